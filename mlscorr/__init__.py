@@ -1,0 +1,17 @@
+"""Correct mobile laser scans with surveyed targets by least squares collocation."""
+
+from importlib import import_module
+
+_HOMES = {"read_survey": "mlscorr.io.survey_file", "correct": "mlscorr.pipeline"}
+__all__ = ["correct", "read_survey"]
+
+
+def __getattr__(name):
+    """Load what is asked for, and the libraries it needs, only then."""
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'mlscorr' has no attribute '{name}'")
+
+
+def __dir__():
+    return sorted([*globals(), *__all__])

@@ -1,0 +1,97 @@
+"""Misclosures before and after a correction, of control and of check points."""
+
+import numpy as np
+
+from mlscorr.survey import PointCloud
+
+CHECK_REASON = "check point"  # why it took no part in the estimate
+
+
+def misclosures(observations, control, correction=None):
+    """Surveyed - observed (n, 3) of matched observations, after a correction if one is given.
+
+    A correction is anything with ``apply(cloud) -> cloud``. Units: m.
+    """
+    surveyed = control.position[_rows(observations, control)]
+    observed = observations.position
+    if correction is not None:
+        centres = PointCloud(observed, observations.gps_time, np.zeros(len(observations)))
+        observed = correction.apply(centres).xyz
+    return surveyed - observed
+
+
+def _rows(observations, control):
+    return np.array([control.name.index(name) for name in observations.name], dtype=int)
+
+
+def statistics(residuals):
+    """RMSE, mean, least and largest residual per axis of (n, 3) in m, as lists of three.
+
+    None stands for each where there is no residual.
+
+    >>> statistics(np.array([[0.3, 0.0, -0.1], [-0.4, 0.0, 0.1]]))["rmse"]
+    [0.3535..., 0.0, 0.1]
+    """
+    if len(residuals) == 0:
+        return {"rmse": None, "mean": None, "min": None, "max": None}
+    return {
+        "rmse": np.sqrt(np.mean(residuals**2, axis=0)).tolist(),
+        "mean": residuals.mean(axis=0).tolist(),
+        "min": residuals.min(axis=0).tolist(),
+        "max": residuals.max(axis=0).tolist(),
+    }
+
+
+def before_and_after(observations, control, correction):
+    """Number of observations, and their statistics before and after a correction."""
+    return {
+        "n": len(observations),
+        "before": statistics(misclosures(observations, control)),
+        "after": statistics(misclosures(observations, control, correction)),
+    }
+
+
+def target_rows(observations, control, correction, role, reasons):
+    """One row for each observation of these surveyed points, as report.json has them.
+
+    reasons (n,) say why an observation took no part in the estimate; None where it did. sigma is
+    that of the misclosure: survey and extraction together (Eq. 19).
+    """
+    surveyed = _rows(observations, control)
+    before = misclosures(observations, control)
+    after = misclosures(observations, control, correction)
+    extraction = np.einsum("nii->ni", observations.covariance)
+    sigma = np.sqrt(control.sigma[surveyed] ** 2 + extraction)
+    return [
+        {
+            "name": name,
+            "pass": int(observations.pass_number[i]),
+            "gps_time": float(observations.gps_time[i]),
+            "role": role,
+            "surveyed": control.position[surveyed[i]].tolist(),
+            "observed": observations.position[i].tolist(),
+            "sigma": sigma[i].tolist(),
+            "before": before[i].tolist(),
+            "after": after[i].tolist(),
+            "used": reasons[i] is None,
+            "reason": reasons[i],
+        }
+        for i, name in enumerate(observations.name)
+    ]
+
+
+def unseen_row(name, pass_number, control, role, reason):
+    """The row of a surveyed point without an observation, and why it has none."""
+    return {
+        "name": name,
+        "pass": pass_number,
+        "gps_time": None,
+        "role": role,
+        "surveyed": control.position[control.name.index(name)].tolist(),
+        "observed": None,
+        "sigma": None,
+        "before": None,
+        "after": None,
+        "used": False,
+        "reason": reason,
+    }

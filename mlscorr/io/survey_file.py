@@ -1,0 +1,262 @@
+"""survey.toml and the files it names, as one Survey (interface.md, section 1)."""
+
+import glob
+import tomllib
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from scipy.spatial.transform import Rotation
+
+from mlscorr.io.control import read_control
+from mlscorr.io.las import sample_gps_times
+from mlscorr.io.sbet import check_crs, describe_projection
+from mlscorr.io.tables import ENCODING, nearest
+from mlscorr.io.time_systems import match_times
+from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
+from mlscorr.survey import CloudFile, Mounting, Pos, Scanner, Survey
+
+FILE_NAME = "survey.toml"
+NEAR = 1e3  # m, a survey's control lies within this distance of the trajectory
+FAR = 5e3  # m, beyond which control and trajectory can't belong together
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
+Three = Field(min_length=3, max_length=3)
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class CloudSection(_Section):
+    files: Annotated[list[str], Field(min_length=1)]
+    gps_time: Literal["auto", "week", "standard"] = "auto"
+
+
+class TrajectorySection(_Section):
+    file: str
+    accuracy: str | None = None
+
+
+class MountingSection(_Section):
+    lever_arm: Annotated[list[Meters], Three]  # m: right, forward, up
+    boresight: Annotated[list[Degrees], Three]  # deg, about x, y, z
+
+    def mounting(self):
+        """R_L^P = Rz(c) Ry(b) Rx(a) for the boresight [a, b, c]."""
+        return Mounting(
+            np.array(self.lever_arm), Rotation.from_euler("xyz", self.boresight, degrees=True)
+        )
+
+
+class ControlSection(_Section):
+    file: str
+
+
+class ScannerSection(_Section):
+    range_noise: Positive = Scanner.range_noise  # m
+    angle_noise: Positive = float(np.degrees(Scanner.angle_noise))  # deg
+    lines_per_second: Positive = Scanner.lines_per_second
+
+    def scanner(self):
+        return Scanner(self.range_noise, np.radians(self.angle_noise), self.lines_per_second)
+
+
+class PosSection(_Section):
+    position_sigma: Positive = Pos.position_sigma  # m
+    attitude_sigma: Annotated[list[Positive], Three] = np.degrees(Pos().attitude_sigma).tolist()
+    correlation_time: Positive = Pos.correlation_time  # s
+
+    def pos(self):
+        sigma = np.radians(self.attitude_sigma)
+        return Pos(self.position_sigma, sigma, self.correlation_time)
+
+
+class SceneSection(_Section):
+    reference: str | None = None
+
+
+class Settings(_Section):
+    """What stands in survey.toml, in its own units (deg)."""
+
+    name: str | None = None
+    crs: str | None = None
+    cloud: CloudSection
+    trajectory: TrajectorySection
+    mounting: MountingSection | None = None
+    control: ControlSection
+    scanner: ScannerSection = ScannerSection()
+    pos: PosSection = PosSection()
+    scene: SceneSection = SceneSection()
+
+
+def read_survey(path):
+    """Survey of a survey.toml, or of a folder that holds one.
+
+    Raises ValueError for anything wrong in survey.toml, in the files it names, or between them
+    (times, coordinates); FileNotFoundError for files that aren't there.
+    """
+    path = _survey_toml(path)
+    settings = read_settings(path)
+    clouds, trajectory_file, accuracy, control_file, reference = _files(path, settings)
+    crs = check_crs(settings.crs) if settings.crs else None
+    trajectory = read_trajectory(trajectory_file, settings.crs, accuracy)
+    control, check = read_control(control_file)
+    _check_together(control_file, control + check, trajectory)
+    notes = [f"Coordinates are in {settings.crs} ({crs.name})." if crs else "No CRS was given."]
+    if trajectory_file.suffix.lower() in SBET_SUFFIXES:
+        notes += describe_projection(settings.crs)
+    files = []
+    for cloud in clouds:
+        file, note = _cloud_file(cloud, trajectory, settings.cloud.gps_time)
+        files.append(file)
+        notes.append(note)
+    return Survey(
+        name=settings.name or path.absolute().parent.name,
+        path=path,
+        crs=settings.crs,
+        clouds=tuple(files),
+        trajectory=trajectory,
+        mounting=settings.mounting.mounting() if settings.mounting else None,
+        control=control,
+        check=check,
+        scanner=settings.scanner.scanner(),
+        pos=settings.pos.pos(),
+        reference=reference,
+        notes=tuple(notes),
+    )
+
+
+def read_settings(path):
+    """Settings of a survey.toml, or of a folder that holds one; no other file is opened.
+
+    Raises ValueError that names the line of bad TOML, or every key that is unknown (with the
+    nearest known one), missing, or of the wrong type.
+    """
+    path = _survey_toml(path)
+    try:
+        document = tomllib.loads(path.read_text(encoding=ENCODING))
+    except UnicodeDecodeError:
+        raise ValueError(f"{path} is not a text file in UTF-8.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{path} is not valid TOML: {error}.") from None
+    try:
+        return Settings.model_validate(document)
+    except ValidationError as error:
+        sentences = " ".join(_sentence(item) for item in error.errors())
+        raise ValueError(f"{path}: {sentences}") from None
+
+
+def _survey_toml(path):
+    path = Path(path)
+    if path.is_dir():
+        path = path / FILE_NAME
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist; a survey is a folder with {FILE_NAME}.")
+    return path
+
+
+def _sentence(item):
+    """One sentence on one of pydantic's findings, with the dotted key."""
+    key = ".".join(str(part) for part in item["loc"])
+    if item["type"] == "extra_forbidden":
+        return f"{key} is an unknown key; the nearest known one is {nearest(key, _known_keys())}."
+    if item["type"] == "missing":
+        return f"{key} is missing."
+    message = item["msg"].replace("Input should", "it should").replace("List should", "it should")
+    return f"{key} = {item['input']!r} can't be used: {message[0].lower()}{message[1:]}."
+
+
+def _known_keys(model=Settings, prefix=""):
+    """Every dotted key of survey.toml, sections included."""
+    keys = []
+    for name, field in model.model_fields.items():
+        keys.append(prefix + name)
+        kinds = getattr(field.annotation, "__args__", (field.annotation,))
+        for kind in kinds:
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                keys += _known_keys(kind, f"{prefix}{name}.")
+    return keys
+
+
+def _files(path, settings):
+    """Paths of the clouds, trajectory, accuracy, control and reference; all of them exist."""
+    folder = path.parent
+
+    def existing(key, name):
+        if name is None:
+            return None
+        if not (folder / name).is_file():
+            raise FileNotFoundError(f"{key} of {path} names {folder / name}, which does not exist.")
+        return folder / name
+
+    clouds = []
+    for name in settings.cloud.files:
+        if glob.has_magic(name) and not (folder / name).exists():
+            found = sorted(
+                folder / match for match in glob.glob(name, root_dir=folder, recursive=True)
+            )
+            if not found:
+                raise FileNotFoundError(f"cloud.files of {path}: no file is like {folder / name}.")
+            clouds += found
+        else:
+            clouds.append(existing("cloud.files", name))
+    _check_distinct(path, clouds)
+    return (
+        clouds,
+        existing("trajectory.file", settings.trajectory.file),
+        existing("trajectory.accuracy", settings.trajectory.accuracy),
+        existing("control.file", settings.control.file),
+        existing("scene.reference", settings.scene.reference),
+    )
+
+
+def _check_distinct(path, clouds):
+    """Refuse a cloud file that is named twice, and two of one name: outputs keep the names."""
+    for kind, values in (
+        ("names the file", [str(cloud.resolve()) for cloud in clouds]),
+        (
+            "has files of the same name in different folders, and outputs keep their names:",
+            [cloud.name.casefold() for cloud in clouds],
+        ),
+    ):
+        value, count = Counter(values).most_common(1)[0]
+        if count > 1:
+            raise ValueError(f"cloud.files of {path} {kind} {value} ({count} times).")
+
+
+def _cloud_file(path, trajectory, setting):
+    """CloudFile of a path, and the sentence on its time system."""
+    points, is_standard, times = sample_gps_times(path)
+    match = match_times(path.name, times, is_standard, trajectory, setting)
+    file = CloudFile(path, points, match.constant, match.cloud_system)
+    return file, f"gps_time of {path.name}: {match}."
+
+
+def _check_together(path, points, trajectory):
+    """Refuse control that lies kilometres from the trajectory, as it stands or swapped."""
+    distance = _distance(points.position[:, :2], trajectory)
+    swapped = _distance(points.position[:, 1::-1], trajectory)
+    if distance > NEAR and swapped < NEAR:
+        raise ValueError(
+            f"Easting and northing seem to be swapped in {path}: its nearest point lies "
+            f"{distance / 1e3:.0f} km from the trajectory as it stands, {swapped:.0f} m when "
+            "they are exchanged. Exchange the two columns."
+        )
+    if distance > FAR:
+        raise ValueError(
+            f"The control nearest to the trajectory lies {distance / 1e3:.1f} km from it "
+            f"(limit {FAR / 1e3:.0f} km): {path} and the trajectory may be in different CRS or "
+            "zones. Bring both into the crs of survey.toml."
+        )
+
+
+def _distance(position, trajectory):
+    """Least horizontal distance of points (n, 2) from the trajectory's epochs. Units: m."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(trajectory.position[:, :2]).query(position)[0].min()

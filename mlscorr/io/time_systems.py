@@ -1,0 +1,176 @@
+"""Which constant turns a cloud's gps_time into the trajectory's.
+
+Three systems are in use: GPS seconds of week; GPS seconds since 1980-01-06; and these minus 1e9
+("adjusted standard GPS time"), LAS's own. A LAS header says week or standard, and real files lie:
+plain GPS seconds are found under either flag.
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+WEEK = 604800.0  # s
+ADJUSTMENT = 1e9  # s
+SYSTEMS = ("week", "standard", "gps")
+NAMES = {
+    "week": "GPS seconds of week",
+    "standard": "adjusted standard GPS time (GPS seconds minus 1e9)",
+    "gps": "plain GPS seconds since 1980",
+}
+MOST = 0.5  # share of the times inside the trajectory from which on a constant fits
+EARLIEST = 6.3e8  # s, GPS seconds of the year 2000, before which nobody scanned from a vehicle
+
+
+@dataclass(frozen=True)
+class TimeMatch:
+    """trajectory time = cloud time + constant (s), the two systems, and the share inside."""
+
+    constant: float
+    cloud_system: str
+    trajectory_system: str
+    inside: float
+
+    def __str__(self):
+        if self.constant == 0.0:
+            return f"{NAMES[self.cloud_system]}, as in the trajectory"
+        return (
+            f"{NAMES[self.cloud_system]}; {self.constant:+.0f} s gives the trajectory's "
+            f"{NAMES[self.trajectory_system]}"
+        )
+
+
+def match_times(name, times, is_standard, trajectory, setting="auto"):
+    """Constant between a cloud's times and the trajectory's.
+
+    Parameters
+    ----------
+    name : str
+        The cloud file, for messages.
+    times : (n,) array
+        Times sampled from the cloud, in its own system. Units: s.
+    is_standard : bool
+        What the LAS header says: adjusted standard GPS time, or else seconds of week.
+    trajectory : Trajectory
+    setting : str
+        ``auto`` prefers the header but takes what fits; ``week`` and ``standard`` are obeyed.
+
+    Returns a TimeMatch. Warns when what fits contradicts the header. Raises ValueError when most
+    of the times lie outside the trajectory under every constant.
+
+    >>> from mlscorr.survey import Trajectory, attitude_from_angles
+    >>> level = attitude_from_angles(np.zeros(2), 0.0, 0.0)
+    >>> trajectory = Trajectory(np.array([413200.0, 413300.0]), np.zeros((2, 3)), level)
+    >>> match_times("a.laz", np.array([391040000.0 + 413250.0]), True, trajectory).constant
+    -391040000.0
+    """
+    times = np.asarray(times, dtype=float)
+    times = times[np.isfinite(times)]
+    if not len(times):
+        raise ValueError(f"{name} has no points with a gps_time.")
+    span = trajectory.gps_time[[0, -1]]
+    flagged = "standard" if is_standard else "week"
+    candidates = _candidates(times, span)
+    if setting == "auto":
+        preferred = _best(candidates, times, span, (flagged,))
+        match = preferred or _best(candidates, times, span, _others(flagged, times))
+    else:
+        match = _best(candidates, times, span, (setting,))
+    if match is None:
+        raise ValueError(_nothing_fits(name, times, span, candidates, setting))
+    if setting == "auto":
+        match = _settle_equal(match, times)
+        if match.cloud_system != flagged:
+            warnings.warn(
+                f"The header of {name} says {NAMES[flagged]}, but its times "
+                f"[{times.min():.1f}, {times.max():.1f}] s fit the trajectory as {match}.",
+                stacklevel=2,
+            )
+    return match
+
+
+def _candidates(times, span):
+    """Constants (s) as a list of (constant, cloud system, trajectory system), simplest first."""
+    middle, goal = np.median(times), np.mean(span)
+    found = [(0.0, system, system) for system in SYSTEMS]
+    to_gps = {"standard": ADJUSTMENT, "gps": 0.0}
+    for cloud, added in to_gps.items():  # to seconds of week, or to the other continuous system
+        week = np.floor((middle + added) / WEEK)
+        found += [(added - WEEK * (week + k), cloud, "week") for k in (0, -1, 1)]
+        found += [(added - taken, cloud, t) for t, taken in to_gps.items() if t != cloud]
+    for system, taken in to_gps.items():  # from seconds of week
+        week = np.floor((goal + taken) / WEEK)
+        found += [(WEEK * (week + k) - taken, "week", system) for k in (0, -1, 1)]
+    found += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
+    return found
+
+
+def _inside(times, span, constant):
+    """Share of the times that fall inside the trajectory's span."""
+    return np.mean((times + constant >= span[0]) & (times + constant <= span[1]))
+
+
+def _best(candidates, times, span, systems):
+    """The TimeMatch with most times inside, the first of equals; None when none fits."""
+    best = None
+    for system in systems:
+        for constant, cloud, trajectory in candidates:
+            if cloud != system:
+                continue
+            inside = _inside(times, span, constant)
+            if inside >= MOST and (best is None or inside > best.inside):
+                best = TimeMatch(float(constant), cloud, trajectory, float(inside))
+    return best
+
+
+def _others(flagged, times):
+    """The systems that the header does not name, the likelier by the size of the times first."""
+    likely = _likely(times)
+    others = [system for system in SYSTEMS if system != flagged]
+    return sorted(others, key=lambda system: system not in likely)
+
+
+def _likely(times):
+    """The systems whose range the times lie in."""
+    if times.min() >= 0 and times.max() <= 2 * WEEK:
+        return ("week",)
+    if times.min() >= ADJUSTMENT:
+        return ("gps",)
+    return ("gps", "standard") if times.min() >= EARLIEST else ("standard",)
+
+
+def _settle_equal(match, times):
+    """Name the system of equal times by their size: a constant of zero says nothing of it."""
+    likely = _likely(times)
+    if match.constant != 0.0 or match.cloud_system in likely:
+        return match
+    return TimeMatch(0.0, likely[0], likely[0], match.inside)
+
+
+def _nothing_fits(name, times, span, candidates, setting):
+    """A sentence with both spans, the likely cause and the way out."""
+    shares = [
+        _inside(times, span, constant)
+        for constant, cloud, _ in candidates
+        if setting in ("auto", cloud)
+    ]
+    spans = (
+        f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
+        f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
+    )
+    if max(shares) > 0:
+        return (
+            f"Only {max(shares):.0%} of {spans}: the trajectory covers a part of the cloud. "
+            "Export the whole trajectory, or clip the cloud to it."
+        )
+    if setting == "auto":
+        return (
+            f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
+            "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "
+            "them may be in UTC or local time. Check cloud.files and trajectory.file in "
+            "survey.toml."
+        )
+    return (
+        f'None of {spans}, taken as {NAMES[setting]}, which cloud.gps_time = "{setting}" in '
+        'survey.toml asks for. Try cloud.gps_time = "auto".'
+    )

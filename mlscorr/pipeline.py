@@ -1,0 +1,306 @@
+"""The story from files to files, one screen a command."""
+
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.correction import ORDER, Estimate, estimate_correction
+from mlscorr.evaluation import CHECK_REASON, before_and_after, statistics, target_rows, unseen_row
+from mlscorr.io.las import read_chunks, sha256, write_corrected
+from mlscorr.io.output import (
+    check_output,
+    document,
+    output_folder,
+    write_json,
+    write_targets_csv,
+)
+from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.matching import Matches, match
+from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
+from mlscorr.targets.candidates import Candidates, collect, search_radius
+from mlscorr.targets.extract import extract_targets
+
+SEED = 0  # of the random samples in the plane fit: the same survey gives the same result
+
+
+def find_targets(survey, rng=None, progress=None):
+    """Find the surveyed targets in the cloud and match them: (Matches, Candidates).
+
+    Raises ValueError when no target is found, or none of those found matches.
+    """
+    surveyed = survey.control + survey.check
+    progress = progress or _silent
+    done = progress("Reading the cloud", sum(file.points for file in survey.clouds))
+    candidates = collect(survey.clouds, survey.trajectory, surveyed, read_chunks, done)
+    rng = np.random.default_rng(SEED) if rng is None else rng
+    found = extract_targets(candidates, surveyed, survey.trajectory, survey.scanner, rng)
+    if len(found) == 0:
+        raise ValueError(_nothing_found(survey, candidates))
+    matches = match(found, surveyed, survey.trajectory)
+    if len(matches.matched) == 0:
+        reasons = " ".join(refusal.reason for refusal in matches.refusals[:3])
+        raise ValueError(
+            f"{len(found)} targets were found, and none of them matches one of the "
+            f"{len(surveyed)} surveyed points. {reasons} Are control and cloud in the same CRS?"
+        )
+    return matches, candidates
+
+
+def correct(survey, order=ORDER, rng=None, progress=None):
+    """Find the targets of a survey and estimate the POS error from its control points.
+
+    Parameters
+    ----------
+    survey : Survey
+    order : int
+        Of the polynomial trend of the position error.
+    rng : numpy.random.Generator, optional
+        For the plane fit's random samples; the same seed each time by default.
+    progress : function, optional
+        ``progress(title, total)`` returns a function of the number of points just done.
+
+    Returns a CorrectedSurvey. Raises ValueError when no target is found or matched. The check
+    points take no part.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(duration=8.0, control=4, check=1, lines_per_second=75, points_per_line=400)
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> result = mlscorr.correct(mlscorr.read_survey(folder))
+    >>> max(result.check["after"]["rmse"]) < 0.03
+    True
+    """
+    matches, candidates = find_targets(survey, rng, progress)
+    is_control = np.array([name in survey.control.name for name in matches.matched.name])
+    control, check = matches.matched[is_control], matches.matched[~is_control]
+    if len(control) == 0:
+        raise ValueError(
+            f"None of the {len(survey.control)} control points was found in the cloud, only "
+            f"{len(check)} check points, which must not take part in the estimate."
+        )
+    estimate = estimate_correction(survey.trajectory, control, survey.control, survey.pos, order)
+    for sentence in estimate.warnings:
+        warnings.warn(sentence, stacklevel=2)
+    return CorrectedSurvey(
+        survey=survey,
+        estimate=estimate,
+        control_observations=control,
+        check_observations=check,
+        unseen=_unseen(survey, matches, candidates),
+    )
+
+
+@dataclass(frozen=True)
+class CorrectedSurvey:
+    """A corrected survey: the estimate, the targets, the statistics, and ``write``.
+
+    ``control`` and ``check`` hold n and the misclosures' statistics before and after, in m;
+    ``unseen`` are the surveyed points without an observation, as rows of report.json.
+    """
+
+    survey: Survey
+    estimate: Estimate
+    control_observations: TargetObservations
+    check_observations: TargetObservations
+    unseen: list[dict] = field(default_factory=list)
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The corrected trajectory, with the sigmas after the estimate."""
+        return self.estimate.correction.corrected
+
+    @property
+    def control(self):
+        fit = self._statistics(self.control_observations, self.survey.control)
+        left_out = self.estimate.left_out[np.isfinite(self.estimate.left_out).all(axis=1)]
+        return {**fit, "leave_one_out": {"rmse": statistics(left_out)["rmse"]}}
+
+    @property
+    def check(self):
+        return self._statistics(self.check_observations, self.survey.check)
+
+    @property
+    def targets(self):
+        """Rows of every surveyed point and pass, as report.json has them."""
+        correction = self.estimate.correction
+        outliers = {outlier.name: outlier for outlier in self.estimate.outliers}
+        reasons = [
+            f"outlier: statistic {outliers[name].statistic:.1f} against "
+            f"{outliers[name].critical:.1f}"
+            if name in outliers
+            else None
+            for name in self.control_observations.name
+        ]
+        rows = target_rows(
+            self.control_observations, self.survey.control, correction, "control", reasons
+        )
+        none = [CHECK_REASON] * len(self.check_observations)
+        rows += target_rows(self.check_observations, self.survey.check, correction, "check", none)
+        return rows + self.unseen
+
+    def _statistics(self, observations, points: ControlPoints):
+        return before_and_after(observations, points, self.estimate.correction)
+
+    def write(self, out, overwrite=False, progress=None):
+        """Write corrected clouds, trajectory, targets and report into a folder.
+
+        The folder appears whole or not at all. Returns the document of report.json. Raises
+        ValueError when the folder holds an input, or holds anything without overwrite; OSError
+        when writing fails.
+        """
+        from mlscorr.report import write_pictures, write_report
+
+        inputs = [file.path for file in self.survey.clouds]
+        check_output(out, [*inputs, self.survey.path], overwrite)
+        with output_folder(out) as folder:
+            files, outside = self._write_clouds(folder, progress or _silent)
+            report = document("report", self._report(files, outside))
+            write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
+            write_targets_csv(folder / "targets.csv", report["targets"])
+            write_json(folder / "report.json", report)
+            write_report(folder / "report.html", self.survey, self.estimate.correction, report)
+            (folder / "pictures").mkdir()
+            write_pictures(folder / "pictures", self.survey, self.estimate.correction, report)
+        return report
+
+    def _write_clouds(self, folder, progress):
+        """The corrected clouds; rows of report.json, and points outside (trajectory, control)."""
+        first, last = self.estimate.span
+        files, outside_trajectory, outside_control = [], 0, 0
+        done = progress("Writing the cloud", sum(file.points for file in self.survey.clouds))
+
+        def watch(times):
+            nonlocal outside_control
+            outside_control += int(np.count_nonzero((times < first) | (times > last)))
+            done(len(times))
+
+        for file in self.survey.clouds:
+            target = folder / file.path.name
+            correction = self.estimate.correction
+            outside_trajectory += write_corrected(file, target, correction, watch)
+            files.append({"name": file.path.name, "points": file.points, "sha256": sha256(target)})
+        return files, (outside_trajectory, outside_control)
+
+    def _report(self, files, outside):
+        epochs = np.unique(self.control_observations.gps_time[self.estimate.used])
+        return {
+            "name": self.survey.name,
+            "crs": self.survey.crs,
+            "notes": list(self.survey.notes),
+            "targets": self.targets,
+            "control": self.control,
+            "check": self.check,
+            "model": _model(self.estimate),
+            "coverage": {
+                "control_span": list(self.estimate.span),
+                "longest_gap_s": float(np.diff(epochs).max(initial=0.0)),
+                "points_outside_trajectory": outside[0],
+                "points_outside_control": outside[1],
+            },
+            "files": files,
+        }
+
+
+def _silent(title, total):
+    return lambda points: None
+
+
+def _model(estimate):
+    """The model section of report.json."""
+    alternatives = [
+        {**_covariance(parameters), "log_posterior": value}
+        for parameters, value in estimate.alternatives
+    ]
+    return {
+        "method": "lsc",
+        "order": estimate.order,
+        "covariance": _covariance(estimate.parameters),
+        "estimated_by": "restricted maximum likelihood of the control points",
+        "log_likelihood": estimate.log_likelihood,
+        "sigma0": estimate.sigma0,
+        "outliers": [
+            {"name": o.name, "statistic": o.statistic, "critical": o.critical}
+            for o in estimate.outliers
+        ],
+        "alternatives": alternatives,
+        "warnings": list(estimate.warnings),
+    }
+
+
+def _covariance(parameters):
+    return {
+        "family": parameters.family,
+        "correlation_time": parameters.drift_time,
+        "scale": parameters.drift_scale,
+        "jitter_correlation_time": parameters.jitter_time,
+        "jitter_scale": parameters.jitter_scale,
+    }
+
+
+def _unseen(survey, matches: Matches, candidates: Candidates):
+    """Rows of the surveyed points without an observation, with the reason."""
+    rows = []
+    for refusal in matches.refusals:
+        role = "control" if refusal.name in survey.control.name else "check"
+        points = survey.control if role == "control" else survey.check
+        reason = _no_pose(points, refusal.name, survey.trajectory, candidates) or refusal.reason
+        rows.append(unseen_row(refusal.name, refusal.pass_number, points, role, reason))
+    return rows
+
+
+def _no_pose(points, name, trajectory, candidates):
+    """Why a target was not seen, when points near it have no pose; else None."""
+    row = points.name.index(name)
+    near = candidates.unplaced.xyz - points.position[row]
+    times = candidates.unplaced.gps_time[
+        np.linalg.norm(near, axis=1) <= search_radius(trajectory, points)[row]
+    ]
+    if len(times) == 0:
+        return None
+    return (
+        f"{len(times)} points near it, at {times.min():.1f} to {times.max():.1f} s, were measured "
+        "in a gap of the trajectory or outside it, and nothing is interpolated there."
+    )
+
+
+def _nothing_found(survey, candidates):
+    """The sentence for a cloud in which no target was found."""
+    surveyed = survey.control + survey.check
+    radius = search_radius(survey.trajectory, surveyed).max()
+    intensity = candidates.cloud.intensity
+    if len(candidates.unplaced) > len(candidates.cloud):
+        return (
+            f"No target was found: {len(candidates.unplaced)} of the points near surveyed points "
+            "were measured in gaps of the trajectory or outside it. Export the whole trajectory."
+        )
+    if len(intensity) == 0:
+        return (
+            f"No point of the cloud lies within {radius:.1f} m of any of the {len(surveyed)} "
+            "surveyed points. Are control and cloud in the same CRS and of the same street?"
+        )
+    return (
+        f"None of the {len(surveyed)} surveyed targets was found among {len(intensity)} points "
+        f"within {radius:.1f} m of them (intensity {intensity.min():.0f} to "
+        f"{intensity.max():.0f}). Targets are circles or squares of the surveyed size, brighter "
+        "than what surrounds them: check kind and size in the control file, and the intensity."
+    )
+
+
+def demo(out, seed=1, overwrite=False, progress=None):
+    """Simulate a small survey and correct it: a folder with ``survey`` and ``corrected``.
+
+    Returns the corrected survey's document of report.json.
+    """
+    from mlscorr.io.survey_file import read_survey
+    from mlscorr.simulate import DEMO, simulate
+
+    check_output(out, [], overwrite)
+    with output_folder(out) as folder:
+        simulated = Path(folder) / "survey"
+        simulated.mkdir()
+        simulate(DEMO, np.random.default_rng(seed)).write(simulated)
+        result = correct(read_survey(simulated), progress=progress)
+        return result.write(Path(folder) / "corrected", progress=progress)

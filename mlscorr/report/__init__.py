@@ -1,0 +1,6 @@
+"""The report of a correction: figures and one self-contained page."""
+
+from mlscorr.report.figures import write_pictures
+from mlscorr.report.html import write_report
+
+__all__ = ["write_pictures", "write_report"]

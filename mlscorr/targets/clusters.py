@@ -1,0 +1,63 @@
+"""Bright components of a cloud at several levels of intensity, as in a component tree.
+
+A target is brighter than what surrounds it, but intensity falls with range and incidence, so no
+single threshold serves. Each component at each level is a candidate; the shape decides.
+"""
+
+import numpy as np
+from sklearn.cluster import DBSCAN
+
+LEVELS = 16  # between the darkest and the brightest point of a region, in equal ratios
+FEWEST_POINTS = 20  # on a target: fewer can't tell plane and outline
+
+MOST_POINTS = 5000  # of which half may be bright where a target hides all that is behind it
+
+
+def split_by_time(gps_time, pause):
+    """Runs of points without a pause longer than this (s): a list of index arrays, in time."""
+    order = np.argsort(gps_time, kind="stable")
+    breaks = np.flatnonzero(np.diff(gps_time[order]) > pause) + 1
+    return np.split(order, breaks)
+
+
+def bright_components(xyz, intensity, links):
+    """Index arrays of connected components of points brighter than each of several levels.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    intensity : (n,) array
+        Of any positive scale.
+    links : sequence of float
+        Points closer than this belong together; each is tried. Units: m.
+
+    Yields (level, rows); a component that stays the same over levels comes once, at the highest.
+    """
+    low, high = np.percentile(intensity, 1), intensity.max()
+    seen = set()
+    for level in np.geomspace(max(high, 1.0), max(low, 1.0), LEVELS + 1)[1:]:
+        bright = np.flatnonzero(intensity >= level)
+        if len(bright) < FEWEST_POINTS:
+            continue
+        if len(bright) > max(MOST_POINTS, len(intensity) / 2):
+            return  # this is the background: road and walls
+        for rows in (part for link in links for part in _components(xyz, bright, link)):
+            if len(rows) >= FEWEST_POINTS and (key := (rows[0], rows[-1], len(rows))) not in seen:
+                seen.add(key)
+                yield float(level), rows
+
+
+def _components(xyz, rows, link):
+    """Rows of each connected component among some rows, each in order."""
+    label = _connected(xyz[rows], link)
+    order = np.argsort(label, kind="stable")
+    return np.split(rows[order], np.flatnonzero(np.diff(label[order])) + 1)
+
+
+def _connected(xyz, link):
+    """Component number of each point: occupied voxels first, so that density costs nothing."""
+    voxel = link / 3
+    cells, cell_of = np.unique(np.floor(xyz / voxel).astype(np.int64), axis=0, return_inverse=True)
+    label = DBSCAN(eps=link, min_samples=1).fit_predict(cells * voxel)
+    return label[cell_of.ravel()]

@@ -1,0 +1,227 @@
+"""Candidates -> bright components -> plane -> circle or square -> TargetObservations."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from mlscorr.survey import TargetObservations
+from mlscorr.targets.candidates import search_radius
+from mlscorr.targets.clusters import FEWEST_POINTS, bright_components, split_by_time
+from mlscorr.targets.outside import Pulses, missed_points
+from mlscorr.targets.plane import Plane, fit_plane
+from mlscorr.targets.shapes import Outline, fit_outline
+
+PLANE_TOLERANCE = 0.03  # m: several sigmas of range noise, less than a post's or a frame's depth
+LINK_SHARES = 0.2, 0.4  # of the target's size: beside a bright post; with wide scan lines
+PAUSE = 2.0  # s without a point: the vehicle came by twice
+LEAST_EXTENT = 0.7, 0.4  # of the size, along and across: a target may be partly hidden
+LEAST_OVERLAP = 0.8  # of the fitted outline with the bright points
+LARGEST_SIGMA = 0.10  # of the size: beyond it the outline holds the centre in one direction only
+FLOOR = 0.001  # m, one sigma: LAS rounding and what the model leaves out
+BEAM_DIVERGENCE = 0.35e-3  # rad, RIEGL VQ-250 data sheet
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A bright component on a plane, its points marked inside or outside, and a rough outline."""
+
+    pulses: Pulses
+    rows: np.ndarray
+    plane: Plane
+    marked: tuple[np.ndarray, np.ndarray]
+    kind: str
+    size: float
+    outline: Outline
+
+    @property
+    def position(self):
+        return self.plane.origin + self.outline.centre @ self.plane.axes[:2]
+
+
+@dataclass(frozen=True)
+class _Target:
+    """One fitted target: a row of TargetObservations."""
+
+    gps_time: float
+    position: np.ndarray
+    covariance: np.ndarray
+    normal: np.ndarray
+    kind: str
+    size: float
+    points: int
+
+
+def extract_targets(candidates, control, trajectory, scanner, rng):
+    """Find circles and squares of the surveyed kinds and sizes near control points.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    control : ControlPoints
+        Control and check points together: they say where to look and for what.
+    trajectory : Trajectory
+        As recorded.
+    scanner : Scanner
+        Noise that blurs the outline.
+    rng : numpy.random.Generator
+        For the random samples of the plane fit.
+
+    Returns TargetObservations without names, in order of pass and time.
+    """
+    passes = _pass_numbers(candidates)
+    regions = _regions(control.position, search_radius(trajectory, control))
+    tree = cKDTree(candidates.cloud.xyz) if len(candidates.cloud) else None
+    found = []
+    for members in regions if tree is not None else ():
+        radii = search_radius(trajectory, control)[members]
+        near = tree.query_ball_point(control.position[members], radii)
+        rows = np.unique(np.concatenate([np.asarray(part, int) for part in near]))
+        shapes = sorted({(control.kind[i], float(control.size[i])) for i in members})
+        for number in np.unique(passes[rows]):
+            visit = rows[passes[rows] == number]
+            for target in _targets_of_pass(
+                candidates.cloud[visit], shapes, trajectory, scanner, rng
+            ):
+                found.append((int(number), target))
+    found.sort(key=lambda pair: (pair[0], pair[1].gps_time))
+    return _as_observations(found)
+
+
+def _pass_numbers(candidates):
+    """Pass of each point, from 1 in time: a pass starts with each file and after each gap."""
+    keys, index = np.unique(
+        np.column_stack([candidates.segment, candidates.file]), axis=0, return_inverse=True
+    )
+    start = np.array(
+        [candidates.cloud.gps_time[index.ravel() == k].min() for k in range(len(keys))]
+    )
+    rank = np.empty(len(keys), dtype=int)
+    rank[np.argsort(start, kind="stable")] = np.arange(1, len(keys) + 1)
+    return rank[index.ravel()] if len(keys) else np.empty(0, int)
+
+
+def _regions(position, radius):
+    """Groups of control points whose neighbourhoods touch: index arrays."""
+    pairs = cKDTree(position).sparse_distance_matrix(cKDTree(position), 2 * radius.max()).tocoo()
+    touching = pairs.data <= radius[pairs.row] + radius[pairs.col]
+    graph = np.zeros((len(position), len(position)), dtype=bool)
+    graph[pairs.row[touching], pairs.col[touching]] = True
+    _, label = connected_components(graph, directed=False)
+    return [np.flatnonzero(label == number) for number in np.unique(label)]
+
+
+def _targets_of_pass(cloud, shapes, trajectory, scanner, rng):
+    """Targets (of any of the shapes) in one region and pass; the best fit at each place."""
+    roughly = []
+    for visit in split_by_time(cloud.gps_time, PAUSE):
+        part = cloud[visit]
+        sight = part.xyz - trajectory.at(part.gps_time).position
+        pulses = Pulses(part.xyz, part.gps_time, part.intensity, sight)
+        links = np.multiply(LINK_SHARES, min(size for _, size in shapes))
+        for level, rows in bright_components(part.xyz, part.intensity, links):
+            for kind, size in shapes:
+                candidate = _candidate(pulses, level, rows, kind, size, rng)
+                if candidate is not None:
+                    roughly.append(candidate)
+    best = []
+    for one in sorted(roughly, key=lambda one: -one.outline.overlap * np.sqrt(len(one.rows))):
+        near = [np.linalg.norm(one.position - other.position) for other in best]
+        if min(near, default=np.inf) > one.size / 2:
+            best.append(one)
+    return [target for one in best if (target := _fit_target(one, scanner)) is not None]
+
+
+def _candidate(pulses, level, rows, kind, size, rng):
+    """The component as a target of this kind and size, or None where it can't be one."""
+    longest = size * (1.0 if kind == "circle" else np.sqrt(2))
+    if np.ptp(pulses.xyz[rows], axis=0).max() > 1.3 * longest:
+        return None
+    plane = fit_plane(pulses.xyz[rows], PLANE_TOLERANCE, rng)
+    if plane.inliers.sum() < max(FEWEST_POINTS, 0.7 * len(rows)):
+        return None
+    rows = rows[plane.inliers]
+    extent = np.ptp(plane.coordinates(pulses.xyz[rows])[:, :2], axis=0)
+    if extent.max() < LEAST_EXTENT[0] * size or extent.min() < LEAST_EXTENT[1] * size:
+        return None
+    marked = _marked_points(pulses, rows, plane, level, size)
+    outline = fit_outline(*marked, kind, size, blur=size / 30, stages=2)
+    if outline.overlap < LEAST_OVERLAP - 0.05:
+        return None
+    return _Candidate(pulses, rows, plane, marked, kind, size, outline)
+
+
+def _fit_target(candidate, scanner):
+    """The candidate with its exact outline, or None where that doesn't fit or hold the centre."""
+    blur = _blur(candidate, scanner)
+    outline = fit_outline(*candidate.marked, candidate.kind, candidate.size, blur)
+    largest = np.sqrt(np.linalg.eigvalsh(outline.covariance)[-1])
+    if outline.overlap < LEAST_OVERLAP or largest > LARGEST_SIGMA * candidate.size:
+        return None
+    return _as_target(replace(candidate, outline=outline))
+
+
+def _marked_points(pulses, rows, plane, level, size):
+    """Points (n, 2) in the plane near the target, and whether each is bright: real returns and
+    the places where pulses missed it."""
+    local = plane.coordinates(pulses.xyz)
+    centre = local[rows, :2].mean(axis=0)
+    close = np.hypot(*(local[:, :2] - centre).T) < 1.2 * size
+    on_plane = np.flatnonzero(close & (np.abs(local[:, 2]) <= PLANE_TOLERANCE))
+    missed = missed_points(pulses, rows, plane, PLANE_TOLERANCE)
+    points = np.vstack([local[on_plane, :2], missed])
+    bright = np.append(pulses.intensity[on_plane] >= level, np.zeros(len(missed), bool))
+    return points, bright
+
+
+def _blur(candidate, scanner):
+    """One sigma of a point's place across the outline, from angle and range noise and beam (m)."""
+    sight = candidate.pulses.sight[candidate.rows].mean(axis=0)
+    distance = np.linalg.norm(sight)
+    cosine = candidate.plane.axes[2] @ sight / distance
+    parts = (
+        scanner.angle_noise * distance,
+        scanner.range_noise * np.sqrt(max(1 - cosine**2, 0.0)),
+        BEAM_DIVERGENCE * distance / 4,  # diameter to one sigma
+    )
+    return float(np.sqrt(np.square(parts).sum()))
+
+
+def _as_target(candidate):
+    """Centre in the map, its covariance, normal towards the vehicle, and time of the centre."""
+    plane, rows, outline = candidate.plane, candidate.rows, candidate.outline
+    local = plane.coordinates(candidate.pulses.xyz[rows])[:, :2]
+    # time and height at the centre, by regression: the points may lie on one side of it
+    basis = np.column_stack([np.ones(len(rows)), local - outline.centre])
+    weights = np.linalg.pinv(basis)[0]
+    time = candidate.pulses.gps_time[rows]
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = outline.covariance
+    covariance[2, 2] = plane.sigma**2 * (weights @ weights)
+    away = plane.axes[2] @ candidate.pulses.sight[rows].mean(axis=0) > 0
+    return _Target(
+        gps_time=float(np.clip(time[0] + weights @ (time - time[0]), time[0], time[-1])),
+        position=candidate.position,
+        covariance=plane.axes.T @ covariance @ plane.axes + FLOOR**2 * np.eye(3),
+        normal=-plane.axes[2] if away else plane.axes[2],
+        kind=candidate.kind,
+        size=candidate.size,
+        points=len(rows),
+    )
+
+
+def _as_observations(found):
+    n = len(found)
+    targets = [target for _, target in found]
+    return TargetObservations(
+        name=(None,) * n,
+        pass_number=np.array([number for number, _ in found], dtype=int),
+        gps_time=np.array([target.gps_time for target in targets], dtype=float),
+        position=np.array([target.position for target in targets]).reshape(n, 3),
+        covariance=np.array([target.covariance for target in targets]).reshape(n, 3, 3),
+        normal=np.array([target.normal for target in targets]).reshape(n, 3),
+        kind=tuple(target.kind for target in targets),
+        size=np.array([target.size for target in targets], dtype=float),
+        points=np.array([target.points for target in targets], dtype=int),
+    )
