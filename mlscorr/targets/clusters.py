@@ -10,7 +10,7 @@ from sklearn.cluster import DBSCAN
 LEVELS = 16  # between the darkest and the brightest point of a region, in equal ratios
 FEWEST_POINTS = 20  # on a target: fewer can't tell plane and outline
 
-MOST_POINTS = 5000  # of which half may be bright where a target hides all that is behind it
+MOST_POINTS = 5000  # may be bright, or a quarter of the region: more are road and walls
 
 
 def split_by_time(gps_time, pause):
@@ -40,8 +40,8 @@ def bright_components(xyz, intensity, links):
         bright = np.flatnonzero(intensity >= level)
         if len(bright) < FEWEST_POINTS:
             continue
-        if len(bright) > max(MOST_POINTS, len(intensity) / 2):
-            return  # this is the background: road and walls
+        if len(bright) > max(MOST_POINTS, len(intensity) / 4):
+            return
         for rows in (part for link in links for part in _components(xyz, bright, link)):
             if len(rows) >= FEWEST_POINTS and (key := (rows[0], rows[-1], len(rows))) not in seen:
                 seen.add(key)

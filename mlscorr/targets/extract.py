@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from mlscorr.survey import TargetObservations
@@ -70,21 +69,21 @@ def extract_targets(candidates, control, trajectory, scanner, rng):
 
     Returns TargetObservations without names, in order of pass and time.
     """
+    if len(candidates.cloud) == 0:
+        return _as_observations([])
     passes = _pass_numbers(candidates)
-    regions = _regions(control.position, search_radius(trajectory, control))
-    tree = cKDTree(candidates.cloud.xyz) if len(candidates.cloud) else None
+    near = cKDTree(candidates.cloud.xyz).query_ball_point(
+        control.position, search_radius(trajectory, control)
+    )
     found = []
-    for members in regions if tree is not None else ():
-        radii = search_radius(trajectory, control)[members]
-        near = tree.query_ball_point(control.position[members], radii)
-        rows = np.unique(np.concatenate([np.asarray(part, int) for part in near]))
-        shapes = sorted({(control.kind[i], float(control.size[i])) for i in members})
+    for index, rows in enumerate(near):
+        rows = np.sort(np.asarray(rows, int))
+        shape = control.kind[index], float(control.size[index])
         for number in np.unique(passes[rows]):
-            visit = rows[passes[rows] == number]
-            for target in _targets_of_pass(
-                candidates.cloud[visit], shapes, trajectory, scanner, rng
-            ):
-                found.append((int(number), target))
+            cloud = candidates.cloud[rows[passes[rows] == number]]
+            for target in _targets_of_pass(cloud, *shape, trajectory, scanner, rng):
+                if not any(number == n and _same_place(target, other) for n, other in found):
+                    found.append((int(number), target))
     found.sort(key=lambda pair: (pair[0], pair[1].gps_time))
     return _as_observations(found)
 
@@ -102,35 +101,28 @@ def _pass_numbers(candidates):
     return rank[index.ravel()] if len(keys) else np.empty(0, int)
 
 
-def _regions(position, radius):
-    """Groups of control points whose neighbourhoods touch: index arrays."""
-    pairs = cKDTree(position).sparse_distance_matrix(cKDTree(position), 2 * radius.max()).tocoo()
-    touching = pairs.data <= radius[pairs.row] + radius[pairs.col]
-    graph = np.zeros((len(position), len(position)), dtype=bool)
-    graph[pairs.row[touching], pairs.col[touching]] = True
-    _, label = connected_components(graph, directed=False)
-    return [np.flatnonzero(label == number) for number in np.unique(label)]
-
-
-def _targets_of_pass(cloud, shapes, trajectory, scanner, rng):
-    """Targets (of any of the shapes) in one region and pass; the best fit at each place."""
+def _targets_of_pass(cloud, kind, size, trajectory, scanner, rng):
+    """Targets of a kind and size near one control point in one pass; the best fit at each place."""
     roughly = []
     for visit in split_by_time(cloud.gps_time, PAUSE):
         part = cloud[visit]
         sight = part.xyz - trajectory.at(part.gps_time).position
-        pulses = Pulses(part.xyz, part.gps_time, part.intensity, sight)
-        links = np.multiply(LINK_SHARES, min(size for _, size in shapes))
+        pulses = Pulses(part.xyz, part.gps_time, part.intensity, sight, cKDTree(part.xyz))
+        links = np.multiply(LINK_SHARES, size)
         for level, rows in bright_components(part.xyz, part.intensity, links):
-            for kind, size in shapes:
-                candidate = _candidate(pulses, level, rows, kind, size, rng)
-                if candidate is not None:
-                    roughly.append(candidate)
+            candidate = _candidate(pulses, level, rows, kind, size, rng)
+            if candidate is not None:
+                roughly.append(candidate)
     best = []
     for one in sorted(roughly, key=lambda one: -one.outline.overlap * np.sqrt(len(one.rows))):
-        near = [np.linalg.norm(one.position - other.position) for other in best]
-        if min(near, default=np.inf) > one.size / 2:
+        if not any(_same_place(one, other) for other in best):
             best.append(one)
     return [target for one in best if (target := _fit_target(one, scanner)) is not None]
+
+
+def _same_place(one, other):
+    """Whether two targets are one: half a target apart or less."""
+    return np.linalg.norm(one.position - other.position) < max(one.size, other.size) / 2
 
 
 def _candidate(pulses, level, rows, kind, size, rng):
@@ -165,13 +157,13 @@ def _fit_target(candidate, scanner):
 def _marked_points(pulses, rows, plane, level, size):
     """Points (n, 2) in the plane near the target, and whether each is bright: real returns and
     the places where pulses missed it."""
-    local = plane.coordinates(pulses.xyz)
-    centre = local[rows, :2].mean(axis=0)
-    close = np.hypot(*(local[:, :2] - centre).T) < 1.2 * size
-    on_plane = np.flatnonzero(close & (np.abs(local[:, 2]) <= PLANE_TOLERANCE))
+    close = np.array(pulses.tree.query_ball_point(pulses.xyz[rows].mean(axis=0), 1.2 * size))
+    local = plane.coordinates(pulses.xyz[close])
+    on_plane = np.abs(local[:, 2]) <= PLANE_TOLERANCE
     missed = missed_points(pulses, rows, plane, PLANE_TOLERANCE)
     points = np.vstack([local[on_plane, :2], missed])
-    bright = np.append(pulses.intensity[on_plane] >= level, np.zeros(len(missed), bool))
+    returned = pulses.intensity[close[on_plane]] >= level
+    bright = np.append(returned, np.zeros(len(missed), bool))
     return points, bright
 
 

@@ -8,18 +8,22 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 IN_FRONT = 0.10  # m: a neighbour nearer to the vehicle by this hides the target
 
 
 @dataclass(frozen=True)
 class Pulses:
-    """Points of one region and visit in order of time; sight (n, 3) is vehicle to point in m."""
+    """Points of one region and visit in order of time; sight (n, 3) is vehicle to point in m,
+    tree finds points by place.
+    """
 
     xyz: np.ndarray
     gps_time: np.ndarray
     intensity: np.ndarray
     sight: np.ndarray
+    tree: cKDTree
 
 
 def missed_points(pulses, rows, plane, tolerance):
