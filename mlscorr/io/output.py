@@ -9,19 +9,23 @@ import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
+PART = ".part"  # ends the name of a folder that isn't whole yet
+
 
 def check_output(out, inputs, overwrite=False):
-    """Refuse an output folder that holds an input, or holds anything without overwrite.
+    """Refuse an output folder that holds an input, holds anything without overwrite, or that
+    can't be written.
 
-    Raises ValueError.
+    Raises ValueError; OSError when it can't be written.
     """
     out = Path(out)
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out} is a file; the results need a folder. Choose another name.")
-    for path in inputs:
-        if Path(path).resolve().parent == out.resolve():
+    for path in map(Path, inputs):
+        # a link to an input counts where it stands and where it leads
+        if out.resolve() in (path.resolve().parent, path.parent.resolve()):
             raise ValueError(
-                f"The output folder {out} holds the input {Path(path).name}, which would be lost. "
+                f"The output folder {out} holds the input {path.name}, which must stay as it is. "
                 "Choose another folder."
             )
     if out.is_dir() and not overwrite and (present := sorted(p.name for p in out.iterdir())):
@@ -30,6 +34,20 @@ def check_output(out, inputs, overwrite=False):
             "Choose another folder, or allow with --overwrite that files of the same name are "
             "replaced."
         )
+    _check_writable(out)
+
+
+def _check_writable(out):
+    """Make a folder where out will stand, and remove it: what can't be written is told early."""
+    out = out.absolute()
+    place = next(path for path in out.parents if path.exists())
+    try:
+        Path(tempfile.mkdtemp(suffix=PART, dir=place)).rmdir()
+    except OSError as error:
+        raise OSError(
+            f"the output folder {out} can't be made, as {place} takes no folder "
+            f"({error.strerror}). Choose another place."
+        ) from None
 
 
 @contextmanager
@@ -40,23 +58,50 @@ def output_folder(out):
     """
     out = Path(out).absolute()
     out.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".part", dir=out.parent))
+    part = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=PART, dir=out.parent))
     try:
         part.chmod(0o777 & ~_umask())
         yield part
         if out.exists():
-            for path in sorted(part.rglob("*")):
-                target = out / path.relative_to(part)
-                if path.is_dir():
-                    target.mkdir(exist_ok=True)
-                else:
-                    os.replace(path, target)
-            shutil.rmtree(part)
+            _move_into(out, part)
         else:
             os.replace(part, out)
+    finally:
+        _remove(part)
+
+
+def _move_into(out, part):
+    """Move the files of part into out; what they replace is put back when one can't be moved."""
+    files = [path.relative_to(part) for path in sorted(part.rglob("*")) if path.is_file()]
+    replaced, made = Path(tempfile.mkdtemp(dir=part)), []
+    try:
+        for file in files:
+            if not (out / file).parent.exists():
+                (out / file).parent.mkdir()
+                made.append(file.parent)
+            if (out / file).exists():
+                (replaced / file).parent.mkdir(exist_ok=True)
+                os.replace(out / file, replaced / file)
+            os.replace(part / file, out / file)
     except BaseException:
-        shutil.rmtree(part, ignore_errors=True)
+        for file in files:
+            if not (part / file).exists():
+                (out / file).unlink(missing_ok=True)
+            if (replaced / file).exists():
+                os.replace(replaced / file, out / file)
+        for folder in made:
+            (out / folder).rmdir()
         raise
+
+
+def _remove(folder):
+    """Remove a folder, also when an impatient user interrupts once more."""
+    while folder.exists():
+        try:
+            shutil.rmtree(folder, ignore_errors=True)
+            return
+        except KeyboardInterrupt:
+            continue
 
 
 def _umask():

@@ -1,0 +1,27 @@
+# Two commands do everything, set-up included: make demo, make test
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin
+
+.PHONY: demo test bench examples clean
+
+demo: $(VENV)/ready
+	$(RUN)/mlscorr demo -o demo --overwrite
+
+test: $(VENV)/ready
+	$(RUN)/ruff check .
+	$(RUN)/ruff format --check .
+	$(RUN)/python -m pytest
+
+bench: $(VENV)/ready
+	$(RUN)/python benchmarks/bench.py
+
+examples: $(VENV)/ready
+	for script in examples/*.py; do $(RUN)/python $$script || exit 1; done
+
+$(VENV)/ready: pyproject.toml setup.sh
+	PYTHON=$(PYTHON) VENV=$(VENV) sh setup.sh
+	touch $@
+
+clean:
+	rm -rf $(VENV) demo
