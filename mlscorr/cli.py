@@ -49,15 +49,11 @@ def correct(
     """Correct the cloud of a survey with its control points, and report on it."""
     with _exit_code(Exit.USAGE):
         from mlscorr.io.output import check_output
-        from mlscorr.io.survey_file import read_settings, read_survey
+        from mlscorr.io.survey_file import input_files, read_survey
 
-        read_settings(survey)
-    with _exit_code(Exit.BAD_DATA):
-        recorded = read_survey(survey)
-    with _exit_code(Exit.USAGE):
-        inputs = [file.path for file in recorded.clouds]
-        check_output(out, [recorded.path, *inputs], overwrite)
+        check_output(out, input_files(survey), overwrite)
     with _exit_code(Exit.BAD_DATA), _progress() as progress:
+        recorded = read_survey(survey)
         from mlscorr.pipeline import correct
 
         result = correct(recorded, order, progress=progress)
@@ -115,13 +111,18 @@ def doctor(as_json: Json = False):
 
 def main():
     """Entry point of the command line."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that it cleans up as Ctrl-C
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
+        signal.signal(number, _interrupt)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as it is under nohup
+        signal.signal(signal.SIGHUP, _interrupt)
     warnings.showwarning = lambda message, *_, **__: _say(f"Warning: {message}")
-    try:
-        app()
-    except KeyboardInterrupt:
-        _say("Interrupted; nothing was written.")
-        sys.exit(Exit.INTERRUPTED)
+    app()
+
+
+def _interrupt(number, frame):
+    """Raise KeyboardInterrupt, and again after a second where a library swallowed it."""
+    signal.setitimer(signal.ITIMER_REAL, 1.0)
+    raise KeyboardInterrupt
 
 
 @contextmanager
@@ -129,11 +130,15 @@ def _exit_code(code):
     """End with one sentence and an exit code where the user's input or the system is at fault."""
     try:
         yield
-    except FileNotFoundError as error:
-        _fail(error, Exit.USAGE)
+    except KeyboardInterrupt:
+        _stop()
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and error.errno is None:  # survey.toml names it
+            _fail(error, Exit.USAGE)
         _fail(f"Reading or writing failed: {error}", Exit.READ_OR_WRITE)
     except ImportError as error:
+        if signal.getitimer(signal.ITIMER_REAL)[0]:  # it was the import that was interrupted
+            _stop()
         _fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
     except ValueError as error:
         _fail(error, code)
@@ -142,6 +147,12 @@ def _exit_code(code):
 def _fail(message, code):
     _say(f"Error: {message}")
     raise typer.Exit(code) from None
+
+
+def _stop():
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    _say("Interrupted; nothing was written.")
+    raise typer.Exit(Exit.INTERRUPTED) from None
 
 
 def _say(text):

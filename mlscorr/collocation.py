@@ -1,13 +1,15 @@
 """Least squares collocation: l = A x + B s + n  (Mao et al. 2015, Eq. 6 and 13-15)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
+from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
 from mlscorr.covariance import Covariance
 
-CHUNK = 20_000  # epochs predicted at once, which bounds the memory
+CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
+DETERMINED = 1e-9  # least share of the trend's information that must remain without some rows
 
 
 @dataclass(frozen=True)
@@ -38,14 +40,16 @@ class Collocation:
     sigma0 : float
         Square root of the weighted residual sum of squares over the redundancy m - p; one if the
         model is right.
+    factor : (m, m) array
+        Lower triangular F with F F^T = V = B D B^T + N.
     weights : (m,) array
-        V^-1 (l - A x), V = B D B^T + N.
+        V^-1 (l - A x).
     """
 
     gps_time: np.ndarray
     design: np.ndarray
     signals: tuple[Signal, ...]
-    factor: tuple
+    factor: np.ndarray
     trend: np.ndarray
     trend_covariance: np.ndarray
     weights: np.ndarray
@@ -67,9 +71,10 @@ class Collocation:
         -------
         mean, covariance : (q, r), (q, r, r) array
         """
+        step = max(CHUNK // (design.shape[1] * len(self.gps_time)), 1)
         parts = [
             self._predict(gps_time[part], design[part], [mixing[part] for mixing in mixings])
-            for part in (slice(i, i + CHUNK) for i in range(0, len(gps_time), CHUNK))
+            for part in (slice(i, i + step) for i in range(0, len(gps_time), step))
         ]
         mean, covariance = zip(*parts, strict=True)
         return np.concatenate(mean), np.concatenate(covariance)
@@ -82,26 +87,47 @@ class Collocation:
         )
         mean = design @ self.trend + cross @ self.weights
         # Covariance of the prediction error: signal, less what was observed of it, plus trend
-        lower, _ = self.factor
         rows = cross.reshape(-1, len(self.gps_time))
-        half = solve_triangular(lower, rows.T, lower=True).T.reshape(cross.shape)
-        whitened = solve_triangular(lower, self.design, lower=True)
-        left = design - half @ whitened
+        half = solve_triangular(self.factor, rows.T, lower=True).T.reshape(cross.shape)
+        left = design - half @ solve_triangular(self.factor, self.design, lower=True)
         covariance = sum(mixing @ mixing.swapaxes(1, 2) for mixing in mixings)
         covariance -= half @ half.swapaxes(1, 2)
         covariance += left @ self.trend_covariance @ left.swapaxes(1, 2)
         return mean, covariance
 
+    @cached_property
+    def _precision(self):
+        """V^-1 - V^-1 A (A^T V^-1 A)^-1 A^T V^-1, (m, m): weight of what the trend leaves."""
+        inverse = solve_triangular(self.factor, np.eye(len(self.gps_time)), lower=True)
+        inverse = inverse.T @ inverse
+        projected = inverse @ self.design
+        return inverse - projected @ self.trend_covariance @ projected.T
+
+    @cached_property
+    def _leverage(self):
+        """Orthonormal basis (m, p) of the columns of A."""
+        return np.linalg.qr(self.design)[0]
+
+    def determined_without(self, rows):
+        """Whether the observations other than these determine the trend."""
+        basis = self._leverage[rows]
+        if basis.shape[1] == 0:
+            return True
+        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < 1.0 - DETERMINED)
+
     def leave_out(self, rows):
         """What the other observations say of some: residuals (l - prediction) and covariance.
 
         The covariance includes the noise of the observations left out, which is what a test of
-        them needs. Source: Dubrule 1983, Math. Geology 15, 687-699.
+        them needs. Raises ValueError when the others don't determine the trend. Source: Dubrule
+        1983, Math. Geology 15, 687-699.
         """
-        inverse = cho_solve(self.factor, np.eye(len(self.gps_time))[:, rows])
-        projected = cho_solve(self.factor, self.design)
-        block = inverse[rows] - projected[rows] @ self.trend_covariance @ projected[rows].T
-        covariance = np.linalg.pinv(block, hermitian=True)
+        if not self.determined_without(rows):
+            raise ValueError(
+                f"Without the {len(rows)} observations that are left out the other "
+                f"{len(self.gps_time) - len(rows)} do not determine the trend."
+            )
+        covariance = np.linalg.inv(self._precision[np.ix_(rows, rows)])
         return covariance @ self.weights[rows], covariance
 
 
@@ -133,31 +159,23 @@ def collocate(gps_time, misclosure, noise, design, signals):
     >>> solved.trend.round(6)
     array([0.5])
     """
-    lag = gps_time[:, None] - gps_time
-    total = noise + sum(  # V = D_omega + B D_Lambda B^T
-        (signal.mixing @ signal.mixing.T) * signal.covariance(lag) for signal in signals
-    )
-    try:
-        factor = cho_factor(total, lower=True)
-        factor = (np.tril(factor[0]), True)
-    except LinAlgError as problem:
-        raise ValueError(
-            "The covariance of the misclosures is not positive definite: two observations of one "
-            "time without noise, or a sigma of zero."
-        ) from problem
-    normal = design.T @ cho_solve(factor, design)
-    if np.linalg.matrix_rank(normal) < design.shape[1]:
+    factor = _factor(gps_time, noise, signals)
+    whitened = solve_triangular(factor, design, lower=True)
+    if np.linalg.matrix_rank(whitened) < design.shape[1]:
         raise ValueError(
             f"{design.shape[1]} trend parameters are not determined by {len(misclosure)} "
             "misclosures. Lower the order or observe more control points."
         )
-    trend_covariance = np.linalg.inv(normal)
-    trend = trend_covariance @ (design.T @ cho_solve(factor, misclosure))  # Eq. 13
-    residual = misclosure - design @ trend
-    weights = cho_solve(factor, residual)  # the right part of Eq. 14 and 15
-    squares = float(residual @ weights)
+    basis, triangle = np.linalg.qr(whitened)
+    root = np.linalg.inv(triangle)
+    trend_covariance = root @ root.T  # (A^T V^-1 A)^-1
+    trend = root @ (basis.T @ solve_triangular(factor, misclosure, lower=True))  # Eq. 13
+    residual = solve_triangular(factor, misclosure - design @ trend, lower=True)
+    weights = solve_triangular(factor, residual, lower=True, trans="T")  # of Eq. 14 and 15
+    squares = float(residual @ residual)
     redundancy = len(misclosure) - design.shape[1]
-    determinants = 2 * np.log(np.diag(factor[0])).sum() + np.linalg.slogdet(normal)[1]
+    determinants = 2 * np.log(np.diag(factor)).sum()
+    determinants += 2 * np.log(np.abs(np.diag(triangle))).sum()
     log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
     return Collocation(
         gps_time=gps_time,
@@ -170,3 +188,21 @@ def collocate(gps_time, misclosure, noise, design, signals):
         log_likelihood=float(log_likelihood),
         sigma0=float(np.sqrt(squares / redundancy)) if redundancy else float("nan"),
     )
+
+
+def _factor(gps_time, noise, signals):
+    """Lower triangular factor (m, m) of V = D_omega + B D_Lambda B^T."""
+    epochs, of = np.unique(gps_time, return_inverse=True)
+    lag = epochs[:, None] - epochs
+    total = noise + sum(
+        (signal.mixing @ signal.mixing.T) * signal.covariance(lag)[np.ix_(of, of)]
+        for signal in signals
+    )
+    try:
+        return cholesky(total, lower=True)
+    except LinAlgError as problem:
+        raise ValueError(
+            f"The covariance of the {len(gps_time)} misclosures is not positive definite: two "
+            "observations of one time without noise, or a sigma of zero. Give each observation "
+            "and control point the sigma that it has."
+        ) from problem

@@ -14,7 +14,7 @@ PACKAGES = (
     "laspy",
     "lazrs",
     "open3d",
-    "scikit-learn",
+    "threadpoolctl",
     "numba",
     "pyproj",
     "typer",
@@ -39,6 +39,7 @@ renderer.scene.add_geometry("box", open3d.geometry.TriangleMesh.create_box(),
                             open3d.visualization.rendering.MaterialRecord())
 assert renderer.render_to_image() is not None
 """
+INSTALLERS = ("apt-get install -y ", "pip install ")  # that take several names in a line
 RENDER_SECONDS = 60  # a software driver takes two
 
 
@@ -63,11 +64,18 @@ def examine():
 
 
 def remedy(findings):
-    """The lines that install all that is missing, one for each installer."""
-    lines = dict.fromkeys(f.remedy for f in findings if not f.ok and f.remedy)
-    apt = [line.split()[-1] for line in lines if line.startswith("apt-get install")]
-    others = [line for line in lines if not line.startswith("apt-get install")]
-    return ([f"apt-get install -y {' '.join(apt)}"] if apt else []) + others
+    """The lines that install all that is missing, one for each installer.
+
+    >>> missing = [Finding(n, False, "missing", f"pip install {n}") for n in ("lazrs", "numba")]
+    >>> remedy(missing)
+    ['pip install lazrs numba']
+    """
+    lines = list(dict.fromkeys(f.remedy for f in findings if not f.ok and f.remedy))
+    joined = []
+    for installer in INSTALLERS:
+        names = [line.removeprefix(installer) for line in lines if line.startswith(installer)]
+        joined += [installer + " ".join(names)] if names else []
+    return joined + [line for line in lines if not line.startswith(INSTALLERS)]
 
 
 def _package(name):

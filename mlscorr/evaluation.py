@@ -3,6 +3,7 @@
 import numpy as np
 
 from mlscorr.survey import PointCloud
+from mlscorr.targets.candidates import search_radius
 
 CHECK_REASON = "check point"  # why it took no part in the estimate
 
@@ -80,8 +81,42 @@ def target_rows(observations, control, correction, role, reasons):
     ]
 
 
-def unseen_row(name, pass_number, control, role, reason):
-    """The row of a surveyed point without an observation, and why it has none."""
+def unseen_rows(survey, refusals, candidates):
+    """One row for each surveyed point without an observation, with the reason.
+
+    Parameters
+    ----------
+    survey : Survey
+    refusals : sequence of Refusal
+        What the matching gave as reasons.
+    candidates : Candidates
+        Their points without a pose are a better reason.
+    """
+    rows = []
+    for refusal in refusals:
+        role = "control" if refusal.name in survey.control.name else "check"
+        points = survey.control if role == "control" else survey.check
+        reason = _no_pose(points, refusal.name, survey.trajectory, candidates) or refusal.reason
+        rows.append(_unseen_row(refusal.name, refusal.pass_number, points, role, reason))
+    return rows
+
+
+def _no_pose(points, name, trajectory, candidates):
+    """Why a target was not seen, when points near it have no pose; else None."""
+    row = points.name.index(name)
+    near = candidates.unplaced.xyz - points.position[row]
+    times = candidates.unplaced.gps_time[
+        np.linalg.norm(near, axis=1) <= search_radius(trajectory, points)[row]
+    ]
+    if len(times) == 0:
+        return None
+    return (
+        f"{len(times)} points near it, at {times.min():.1f} to {times.max():.1f} s, were measured "
+        "in a gap of the trajectory or outside it, and nothing is interpolated there."
+    )
+
+
+def _unseen_row(name, pass_number, control, role, reason):
     return {
         "name": name,
         "pass": pass_number,

@@ -128,9 +128,7 @@ def _unseen(named, control, refusals, gate):
             yield Refusal(name, None, "No target was found in the cloud.")
             continue
         near = int(np.argmin(distance))
-        yield Refusal(
-            name,
-            None,
-            f"No target of its kind and size was found within the gate; the nearest one found "
-            f"lies {distance[near]:.2f} m away (gate {gate[near]:.2f} m).",
-        )
+        found = f"the nearest one found lies {distance[near]:.2f} m away"
+        if named.name[near] is not None:
+            found += f" and is {named.name[near]}"
+        yield Refusal(name, None, f"No target is left for it; {found} (gate {gate[near]:.2f} m).")

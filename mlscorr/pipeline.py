@@ -7,7 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.correction import ORDER, Estimate, estimate_correction
-from mlscorr.evaluation import CHECK_REASON, before_and_after, statistics, target_rows, unseen_row
+from mlscorr.evaluation import (
+    CHECK_REASON,
+    before_and_after,
+    statistics,
+    target_rows,
+    unseen_rows,
+)
 from mlscorr.io.las import read_chunks, sha256, write_corrected
 from mlscorr.io.output import (
     check_output,
@@ -16,10 +22,11 @@ from mlscorr.io.output import (
     write_json,
     write_targets_csv,
 )
+from mlscorr.io.survey_file import input_files, read_survey
 from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.matching import Matches, match
+from mlscorr.matching import match
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
-from mlscorr.targets.candidates import Candidates, collect, search_radius
+from mlscorr.targets.candidates import collect, search_radius
 from mlscorr.targets.extract import extract_targets
 
 SEED = 0  # of the random samples in the plane fit: the same survey gives the same result
@@ -35,7 +42,9 @@ def find_targets(survey, rng=None, progress=None):
     done = progress("Reading the cloud", sum(file.points for file in survey.clouds))
     candidates = collect(survey.clouds, survey.trajectory, surveyed, read_chunks, done)
     rng = np.random.default_rng(SEED) if rng is None else rng
-    found = extract_targets(candidates, surveyed, survey.trajectory, survey.scanner, rng)
+    found = extract_targets(
+        candidates, surveyed, survey.trajectory, survey.scanner, rng, survey.mounting
+    )
     if len(found) == 0:
         raise ValueError(_nothing_found(survey, candidates))
     matches = match(found, surveyed, survey.trajectory)
@@ -73,6 +82,11 @@ def correct(survey, order=ORDER, rng=None, progress=None):
     >>> max(result.check["after"]["rmse"]) < 0.03
     True
     """
+    if len(survey.control) == 0:
+        raise ValueError(
+            f"{survey.path} names {len(survey.check)} check points and no control point: check "
+            "points never enter an estimate. Give some of them the role control."
+        )
     matches, candidates = find_targets(survey, rng, progress)
     is_control = np.array([name in survey.control.name for name in matches.matched.name])
     control, check = matches.matched[is_control], matches.matched[~is_control]
@@ -89,7 +103,7 @@ def correct(survey, order=ORDER, rng=None, progress=None):
         estimate=estimate,
         control_observations=control,
         check_observations=check,
-        unseen=_unseen(survey, matches, candidates),
+        unseen=unseen_rows(survey, matches.refusals, candidates),
     )
 
 
@@ -153,8 +167,7 @@ class CorrectedSurvey:
         """
         from mlscorr.report import write_pictures, write_report
 
-        inputs = [file.path for file in self.survey.clouds]
-        check_output(out, [*inputs, self.survey.path], overwrite)
+        check_output(out, input_files(self.survey.path), overwrite)
         with output_folder(out) as folder:
             files, outside = self._write_clouds(folder, progress or _silent)
             report = document("report", self._report(files, outside))
@@ -211,8 +224,8 @@ def _silent(title, total):
 def _model(estimate):
     """The model section of report.json."""
     alternatives = [
-        {**_covariance(parameters), "log_posterior": value}
-        for parameters, value in estimate.alternatives
+        {**_covariance(parameters), "probability": probability}
+        for parameters, probability in estimate.alternatives
     ]
     return {
         "method": "lsc",
@@ -238,32 +251,6 @@ def _covariance(parameters):
         "jitter_correlation_time": parameters.jitter_time,
         "jitter_scale": parameters.jitter_scale,
     }
-
-
-def _unseen(survey, matches: Matches, candidates: Candidates):
-    """Rows of the surveyed points without an observation, with the reason."""
-    rows = []
-    for refusal in matches.refusals:
-        role = "control" if refusal.name in survey.control.name else "check"
-        points = survey.control if role == "control" else survey.check
-        reason = _no_pose(points, refusal.name, survey.trajectory, candidates) or refusal.reason
-        rows.append(unseen_row(refusal.name, refusal.pass_number, points, role, reason))
-    return rows
-
-
-def _no_pose(points, name, trajectory, candidates):
-    """Why a target was not seen, when points near it have no pose; else None."""
-    row = points.name.index(name)
-    near = candidates.unplaced.xyz - points.position[row]
-    times = candidates.unplaced.gps_time[
-        np.linalg.norm(near, axis=1) <= search_radius(trajectory, points)[row]
-    ]
-    if len(times) == 0:
-        return None
-    return (
-        f"{len(times)} points near it, at {times.min():.1f} to {times.max():.1f} s, were measured "
-        "in a gap of the trajectory or outside it, and nothing is interpolated there."
-    )
 
 
 def _nothing_found(survey, candidates):
@@ -294,7 +281,6 @@ def demo(out, seed=1, overwrite=False, progress=None):
 
     Returns the corrected survey's document of report.json.
     """
-    from mlscorr.io.survey_file import read_survey
     from mlscorr.simulate import DEMO, simulate
 
     check_output(out, [], overwrite)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.tables import ENCODING, find_columns, nearest, read_header
+from mlscorr.io.tables import ENCODING, find_columns, nearest, not_text, read_header
 from mlscorr.survey import KINDS, ControlPoints
 
 POSITION = ("easting", "northing", "height")
@@ -15,6 +15,7 @@ COLUMNS = ("name", *POSITION, "sigma_horizontal", "sigma_vertical", "kind", "siz
 NORMAL = ("normal_e", "normal_n", "normal_h")
 ROLES = ("control", "check")
 LARGEST_TARGET = 10.0  # m, the size beyond which it was certainly given in mm
+LARGEST_COORDINATE = 1e8  # m, twice the Earth's girth and more; map zones prefixed to E fit in
 COARSE_SIGMA = 0.5  # m, beyond which a surveyed point corrects nothing
 
 
@@ -27,7 +28,10 @@ def read_control(path):
     path = Path(path)
     header, skip = read_header(path)
     columns = find_columns(path, header, COLUMNS, (NORMAL,))
-    rows = _rows(path, skip, header, columns)
+    try:
+        rows = _rows(path, skip, header, columns)
+    except UnicodeDecodeError:
+        raise ValueError(not_text(path)) from None
     if not rows:
         raise ValueError(f"{path} has a header but no points.")
     doubled = [name for name, count in Counter(row["name"] for row in rows).items() if count > 1]
@@ -93,6 +97,12 @@ def _check(path, row):
         raise ValueError(
             f"{who} has the size {row['size']:g} m, outside (0, {LARGEST_TARGET:g}] m: {cause}"
         )
+    for key in POSITION:
+        if abs(row[key]) > LARGEST_COORDINATE:
+            raise ValueError(
+                f"{who} has the {key} {row[key]:g} m, beyond {LARGEST_COORDINATE:g} m: no map "
+                "reaches that far (millimetres?)."
+            )
     for key in ("sigma_horizontal", "sigma_vertical"):
         if row[key] <= 0:
             raise ValueError(f"{who} has the {key} {row[key]:g} m; it must be greater than zero.")

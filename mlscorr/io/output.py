@@ -79,6 +79,8 @@ def _move_into(out, part):
             if not (out / file).parent.exists():
                 (out / file).parent.mkdir()
                 made.append(file.parent)
+            if (out / file).is_dir():
+                raise IsADirectoryError(f"{out / file} is a folder, where a file belongs.")
             if (out / file).exists():
                 (replaced / file).parent.mkdir(exist_ok=True)
                 os.replace(out / file, replaced / file)

@@ -145,10 +145,23 @@ def read_settings(path):
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path} is not valid TOML: {error}.") from None
     try:
-        return Settings.model_validate(document)
+        settings = Settings.model_validate(document)
     except ValidationError as error:
         sentences = " ".join(_sentence(item) for item in error.errors())
         raise ValueError(f"{path}: {sentences}") from None
+    if settings.crs is not None:
+        check_crs(settings.crs)
+    return settings
+
+
+def input_files(path):
+    """Paths of a survey.toml and of every file that it names, all of which exist.
+
+    Raises as read_settings does, and FileNotFoundError for files that aren't there.
+    """
+    path = _survey_toml(path)
+    clouds, *others = _files(path, read_settings(path))
+    return [path, *clouds, *(other for other in others if other is not None)]
 
 
 def _survey_toml(path):

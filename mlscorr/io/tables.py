@@ -27,10 +27,16 @@ def read_header(path):
                 if line.strip():
                     return [cell.strip().strip('"').casefold() for cell in line.split(",")], number
     except UnicodeDecodeError:
-        raise ValueError(
-            f"{path} is not a text file; comma-separated values are expected."
-        ) from None
+        raise ValueError(not_text(path)) from None
     raise ValueError(f"{path} is empty.")
+
+
+def not_text(path):
+    """The sentence on a file that can't be decoded."""
+    return (
+        f"{path} is not a text file in UTF-8. Save it anew as comma-separated values in UTF-8; "
+        "letters such as umlauts are the likely cause."
+    )
 
 
 def find_columns(path, header, required, groups=()):

@@ -149,21 +149,18 @@ def _settle_equal(match, times):
 
 def _nothing_fits(name, times, span, candidates, setting):
     """A sentence with both spans, the likely cause and the way out."""
-    shares = [
-        _inside(times, span, constant)
-        for constant, cloud, _ in candidates
-        if setting in ("auto", cloud)
-    ]
+    shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
+    most = max(inside for inside, cloud in shares if setting in ("auto", cloud))
     spans = (
         f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
         f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
     )
-    if max(shares) > 0:
+    if most > 0:
         return (
-            f"Only {max(shares):.0%} of {spans}: the trajectory covers a part of the cloud. "
+            f"Only {most:.0%} of {spans}: the trajectory covers a part of the cloud. "
             "Export the whole trajectory, or clip the cloud to it."
         )
-    if setting == "auto":
+    if setting == "auto" or max(shares)[0] < MOST:
         return (
             f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
             "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "

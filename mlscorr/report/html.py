@@ -11,7 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from mlscorr.report import tables
 from mlscorr.report.figures import drawings
 
-LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "scikit-learn", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib")
 SHOWN_ELSEWHERE = ("outliers", "alternatives", "warnings")
 WORDS = {
     "estimated_by": "estimated by",

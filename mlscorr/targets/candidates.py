@@ -16,14 +16,13 @@ NO_POINTS = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0))
 
 @dataclass(frozen=True)
 class Candidates:
-    """Points near control points, with the number of the file and of the trajectory segment.
+    """Points near control points, with the pass of each; unplaced are those that have no pose.
 
-    unplaced are those points near control points that have no pose.
+    A pass starts with each file and at each gap of the trajectory; passes count from 1 in time.
     """
 
     cloud: PointCloud
-    file: np.ndarray
-    segment: np.ndarray
+    pass_number: np.ndarray
     unplaced: PointCloud
 
 
@@ -60,24 +59,31 @@ def collect(clouds, trajectory, control, read_chunks, progress=None):
     Returns Candidates.
     """
     near = _Neighbourhood(control.position, search_radius(trajectory, control))
-    clouds_near, files, segments, unplaced = [NO_POINTS], [], [], [NO_POINTS]
+    placed, unplaced, keys, starts = [NO_POINTS], [NO_POINTS], [np.empty(0, int)], {}
     for number, file in enumerate(clouds):
         for chunk in read_chunks(file):
-            kept = chunk[near.contains(chunk.xyz)]
-            segment = trajectory.segment(kept.gps_time)
-            placed = segment >= 0
-            clouds_near.append(kept[placed])
-            unplaced.append(kept[~placed])
-            files.append(np.full(placed.sum(), number))
-            segments.append(segment[placed])
+            segment = trajectory.segment(chunk.gps_time)
+            key = np.where(segment < 0, -1, number * (len(trajectory.gaps) + 1) + segment)
+            for one in np.unique(key[key >= 0]):
+                starts[one] = min(starts.get(one, np.inf), chunk.gps_time[key == one].min())
+            rows = near.contains(chunk.xyz)
+            has_pose = key[rows] >= 0
+            placed.append(chunk[rows[has_pose]])
+            keys.append(key[rows[has_pose]])
+            unplaced.append(chunk[rows[~has_pose]])
             if progress is not None:
                 progress(len(chunk))
     return Candidates(
-        PointCloud.concatenate(clouds_near),
-        np.concatenate([np.empty(0, int), *files]),
-        np.concatenate([np.empty(0, int), *segments]),
+        PointCloud.concatenate(placed),
+        _pass_numbers(np.concatenate(keys), starts),
         PointCloud.concatenate(unplaced),
     )
+
+
+def _pass_numbers(keys, starts):
+    """Number (n,) of the pass of each point, by the order of the passes' starts, from 1."""
+    number = {key: i for i, key in enumerate(sorted(starts, key=starts.get), start=1)}
+    return np.array([number.get(key, 0) for key in range(max(starts, default=0) + 1)])[keys]
 
 
 class _Neighbourhood:

@@ -5,11 +5,12 @@ single threshold serves. Each component at each level is a candidate; the shape 
 """
 
 import numpy as np
-from sklearn.cluster import DBSCAN
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 LEVELS = 16  # between the darkest and the brightest point of a region, in equal ratios
 FEWEST_POINTS = 20  # on a target: fewer can't tell plane and outline
-
 MOST_POINTS = 5000  # may be bright, or a quarter of the region: more are road and walls
 
 
@@ -59,5 +60,6 @@ def _connected(xyz, link):
     """Component number of each point: occupied voxels first, so that density costs nothing."""
     voxel = link / 3
     cells, cell_of = np.unique(np.floor(xyz / voxel).astype(np.int64), axis=0, return_inverse=True)
-    label = DBSCAN(eps=link, min_samples=1).fit_predict(cells * voxel)
-    return label[cell_of.ravel()]
+    pairs = cKDTree(cells * voxel).query_pairs(link, output_type="ndarray").T
+    graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(len(cells),) * 2)
+    return connected_components(graph, directed=False)[1][cell_of.ravel()]

@@ -10,7 +10,7 @@ from mlscorr.targets.candidates import search_radius
 from mlscorr.targets.clusters import FEWEST_POINTS, bright_components, split_by_time
 from mlscorr.targets.outside import Pulses, missed_points
 from mlscorr.targets.plane import Plane, fit_plane
-from mlscorr.targets.shapes import Outline, fit_outline
+from mlscorr.targets.shapes import ROUGH_STAGES, Outline, fit_outline
 
 PLANE_TOLERANCE = 0.03  # m: several sigmas of range noise, less than a post's or a frame's depth
 LINK_SHARES = 0.2, 0.4  # of the target's size: beside a bright post; with wide scan lines
@@ -18,7 +18,7 @@ PAUSE = 2.0  # s without a point: the vehicle came by twice
 LEAST_EXTENT = 0.7, 0.4  # of the size, along and across: a target may be partly hidden
 LEAST_OVERLAP = 0.8  # of the fitted outline with the bright points
 LARGEST_SIGMA = 0.10  # of the size: beyond it the outline holds the centre in one direction only
-FLOOR = 0.001  # m, one sigma: LAS rounding and what the model leaves out
+FLOOR = 0.0005  # m, one sigma: half of the usual LAS scale of 1 mm
 BEAM_DIVERGENCE = 0.35e-3  # rad, RIEGL VQ-250 data sheet
 
 
@@ -52,7 +52,7 @@ class _Target:
     points: int
 
 
-def extract_targets(candidates, control, trajectory, scanner, rng):
+def extract_targets(candidates, control, trajectory, scanner, rng, mounting=None):
     """Find circles and squares of the surveyed kinds and sizes near control points.
 
     Parameters
@@ -66,12 +66,15 @@ def extract_targets(candidates, control, trajectory, scanner, rng):
         Noise that blurs the outline.
     rng : numpy.random.Generator
         For the random samples of the plane fit.
+    mounting : Mounting, optional
+        Its lever arm tells where the beams came from; else from the navigation centre.
 
     Returns TargetObservations without names, in order of pass and time.
     """
     if len(candidates.cloud) == 0:
         return _as_observations([])
-    passes = _pass_numbers(candidates)
+    passes = candidates.pass_number
+    lever_arm = np.zeros(3) if mounting is None else mounting.lever_arm
     near = cKDTree(candidates.cloud.xyz).query_ball_point(
         control.position, search_radius(trajectory, control)
     )
@@ -81,32 +84,20 @@ def extract_targets(candidates, control, trajectory, scanner, rng):
         shape = control.kind[index], float(control.size[index])
         for number in np.unique(passes[rows]):
             cloud = candidates.cloud[rows[passes[rows] == number]]
-            for target in _targets_of_pass(cloud, *shape, trajectory, scanner, rng):
+            for target in _targets_of_pass(cloud, *shape, trajectory, lever_arm, scanner, rng):
                 if not any(number == n and _same_place(target, other) for n, other in found):
                     found.append((int(number), target))
     found.sort(key=lambda pair: (pair[0], pair[1].gps_time))
     return _as_observations(found)
 
 
-def _pass_numbers(candidates):
-    """Pass of each point, from 1 in time: a pass starts with each file and after each gap."""
-    keys, index = np.unique(
-        np.column_stack([candidates.segment, candidates.file]), axis=0, return_inverse=True
-    )
-    start = np.array(
-        [candidates.cloud.gps_time[index.ravel() == k].min() for k in range(len(keys))]
-    )
-    rank = np.empty(len(keys), dtype=int)
-    rank[np.argsort(start, kind="stable")] = np.arange(1, len(keys) + 1)
-    return rank[index.ravel()] if len(keys) else np.empty(0, int)
-
-
-def _targets_of_pass(cloud, kind, size, trajectory, scanner, rng):
+def _targets_of_pass(cloud, kind, size, trajectory, lever_arm, scanner, rng):
     """Targets of a kind and size near one control point in one pass; the best fit at each place."""
     roughly = []
     for visit in split_by_time(cloud.gps_time, PAUSE):
         part = cloud[visit]
-        sight = part.xyz - trajectory.at(part.gps_time).position
+        pose = trajectory.at(part.gps_time)
+        sight = part.xyz - pose.position - pose.attitude.apply(lever_arm)
         pulses = Pulses(part.xyz, part.gps_time, part.intensity, sight, cKDTree(part.xyz))
         links = np.multiply(LINK_SHARES, size)
         for level, rows in bright_components(part.xyz, part.intensity, links):
@@ -138,7 +129,7 @@ def _candidate(pulses, level, rows, kind, size, rng):
     if extent.max() < LEAST_EXTENT[0] * size or extent.min() < LEAST_EXTENT[1] * size:
         return None
     marked = _marked_points(pulses, rows, plane, level, size)
-    outline = fit_outline(*marked, kind, size, blur=size / 30, stages=2)
+    outline = fit_outline(*marked, kind, size, blur=size / 30, stages=ROUGH_STAGES)
     if outline.overlap < LEAST_OVERLAP - 0.05:
         return None
     return _Candidate(pulses, rows, plane, marked, kind, size, outline)
@@ -158,42 +149,37 @@ def _marked_points(pulses, rows, plane, level, size):
     """Points (n, 2) in the plane near the target, and whether each is bright: real returns and
     the places where pulses missed it."""
     close = np.array(pulses.tree.query_ball_point(pulses.xyz[rows].mean(axis=0), 1.2 * size))
-    local = plane.coordinates(pulses.xyz[close])
-    on_plane = np.abs(local[:, 2]) <= PLANE_TOLERANCE
+    close = close[np.abs(plane.coordinates(pulses.xyz[close])[:, 2]) <= PLANE_TOLERANCE]
     missed = missed_points(pulses, rows, plane, PLANE_TOLERANCE)
-    points = np.vstack([local[on_plane, :2], missed])
-    returned = pulses.intensity[close[on_plane]] >= level
+    points = np.vstack([plane.crossing(pulses.xyz[close], pulses.sight[close]), missed])
+    returned = pulses.intensity[close] >= level
     bright = np.append(returned, np.zeros(len(missed), bool))
     return points, bright
 
 
 def _blur(candidate, scanner):
-    """One sigma of a point's place across the outline, from angle and range noise and beam (m)."""
-    sight = candidate.pulses.sight[candidate.rows].mean(axis=0)
-    distance = np.linalg.norm(sight)
-    cosine = candidate.plane.axes[2] @ sight / distance
-    parts = (
-        scanner.angle_noise * distance,
-        scanner.range_noise * np.sqrt(max(1 - cosine**2, 0.0)),
-        BEAM_DIVERGENCE * distance / 4,  # diameter to one sigma
-    )
-    return float(np.sqrt(np.square(parts).sum()))
+    """One sigma of a beam's place across the outline, from angle noise and its own width (m)."""
+    distance = np.linalg.norm(candidate.pulses.sight[candidate.rows].mean(axis=0))
+    return float(distance * np.hypot(scanner.angle_noise, BEAM_DIVERGENCE / 4))  # 4 sigmas wide
 
 
 def _as_target(candidate):
     """Centre in the map, its covariance, normal towards the vehicle, and time of the centre."""
-    plane, rows, outline = candidate.plane, candidate.rows, candidate.outline
-    local = plane.coordinates(candidate.pulses.xyz[rows])[:, :2]
+    plane, outline, pulses = candidate.plane, candidate.outline, candidate.pulses
+    rows = candidate.rows
+    crossing = plane.crossing(pulses.xyz[rows], pulses.sight[rows])
     # time and height at the centre, by regression: the points may lie on one side of it
-    basis = np.column_stack([np.ones(len(rows)), local - outline.centre])
+    basis = np.column_stack([np.ones(len(rows)), crossing - outline.centre])
     weights = np.linalg.pinv(basis)[0]
-    time = candidate.pulses.gps_time[rows]
-    covariance = np.zeros((3, 3))
-    covariance[:2, :2] = outline.covariance
-    covariance[2, 2] = plane.sigma**2 * (weights @ weights)
-    away = plane.axes[2] @ candidate.pulses.sight[rows].mean(axis=0) > 0
+    time = pulses.gps_time[rows] - pulses.gps_time[0]
+    at_centre = np.clip(weights @ time, 0.0, pulses.gps_time[-1] - pulses.gps_time[0])
+    # a plane too far moves the centre along the beam
+    beam = plane.axes @ pulses.sight[rows].mean(axis=0)
+    covariance = plane.sigma**2 * (weights @ weights) * np.outer(beam, beam) / beam[2] ** 2
+    covariance[:2, :2] += outline.covariance
+    away = beam[2] > 0
     return _Target(
-        gps_time=float(np.clip(time[0] + weights @ (time - time[0]), time[0], time[-1])),
+        gps_time=float(pulses.gps_time[0] + at_centre),
         position=candidate.position,
         covariance=plane.axes.T @ covariance @ plane.axes + FLOOR**2 * np.eye(3),
         normal=-plane.axes[2] if away else plane.axes[2],

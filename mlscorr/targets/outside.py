@@ -15,7 +15,7 @@ IN_FRONT = 0.10  # m: a neighbour nearer to the vehicle by this hides the target
 
 @dataclass(frozen=True)
 class Pulses:
-    """Points of one region and visit in order of time; sight (n, 3) is vehicle to point in m,
+    """Points of one region and visit in order of time; sight (n, 3) is scanner to point in m,
     tree finds points by place.
     """
 
@@ -40,7 +40,7 @@ def missed_points(pulses, rows, plane, tolerance):
 
     Returns (k, 2) in m; none when the target has fewer than two scan lines.
     """
-    uv = plane.coordinates(pulses.xyz[rows])[:, :2]
+    uv = plane.crossing(pulses.xyz[rows], pulses.sight[rows])
     pulse, lines = _scan_lines(pulses.gps_time[rows])
     if len(lines) < 2 or pulse == 0:
         return np.empty((0, 2))

@@ -20,6 +20,11 @@ class Plane:
         """u, v in the plane and w along the normal of points (n, 3): (n, 3). Units: m."""
         return (xyz - self.origin) @ self.axes.T
 
+    def crossing(self, xyz, sight):
+        """u, v (n, 2) where the beams along sight (n, 3) to points (n, 3) cross the plane. m."""
+        local, beam = self.coordinates(xyz), sight @ self.axes.T
+        return local[:, :2] - local[:, 2:] / beam[:, 2:] * beam[:, :2]
+
 
 def fit_plane(xyz, tolerance, rng):
     """Plane through most points (n, 3), those within the tolerance (m) of it.

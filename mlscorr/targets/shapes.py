@@ -13,7 +13,8 @@ from scipy.special import expit
 WRONG_SIDE = 0.01  # share of points marked wrong whatever their distance (mixed returns)
 STEPS = 13  # of the grid, along each axis
 ANGLES = 9  # of the grid of a square's turn
-STAGES = 4
+STAGES = 12
+ROUGH_STAGES = 3  # the first of them
 ROUGH_POINTS = 150  # of either side, enough to place the outline roughly
 
 
@@ -45,36 +46,41 @@ def fit_outline(points, bright, kind, size, blur, stages=STAGES):
     """Fit an outline of known kind and size (m) to points (n, 2) marked bright or not (n,).
 
     blur is the one-sigma position error of a point across the outline. Units: m. The grid starts
-    wide, blurred and with few points, and closes in on the posterior in a few stages; two tell
-    roughly whether it is one.
+    wide, blurred and with few points. Each stage halves the blur, so that the posterior's mode is
+    not lost, until the grid resolves the posterior; three stages tell roughly whether it is one.
     """
     mean = np.array([*points[bright].mean(axis=0), np.pi / 4])
     half = np.array([0.35 * size, 0.35 * size, np.pi / 4])
     for stage in range(stages):
-        width = blur if stage == stages - 1 else max(blur, size / 8 / 4**stage)
-        telling = _telling(points, bright, mean, half, kind, size, width, rough=stage == 0)
+        width = max(blur, size / 8 / 2**stage)
+        telling = _telling(points, bright, mean, half, kind, size, width)
+        if stage < ROUGH_STAGES:
+            telling = _thinned(telling, bright)
         grid = _grid(mean, half, kind)
         weight = _posterior(points[telling], bright[telling], grid, kind, size, width)
         mean = weight @ grid
         deviation = grid - mean
         covariance = (weight[:, None] * deviation).T @ deviation
-        half = np.maximum(4 * np.sqrt(np.diag(covariance)), 3 * half / (STEPS - 1))
+        closer = np.maximum(4 * np.sqrt(np.diag(covariance)), 3 * half / (STEPS - 1))
+        resolved = (closer > half / 2)[: 3 if kind == "square" else 2].all()
+        half = closer
+        if width == blur and resolved:
+            break
     inside = distance_inside(points, mean[None], kind, size)[0] > 0
     overlap = (inside & bright).sum() / max((inside | bright).sum(), 1)
     return Outline(mean[:2], covariance[:2, :2], float(mean[2]), float(overlap))
 
 
-def _telling(points, bright, mean, half, kind, size, width, rough):
+def _telling(points, bright, mean, half, kind, size, width):
     """Rows of the points that can lie near the outline: all others say the same of every trial."""
-    if rough:
-        return np.concatenate(
-            [
-                rows[:: len(rows) // ROUGH_POINTS + 1]
-                for rows in map(np.flatnonzero, (bright, ~bright))
-            ]
-        )
     play = np.hypot(half[0], half[1]) + size * half[2] * (kind == "square") + 8 * width
     return np.flatnonzero(np.abs(distance_inside(points, mean[None], kind, size)[0]) < play)
+
+
+def _thinned(rows, bright):
+    """At most ROUGH_POINTS of the rows on either side, evenly among them."""
+    sides = rows[bright[rows]], rows[~bright[rows]]
+    return np.concatenate([side[:: len(side) // ROUGH_POINTS + 1] for side in sides])
 
 
 def _grid(mean, half, kind):

@@ -1,0 +1,44 @@
+"""What several test files share."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlscorr.simulate import Scenario, simulate
+
+MLSCORR = Path(sys.executable).with_name("mlscorr")
+
+
+@pytest.fixture(scope="session")
+def street(tmp_path_factory):
+    "Folder of a simulated survey of 8 s: 4 control points and 1 check point; copy it to change it"
+    folder = tmp_path_factory.mktemp("street")
+    scenario = Scenario(duration=8.0, control=4, check=1, lines_per_second=75, points_per_line=400)
+    simulate(scenario, np.random.default_rng(1)).write(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def commanded(street, tmp_path_factory):
+    "mlscorr correct --json on the street, with spaces and umlauts in the paths: (process, out)"
+    folder = tmp_path_factory.mktemp("öffentliche Straße")
+    shutil.copytree(street, folder / "Erste Fahrt")
+    command = [MLSCORR, "correct", "Erste Fahrt/survey.toml", "-o", "out/für Müller", "--json"]
+    process = subprocess.run(command, capture_output=True, text=True, cwd=folder)
+    return process, folder / "out" / "für Müller"
+
+
+@pytest.fixture(scope="session")
+def in_part(street, tmp_path_factory):
+    "mlscorr correct where the trajectory starts late and has a gap under T02: (process, out)"
+    folder = shutil.copytree(street, tmp_path_factory.mktemp("in part") / "survey")
+    header, *epochs = (folder / "trajectory.csv").read_text().splitlines()
+    kept = [header, *epochs[51:271], *epochs[360:]]
+    (folder / "trajectory.csv").write_text("\n".join(kept) + "\n")
+    out = folder.parent / "out"
+    command = [MLSCORR, "correct", folder, "-o", out]
+    return subprocess.run(command, capture_output=True, text=True), out

@@ -1,0 +1,210 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.matching import LEAST_GATE, match
+from mlscorr.survey import ControlPoints, TargetObservations, Trajectory, attitude_from_angles
+
+ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
+START = 357_700.0  # s of the GPS week
+SPEED = 10.0  # m/s
+
+
+def trajectory(sigma=None):
+    "A drive of 200 s to the north; sigma (m) of the easting as a function of elapsed time"
+    elapsed = np.arange(0.0, 200.0, 0.1)
+    path = ORIGIN + np.outer(elapsed, [0.0, SPEED, 0.0])
+    sigmas = None if sigma is None else np.outer(sigma(elapsed), [1.0, 0.0, 0.0])
+    still = attitude_from_angles(0.0, 0.0, np.zeros(len(elapsed)))
+    return Trajectory(START + elapsed, path, still, sigmas)
+
+
+def control_points(local, kind="circle", size=0.6):
+    n = len(local)
+    return ControlPoints(
+        tuple(f"T{i + 1:02d}" for i in range(n)),
+        ORIGIN + np.reshape(local, (n, 3)),
+        np.full((n, 3), 0.003),
+        (kind,) * n if isinstance(kind, str) else kind,
+        np.broadcast_to(size, n).astype(float),
+        np.full((n, 3), np.nan),
+    )
+
+
+def observations(local, kind="circle", size=0.6, pass_number=1):
+    "Observations at local places, each at the time when the vehicle drives by"
+    local = np.reshape(local, (-1, 3))
+    n = len(local)
+    return TargetObservations(
+        (None,) * n,
+        np.broadcast_to(pass_number, n).copy(),
+        START + local[:, 1] / SPEED,
+        ORIGIN + local,
+        np.tile(np.eye(3) * 0.002**2, (n, 1, 1)),
+        np.tile([1.0, 0.0, 0.0], (n, 1)),
+        (kind,) * n if isinstance(kind, str) else kind,
+        np.broadcast_to(size, n).astype(float),
+        np.full(n, 200),
+    )
+
+
+PLACES = np.array([[5.0, 100.0 * i + 50.0, 1.0] for i in range(10)])
+
+
+def test_each_observation_gets_its_own_control_point():
+    "Ten targets 0.5 m from their surveyed points are all named right, in any order"
+    order = np.random.default_rng(1).permutation(10)
+    found = match(observations(PLACES[order] + 0.3), control_points(PLACES), trajectory())
+    assert found.matched.name == tuple(f"T{i + 1:02d}" for i in order)
+    assert len(found.unmatched) == 0
+    assert found.refusals == ()
+
+
+@pytest.mark.parametrize("away, matched", [(0.95, 1), (1.05, 0)])
+def test_gate_without_sigmas_is_a_metre(away, matched):
+    "Datum and mounting are not in the POS's sigma, so the gate is never below 1 m"
+    assert LEAST_GATE == 1.0
+    for drive in (trajectory(), trajectory(lambda t: np.full(len(t), 0.01))):
+        found = match(
+            observations(PLACES[:1] + np.array([away, 0, 0])), control_points(PLACES[:1]), drive
+        )
+        assert len(found.matched) == matched
+
+
+def test_gate_is_the_sigma_of_its_own_time():
+    "3 m are credible at a sigma of 1 m (gate 4 m), not 100 s later at a sigma of 0.1 m"
+    drive = trajectory(lambda t: np.where(t < 50.0, 1.0, 0.1))
+    places = np.array([[5.0, 100.0, 1.0], [5.0, 1500.0, 1.0]])
+    found = match(observations(places + np.array([3.0, 0.0, 0.0])), control_points(places), drive)
+    assert found.matched.name == ("T01",)
+    assert [refusal.name for refusal in found.refusals] == ["T02"]
+    assert "gate 1.00 m" in found.refusals[0].reason
+
+
+def test_kind_and_size_must_agree():
+    "A square is no circle, and 0.6 m is not 0.5 m, however near"
+    control = control_points(PLACES[:1], "circle", 0.6)
+    assert len(match(observations(PLACES[:1], "square", 0.6), control, trajectory()).matched) == 0
+    assert len(match(observations(PLACES[:1], "circle", 0.5), control, trajectory()).matched) == 0
+    assert len(match(observations(PLACES[:1], "circle", 0.6), control, trajectory()).matched) == 1
+
+
+def test_a_square_beside_a_circle_is_no_rival():
+    "Targets of two kinds at one place do not disturb each other"
+    places = np.array([[5.0, 50.0, 1.0], [5.0, 50.3, 1.0]])
+    kinds = ("circle", "square")
+    found = match(observations(places + 0.2, kinds), control_points(places, kinds), trajectory())
+    assert found.matched.name == ("T01", "T02")
+
+
+def test_two_look_alikes_apart_are_told_apart():
+    "Control 1.5 m apart and misclosures of 0.2 m: clear"
+    places = np.array([[5.0, 50.0, 1.0], [5.0, 51.5, 1.0]])
+    found = match(
+        observations(places + np.array([0.0, 0.2, 0.0])), control_points(places), trajectory()
+    )
+    assert found.matched.name == ("T01", "T02")
+
+
+def test_ambiguous_look_alikes_are_both_refused():
+    "Observations halfway between two surveyed points could be either: neither is named"
+    places = np.array([[5.0, 50.0, 1.0], [5.0, 51.0, 1.0]])
+    seen = places + np.array([0.0, 0.45, 0.0])
+    found = match(observations(seen), control_points(places), trajectory())
+    assert len(found.matched) == 0
+    assert len(found.unmatched) == 2
+    assert {refusal.name for refusal in found.refusals} == {"T01", "T02"}
+    for refusal in found.refusals:
+        assert refusal.pass_number == 1
+        assert "T01" in refusal.reason or "T02" in refusal.reason
+        assert "claim" in refusal.reason
+        assert "gate 1.00 m" in refusal.reason
+
+
+def test_the_sentence_of_an_ambiguity_gives_the_numbers():
+    "Which points, how far apart, at what time, within what gate"
+    places = np.array([[5.0, 50.0, 1.0], [5.0, 50.31, 1.0]])
+    found = match(
+        observations(places[:1] + np.array([0, 0.15, 0])), control_points(places), trajectory()
+    )
+    assert len(found.matched) == 0
+    sentence = found.refusals[0].reason
+    assert "lie 0.31 m apart and both claim the observation at 357705.0 s" in sentence
+
+
+def test_unseen_control_has_a_reason_with_the_nearest_find():
+    "A control point that nobody saw says how far the nearest target found is"
+    found = match(observations(PLACES[:1]), control_points(PLACES[:2]), trajectory())
+    (refusal,) = found.refusals
+    assert (refusal.name, refusal.pass_number) == ("T02", None)
+    assert "nearest one found lies 100.00 m away" in refusal.reason
+
+
+def test_nothing_observed_gives_every_control_a_reason():
+    "No observation at all is no crash"
+    found = match(observations(np.empty((0, 3))), control_points(PLACES), trajectory())
+    assert len(found.matched) == 0
+    assert {refusal.reason for refusal in found.refusals} == {"No target was found in the cloud."}
+    assert len(found.refusals) == 10
+
+
+def test_an_observation_without_control_is_left_over():
+    "A target that nobody surveyed stays unnamed, with its data"
+    found = match(observations(PLACES[:3]), control_points(PLACES[[0, 2]]), trajectory())
+    assert found.matched.name == ("T01", "T02")
+    assert found.unmatched.name == (None,)
+    assert np.array_equal(found.unmatched.position[0], ORIGIN + PLACES[1])
+
+
+def test_a_control_point_is_matched_once_in_a_pass():
+    "Of two finds near one surveyed point the clearly nearer one gets it"
+    seen = PLACES[[0, 0]] + [[0.0, 0.1, 0.0], [0.0, 0.8, 0.0]]
+    found = match(observations(seen), control_points(PLACES[:1]), trajectory())
+    assert found.matched.name == ("T01",)
+    assert np.array_equal(found.matched.position[0], ORIGIN + seen[0])
+    assert len(found.unmatched) == 1
+
+
+def test_two_finds_as_near_as_each_other_are_refused():
+    "Two finds 0.5 m to either side of one surveyed point: the sentence says so"
+    seen = PLACES[[0, 0]] + [[0.0, 0.5, 0.0], [0.0, -0.5, 0.0]]
+    found = match(observations(seen), control_points(PLACES[:1]), trajectory())
+    assert len(found.matched) == 0
+    assert "Two observations 1.00 m apart" in found.refusals[0].reason
+    assert "both claim T01" in found.refusals[0].reason
+
+
+def test_each_pass_is_matched_by_itself():
+    "Two passes of other misclosures each get the same ten names"
+    seen = np.vstack([PLACES + np.array([0.4, 0, 0]), PLACES - np.array([0.4, 0, 0])])
+    passes = np.repeat([1, 2], 10)
+    found = match(observations(seen, pass_number=passes), control_points(PLACES), trajectory())
+    assert found.matched.name == control_points(PLACES).name * 2
+    assert np.array_equal(found.matched.pass_number, passes)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_smooth_drift_of_two_metres_between_targets_ten_metres_apart(seed):
+    "An outage's drift, stated by the POS, names 60 targets right: none wrong, none lost"
+    rng = np.random.default_rng(seed)
+    along = 10.0 * np.arange(60) + 50.0
+    places = np.column_stack([rng.choice([-5.0, 5.0], 60), along, rng.uniform(0, 2, 60)])
+    shape = np.sin(np.pi * np.arange(60) / 59)[:, None]
+    direction = rng.standard_normal(3)
+    drift = 2.0 * shape * direction / np.linalg.norm(direction)
+    drive = trajectory(lambda t: np.full(len(t), 0.7))
+    found = match(observations(places + drift), control_points(places), drive)
+    assert found.matched.name == control_points(places).name
+    assert found.refusals == ()
+
+
+def test_origin_does_not_matter():
+    "Only differences count: local coordinates give the same names"
+    control, seen = control_points(PLACES), observations(PLACES + 0.4)
+    near = match(
+        replace(seen, position=seen.position - ORIGIN),
+        replace(control, position=control.position - ORIGIN),
+        trajectory(),
+    )
+    assert near.matched.name == match(seen, control, trajectory()).matched.name
