@@ -389,7 +389,7 @@ def test_bright_components_are_separate_patches():
     first = np.abs(xyz[:, :2] - [-0.5, 0]).max(axis=1) < 0.25
     second = np.abs(xyz[:, :2] - [0.5, 0]).max(axis=1) < 0.25
     intensity = np.where(first | second, 900.0, 100.0)
-    parts = [set(rows) for _, rows in bright_components(xyz + ORIGIN, intensity, [0.2])]
+    parts = [set(rows) for _, rows in bright_components(xyz + ORIGIN, intensity, 1.0)]
     assert parts == [set(np.flatnonzero(first)), set(np.flatnonzero(second))] or parts == [
         set(np.flatnonzero(second)),
         set(np.flatnonzero(first)),

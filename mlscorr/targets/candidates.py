@@ -11,7 +11,7 @@ MINIMUM_RADIUS = 2.0  # m: a POS that states less than it errs (datum, mounting)
 SIGMAS = 4.0  # of the stated position sigma
 REACH = 150.0  # m: scanners on vehicles see no target farther away
 RASTER_CELLS = 4_000_000  # of the coarse first cut, one byte each
-NO_POINTS = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0))
+NO_POINTS = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0, np.uint16))
 
 
 @dataclass(frozen=True)

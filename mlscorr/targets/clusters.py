@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 
 LEVELS = 16  # between the darkest and the brightest point of a region, in equal ratios
 FEWEST_POINTS = 20  # on a target: fewer can't tell plane and outline
-MOST_POINTS = 5000  # may be bright, or a quarter of the region: more are road and walls
+LINK_SHARES = 0.2, 0.4  # of the target's size: beside a bright post; with wide scan lines
+BACKGROUND = 4.0  # times the points of the fullest place: so many bright ones are road and walls
 
 
 def split_by_time(gps_time, pause):
@@ -21,7 +22,7 @@ def split_by_time(gps_time, pause):
     return np.split(order, breaks)
 
 
-def bright_components(xyz, intensity, links):
+def bright_components(xyz, intensity, size):
     """Index arrays of connected components of points brighter than each of several levels.
 
     Parameters
@@ -30,23 +31,30 @@ def bright_components(xyz, intensity, links):
         Units: m.
     intensity : (n,) array
         Of any positive scale.
-    links : sequence of float
-        Points closer than this belong together; each is tried. Units: m.
+    size : float
+        Of a target; points closer than a share of it belong together. Units: m.
 
     Yields (level, rows); a component that stays the same over levels comes once, at the highest.
     """
     low, high = np.percentile(intensity, 1), intensity.max()
+    background = max(BACKGROUND * _fullest(xyz, size), len(intensity) / 4)
     seen = set()
     for level in np.geomspace(max(high, 1.0), max(low, 1.0), LEVELS + 1)[1:]:
         bright = np.flatnonzero(intensity >= level)
         if len(bright) < FEWEST_POINTS:
             continue
-        if len(bright) > max(MOST_POINTS, len(intensity) / 4):
+        if len(bright) > background:
             return
-        for rows in (part for link in links for part in _components(xyz, bright, link)):
+        parts = (part for share in LINK_SHARES for part in _components(xyz, bright, share * size))
+        for rows in parts:
             if len(rows) >= FEWEST_POINTS and (key := (rows[0], rows[-1], len(rows))) not in seen:
                 seen.add(key)
                 yield float(level), rows
+
+
+def _fullest(xyz, size):
+    """Number of points in the fullest cube of a target's size."""
+    return np.unique(np.floor(xyz / size).astype(np.int64), axis=0, return_counts=True)[1].max()
 
 
 def _components(xyz, rows, link):

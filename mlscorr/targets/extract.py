@@ -13,7 +13,6 @@ from mlscorr.targets.plane import Plane, fit_plane
 from mlscorr.targets.shapes import ROUGH_STAGES, Outline, fit_outline
 
 PLANE_TOLERANCE = 0.03  # m: several sigmas of range noise, less than a post's or a frame's depth
-LINK_SHARES = 0.2, 0.4  # of the target's size: beside a bright post; with wide scan lines
 PAUSE = 2.0  # s without a point: the vehicle came by twice
 LEAST_EXTENT = 0.7, 0.4  # of the size, along and across: a target may be partly hidden
 LEAST_OVERLAP = 0.8  # of the fitted outline with the bright points
@@ -75,12 +74,10 @@ def extract_targets(candidates, control, trajectory, scanner, rng, mounting=None
         return _as_observations([])
     passes = candidates.pass_number
     lever_arm = np.zeros(3) if mounting is None else mounting.lever_arm
-    near = cKDTree(candidates.cloud.xyz).query_ball_point(
-        control.position, search_radius(trajectory, control)
-    )
+    tree = cKDTree(candidates.cloud.xyz)
     found = []
-    for index, rows in enumerate(near):
-        rows = np.sort(np.asarray(rows, int))
+    for index, radius in enumerate(search_radius(trajectory, control)):
+        rows = np.sort(np.array(tree.query_ball_point(control.position[index], radius), int))
         shape = control.kind[index], float(control.size[index])
         for number in np.unique(passes[rows]):
             cloud = candidates.cloud[rows[passes[rows] == number]]
@@ -99,8 +96,7 @@ def _targets_of_pass(cloud, kind, size, trajectory, lever_arm, scanner, rng):
         pose = trajectory.at(part.gps_time)
         sight = part.xyz - pose.position - pose.attitude.apply(lever_arm)
         pulses = Pulses(part.xyz, part.gps_time, part.intensity, sight, cKDTree(part.xyz))
-        links = np.multiply(LINK_SHARES, size)
-        for level, rows in bright_components(part.xyz, part.intensity, links):
+        for level, rows in bright_components(part.xyz, part.intensity, size):
             candidate = _candidate(pulses, level, rows, kind, size, rng)
             if candidate is not None:
                 roughly.append(candidate)

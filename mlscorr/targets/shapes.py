@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import expit
 
 WRONG_SIDE = 0.01  # share of points marked wrong whatever their distance (mixed returns)
+AT_ONCE = 500  # points, which bounds the memory on dense targets
 STEPS = 13  # of the grid, along each axis
 ANGLES = 9  # of the grid of a square's turn
 STAGES = 12
@@ -92,9 +93,11 @@ def _grid(mean, half, kind):
 
 
 def _posterior(points, bright, grid, kind, size, width):
-    """Probability of each trial outline (c,). Far points say the same of all of them."""
-    distance = distance_inside(points, grid, kind, size)
-    side = np.where(bright, distance, -distance) * (np.pi / np.sqrt(3) / width)
-    likelihood = np.log(WRONG_SIDE + (1 - 2 * WRONG_SIDE) * expit(side)).sum(axis=1)
+    """Probability of each trial outline (c,)."""
+    likelihood = np.zeros(len(grid))
+    for part in (slice(i, i + AT_ONCE) for i in range(0, len(points), AT_ONCE)):
+        distance = distance_inside(points[part], grid, kind, size)
+        side = np.where(bright[part], distance, -distance) * (np.pi / np.sqrt(3) / width)
+        likelihood += np.log(WRONG_SIDE + (1 - 2 * WRONG_SIDE) * expit(side)).sum(axis=1)
     weight = np.exp(likelihood - likelihood.max())
     return weight / weight.sum()
