@@ -20,7 +20,7 @@ from mlscorr.survey import PointCloud
 
 THREE = [float, float, float]
 STATISTICS = {"rmse": THREE, "mean": THREE, "min": THREE, "max": THREE}
-REPORT = {  # interface.md, section 3; a list of one holds any number of its kind
+REPORT = {  # a list of one holds any number of its kind
     "schema": str,
     "targets": [
         {
@@ -124,7 +124,7 @@ def test_check_points_fit_better_after_the_correction(corrected):
 
 
 def test_the_report_has_every_key_that_is_promised(corrected):
-    "report.json holds to interface.md: the schema first, then every key with its type"
+    "report.json holds to its promise: the schema first, then every key with its type"
     report = corrected[2]
     assert next(iter(report)) == "schema"
     assert report["schema"] == "mlscorr.report/1"

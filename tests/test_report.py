@@ -63,7 +63,7 @@ def statistics(residuals):
 
 
 def fabricate(trajectory, count=8, checks=True, sigma=True, rng=None, names=None):
-    "A survey, its correction and a report.json as interface.md has it, with made-up residuals"
+    "A survey, its correction and a report.json, with made-up residuals"
     rng = rng or np.random.default_rng(1)
     new = corrected(trajectory, sigma)
     correction = Correction(trajectory, new)

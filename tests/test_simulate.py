@@ -182,7 +182,7 @@ def test_the_demo_shows_a_drift_worth_correcting(demo):
 
 
 def test_the_survey_folder_is_whole_and_as_promised(short, tmp_path):
-    "survey.toml, cloud, trajectory, control and truth stand as interface.md describes them"
+    "survey.toml, cloud, trajectory, control and truth stand as the readers expect them"
     short.write(tmp_path)
     names = {"survey.toml", "pass-1.laz", "trajectory.csv", "control.csv"}
     assert {p.name for p in tmp_path.iterdir()} == names | {"truth.npz", "truth.json"}

@@ -37,7 +37,7 @@ def test_attitude_follows_the_interface(angles, body, map_axis):
 
 
 def test_attitude_is_the_written_product_of_rotations():
-    "R_P^G = Rz(-heading) Rx(pitch) Ry(roll), as interface.md writes it"
+    "R_P^G = Rz(-heading) Rx(pitch) Ry(roll)"
     rng = np.random.default_rng(1)
     for roll, pitch, heading in rng.uniform(-1.5, 1.5, (50, 3)):
         about = [("z", -heading), ("x", pitch), ("y", roll)]

@@ -1,4 +1,4 @@
-"""Surveyed targets from control.csv (interface.md, section 1)."""
+"""Surveyed targets from control.csv."""
 
 import csv
 import warnings

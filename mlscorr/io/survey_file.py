@@ -1,4 +1,4 @@
-"""survey.toml and the files it names, as one Survey (interface.md, section 1)."""
+"""survey.toml and the files it names, as one Survey."""
 
 import glob
 import tomllib

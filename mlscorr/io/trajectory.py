@@ -1,4 +1,4 @@
-"""Trajectories from CSV (interface.md, section 1) or SBET, and back to CSV."""
+"""Trajectories from CSV or SBET, and back to CSV."""
 
 import os
 import warnings
