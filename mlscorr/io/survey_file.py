@@ -1,19 +1,18 @@
 """survey.toml and the files it names, as one Survey."""
 
 import glob
-import tomllib
 from collections import Counter
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.control import read_control
 from mlscorr.io.las import sample_gps_times
 from mlscorr.io.sbet import check_crs, describe_projection
-from mlscorr.io.tables import ENCODING, nearest
+from mlscorr.io.settings import read_settings_file
 from mlscorr.io.time_systems import match_times
 from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
 from mlscorr.survey import CloudFile, Mounting, Pos, Scanner, Survey
@@ -137,18 +136,7 @@ def read_settings(path):
     Raises ValueError that names the line of bad TOML, or every key that is unknown (with the
     nearest known one), missing, or of the wrong type.
     """
-    path = _survey_toml(path)
-    try:
-        document = tomllib.loads(path.read_text(encoding=ENCODING))
-    except UnicodeDecodeError:
-        raise ValueError(f"{path} is not a text file in UTF-8.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path} is not valid TOML: {error}.") from None
-    try:
-        settings = Settings.model_validate(document)
-    except ValidationError as error:
-        sentences = " ".join(_sentence(item) for item in error.errors())
-        raise ValueError(f"{path}: {sentences}") from None
+    settings = read_settings_file(_survey_toml(path), Settings)
     if settings.crs is not None:
         check_crs(settings.crs)
     return settings
@@ -171,29 +159,6 @@ def _survey_toml(path):
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist; a survey is a folder with {FILE_NAME}.")
     return path
-
-
-def _sentence(item):
-    """One sentence on one of pydantic's findings, with the dotted key."""
-    key = ".".join(str(part) for part in item["loc"])
-    if item["type"] == "extra_forbidden":
-        return f"{key} is an unknown key; the nearest known one is {nearest(key, _known_keys())}."
-    if item["type"] == "missing":
-        return f"{key} is missing."
-    message = item["msg"].replace("Input should", "it should").replace("List should", "it should")
-    return f"{key} = {item['input']!r} can't be used: {message[0].lower()}{message[1:]}."
-
-
-def _known_keys(model=Settings, prefix=""):
-    """Every dotted key of survey.toml, sections included."""
-    keys = []
-    for name, field in model.model_fields.items():
-        keys.append(prefix + name)
-        kinds = getattr(field.annotation, "__args__", (field.annotation,))
-        for kind in kinds:
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                keys += _known_keys(kind, f"{prefix}{name}.")
-    return keys
 
 
 def _files(path, settings):
