@@ -1,59 +1,181 @@
-"""What a simulated survey should be, as one frozen value."""
+"""What a simulated survey should be, as one frozen value; in files, scenario.toml.
 
-from dataclasses import dataclass
+Lengths in m, times in s, angles in deg. Every default says where it comes from.
+"""
 
-LEAD = 0.05  # s of trajectory before the first and after the last pulse
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from mlscorr.effects import in_order, make_effect
+
+LEAD = 0.05  # s of trajectory before the first and after the last pulse of a pass
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Vector = tuple[float, float, float]
+Spans = tuple[tuple[NotNegative, Positive], ...]  # (start, duration), from the drive's start
 
 
-@dataclass(frozen=True)
-class Scenario:
-    """One drive past surveyed targets; times count from its start.
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    Raises ValueError when a quantity is not positive, or when an outage or a canyon does not lie
-    within the drive.
-    """
+
+class SceneScenario(_Part):
+    """What stands along the way."""
+
+    kind: Literal["street", "river", "mesh"] = "street"
+    file: Path | None = None  # PLY or OBJ in map coordinates, for kind = "mesh"
+    reflectance: Share = 0.3  # of a mesh: asphalt 0.2 to plaster 0.5 at 905-1550 nm
+    house_height: tuple[Positive, Positive] = (6.0, 11.0)  # two to three storeys
+    gaps: Share = 0.4  # of the houses, a gap after which a cross wall shows
+    trees: NotNegative = 4.0  # per 100 m of street
+    cars: NotNegative = 5.0  # parked, per 100 m of street
+    poles: NotNegative = 5.5  # per 100 m of street: lamps every 18 m
+
+    @model_validator(mode="after")
+    def _has_a_file(self):
+        if (self.kind == "mesh") != (self.file is not None):
+            raise ValueError('a file is needed for kind = "mesh", and for no other kind')
+        return self
+
+
+class TargetScenario(_Part):
+    """Surveyed targets, evenly spaced along the way."""
+
+    control: Annotated[int, Field(ge=1)] = 16
+    check: Annotated[int, Field(ge=0)] = 8
+    kinds: Annotated[tuple[Literal["circle", "square"], ...], Field(min_length=1)] = (
+        "circle",
+        "square",
+    )
+    size: Positive = 0.6  # disc diameter or plate edge, as in Mao et al. 2015's class of target
+    supports: Annotated[tuple[Literal["post", "wall", "road"], ...], Field(min_length=1)] = (
+        "post",
+        "wall",
+        "road",
+    )
+    hidden: Share = 0.1  # of the targets, partly hidden by a narrow post in front
+    survey_sigma: tuple[NotNegative, NotNegative] = (0.003, 0.003)  # across, up: total station
+
+
+class PassScenario(_Part):
+    """One pass along the way: forward or back, beside the centre line, after a pause."""
+
+    direction: Literal["forward", "back"] = "forward"
+    lateral: float = 0.0  # to the right of the centre line as seen forward
+    pause: Positive = 30.0  # before this pass; the trajectory has a gap there
+    speed: Positive | None = None  # the drive's, when not given
+
+
+class DriveScenario(_Part):
+    """How the vehicle moves; or a trajectory file instead."""
+
+    duration: Positive = 60.0  # of the first pass, which sets the length of the way
+    speed: Positive = 8.0  # m/s, usual of mobile mapping in towns
+    stops: Spans = ()  # standing still in the first pass
+    turns: Annotated[float, Field(ge=0, le=90)] = 15.0  # deg, how far the way swings to each side
+    u_turn: bool = False  # drive the way back in the same pass
+    passes: Annotated[tuple[PassScenario, ...], Field(min_length=1)] = (PassScenario(),)
+    pose_rate: Positive = 100.0  # Hz, usual of exported trajectories
+    file: Path | None = None  # CSV, SBET, GNSS_RTK.pos or poses to follow; sets duration and way
+
+
+class ScannerScenario(_Part):
+    """A line scanner, or a spinning one with several rings; mounting of its own."""
+
+    kind: Literal["line", "spinning"] = "line"
+    lever_arm: Vector = (0.10, -0.60, 0.40)  # right, forward, up
+    boresight: Vector = (90.0, 0.0, 35.0)  # R_L^P = Rz(c) Ry(b) Rx(a): plane askew, as is usual
+    lines_per_second: Positive = 150.0  # or turns a second of a spinning one (10 to 20)
+    points_per_line: Annotated[int, Field(ge=8)] = 1000  # pulses a line and ring
+    field_of_view: tuple[float, float] = (-180.0, 180.0)  # scan angles that are measured
+    rings: tuple[float, ...] = (0.0,)  # elevations of a spinning scanner's beams
+    range_noise: NotNegative = 0.004  # one sigma; data sheets: 3 (RIEGL VMQ) to 5 mm (VQ-250)
+    angle_noise: NotNegative = 0.002  # one sigma, the paper's class of scanner
+    beam_divergence: NotNegative = 0.0  # mrad, full angle; 0.35 for RIEGL VQ-250
+    max_range: Positive = 100.0
+    loss: Share = 0.0  # of returns of a hundredth of full strength, as of asphalt 12 m away
+
+
+class PosScenario(_Part):
+    """GNSS and inertial sensors with their errors; or a series of errors from a file."""
+
+    grade: Literal["tactical", "mems"] = "tactical"  # see pos_error for the figures of each
+    gnss_rate: Positive = 1.0  # Hz, the paper's
+    odometer: bool = False  # a wheel odometer that the filter uses too
+    processing: Literal["smoothed", "filtered"] = "smoothed"  # afterwards, or in real time
+    outages: Spans = ()  # no GNSS at all
+    canyons: Spans = ()  # few satellites, multipath
+    sky_view: bool = False  # outages and multipath from the height of the scene's walls
+    error_file: Path | None = None  # a given error series (OB_GINS .err), instead of the sensors
+
+
+class EffectScenario(_Part):
+    """One effect by its name and its parameters, as mlscorr.effects names them."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    name: str
+
+    @property
+    def effect(self):
+        """The effect as a value: an Effect of mlscorr.effects."""
+        return make_effect(self.name, **self.model_extra)
+
+    @model_validator(mode="after")
+    def _is_known(self):
+        make_effect(self.name, **self.model_extra)  # refuses what no survey can have
+        return self
+
+
+class Scenario(_Part):
+    """A whole simulated survey; times count from the start of the drive."""
 
     name: str = "street"
     crs: str = "EPSG:32650"
-    origin: tuple = (532_000.0, 3_374_000.0, 42.0)  # m: E, N, H at the start, in Wuhan's UTM zone
-    start_time: float = 357_700.0  # s of the GPS week
-    duration: float = 60.0  # s
-    speed: float = 8.0  # m/s, usual of mobile mapping in towns
-    pose_rate: float = 100.0  # Hz, usual of exported trajectories
-    control: int = 16  # surveyed targets that a correction may use
-    check: int = 8  # surveyed targets that it may not
-    target_size: float = 0.6  # m, disc diameter or plate edge, as in the shared surveys
-    survey_noise: float = 0.003  # m, one sigma an axis: total station and levelling
-    lines_per_second: float = 150.0  # the shared surveys' scanner
-    points_per_line: int = 1000  # a quarter to a third of what such scanners measure
-    max_range: float = 100.0  # m
-    range_noise: float = 0.004  # m, one sigma, the shared surveys' scanner
-    angle_noise: float = 0.002  # deg, one sigma, the paper's class of scanner
-    lever_arm: tuple = (0.10, -0.60, 0.40)  # m: right, forward, up
-    boresight: tuple = (90.0, 0.0, 35.0)  # deg, R_L^P = Rz(c) Ry(b) Rx(a)
-    outages: tuple = ()  # (start, duration) of each, s: no GNSS
-    canyons: tuple = ()  # (start, duration) of each, s: GNSS with multipath
-    accelerometer_bias: float = 0.006  # m/s^2, not yet calibrated; tactical to MEMS class, 0.6 mg
+    origin: Vector = (532_000.0, 3_374_000.0, 42.0)  # E, N, H at the start: Wuhan's UTM zone
+    start_time: NotNegative = 357_700.0  # s of the GPS week
+    scene: SceneScenario = SceneScenario()
+    targets: TargetScenario = TargetScenario()
+    drive: DriveScenario = DriveScenario()
+    scanner: Annotated[tuple[ScannerScenario, ...], Field(min_length=1)] = (ScannerScenario(),)
+    pos: PosScenario = PosScenario()
+    effects: tuple[EffectScenario, ...] = ()
 
-    def __post_init__(self):
-        for name in ("duration", "speed", "pose_rate", "control", "target_size"):
-            if getattr(self, name) <= 0:
-                raise ValueError(f"Invalid {name} '{getattr(self, name)}'. Should be positive.")
-        for name in ("outages", "canyons"):
-            for start, length in getattr(self, name):
-                if start < 0 or length <= 0 or start + length > self.duration:
-                    raise ValueError(
-                        f"Invalid {name} of {length} s from {start} s. "
-                        f"Should lie within the drive of {self.duration} s."
-                    )
+    @property
+    def imperfections(self):
+        """The effects as values (tuple of Effect), in the order in which they act."""
+        return in_order(effect.effect for effect in self.effects)
+
+    @property
+    def end(self):
+        """When the last pass ends, from the start of the drive, at most; None for a given file."""
+        if self.drive.file is not None:
+            return None
+        ways = [self.drive.speed / (p.speed or self.drive.speed) for p in self.drive.passes]
+        pauses = [p.pause for p in self.drive.passes[1:]]
+        return self.drive.duration * sum(ways) + sum(pauses)
+
+    @model_validator(mode="after")
+    def _holds_its_events(self):
+        spans = [("drive.stops", self.drive.stops)]
+        spans += [("pos.outages", self.pos.outages), ("pos.canyons", self.pos.canyons)]
+        events = [(f"{key} of {length:g} s from", start, start + length)
+                  for key, several in spans for start, length in several]  # fmt: skip
+        events += [(f"{e.name} at", e.time, e.time) for e in self.imperfections
+                   if hasattr(e, "time")]  # fmt: skip
+        for what, start, end in events:
+            if self.end is not None and end > self.end:
+                raise ValueError(f"{what} {start:g} s lies outside the drive of {self.end:g} s")
+        return self
 
 
 DEMO = Scenario(  # slow and coarse, so that a million points are enough
     name="demo",
-    speed=4.2,
-    lines_per_second=75.0,
-    points_per_line=400,
-    outages=((18.0, 25.0),),
-    canyons=((4.0, 12.0),),
-    accelerometer_bias=0.015,  # a cheap MEMS sensor, so that the drift is easy to see
+    drive=DriveScenario(speed=4.2),
+    scanner=(ScannerScenario(lines_per_second=75.0, points_per_line=400),),
+    # in real time, not smoothed afterwards, so that the drift is easy to see
+    pos=PosScenario(processing="filtered", outages=((15.0, 25.0),), canyons=((3.0, 10.0),)),
 )

@@ -1,0 +1,38 @@
+"""scenario.toml as one Scenario."""
+
+from pathlib import Path
+
+from mlscorr.io.settings import read_settings_file
+from mlscorr.simulate.scenario import Scenario
+
+FILES = (("scene", "file"), ("drive", "file"), ("pos", "error_file"))  # that a scenario may name
+
+
+def read_scenario(path):
+    """Scenario of a TOML file; the files it names stand relative to it.
+
+    Raises ValueError for bad TOML, unknown keys (with the nearest known one) and values that no
+    survey can have; FileNotFoundError for files that aren't there.
+    """
+    path = Path(path)
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "does not exist"
+        raise FileNotFoundError(f"{path} {what}; a scenario is a TOML file.")
+    scenario = read_settings_file(path, Scenario)
+    for part, key in FILES:
+        section = getattr(scenario, part)
+        if (name := getattr(section, key)) is None:
+            continue
+        file = path.parent / name
+        if not file.is_file():
+            raise FileNotFoundError(f"{part}.{key} of {path} names {file}, which does not exist.")
+        scenario = scenario.model_copy(
+            update={part: section.model_copy(update={key: file.absolute()})}
+        )
+    return scenario
+
+
+def scenario_files(scenario):
+    """Paths of the files that a scenario names, which a simulation must not overwrite."""
+    named = (getattr(getattr(scenario, part), key) for part, key in FILES)
+    return [file for file in named if file is not None]
