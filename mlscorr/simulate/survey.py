@@ -1,202 +1,230 @@
 """A whole survey, simulated: what was recorded, and the truth behind it."""
 
-import json
-from dataclasses import asdict, dataclass
-from datetime import date
+from copy import deepcopy
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from mlscorr.georeference import georeference
-from mlscorr.simulate.drive import distance_along, drive
-from mlscorr.simulate.pos_error import ATTITUDE_ERROR, pos_error, record
-from mlscorr.simulate.scanner import Pulses, scan
+from mlscorr.effects import Reference, apply_effects, effect_streams
+from mlscorr.simulate.drive import drive
+from mlscorr.simulate.echoes import Surfaces
+from mlscorr.simulate.rays import Platform
+from mlscorr.simulate.recording import (
+    disturb,
+    join_passes,
+    recorded_passes,
+    split_passes,
+    spread_checks,
+    streams_by_file,
+    surveyed_targets,
+    true_mounting,
+)
+from mlscorr.simulate.scanner import Pulses, pulses_of_a_pass, shoot
 from mlscorr.simulate.scenario import Scenario
-from mlscorr.simulate.scene import Scene, build_scene, centre_line
-from mlscorr.survey import ControlPoints, Mounting, PointCloud, Trajectory, angles_from_attitude
+from mlscorr.simulate.scene import Scene, build_scene
+from mlscorr.survey import ControlPoints, Mounting, PointCloud, Trajectory
 
-CLOUD_FILE = "pass-1.laz"
-CREATED = date(2015, 1, 1)  # in the LAS header, so that a seed gives the same bytes on any day
+STREAMS = 6  # drive, scene, scan, POS, control, effects: switching one leaves all others
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some pulses of one pass and scanner: as measured, and as georeferenced with what was
+    recorded. Of ``fired`` pulses, ``pulses`` are the returns and ``cloud`` their points."""
+
+    file: str
+    fired: int
+    pulses: Pulses
+    cloud: PointCloud
 
 
 @dataclass(frozen=True)
 class SimulatedSurvey:
-    """One simulated drive.
+    """One simulated survey. Its pulses are made anew, block by block, each time they are asked for.
 
     Parameters
     ----------
     scenario : Scenario
     scene : Scene
-    pulses : Pulses
-        As measured, with their true points.
-    true_trajectory, trajectory : Trajectory
-        Where the vehicle was, and what the POS recorded.
-    mounting : Mounting
+    true_passes, passes : tuple of Trajectory
+        Where the vehicle was, and what the POS recorded; one for each pass, in time order.
+    true_mountings, mountings : tuple of Mounting
+        Of each scanner, as it is and as it is recorded.
     targets : ControlPoints
-        All targets as surveyed, with noise, in the order of the scene's targets.
+        All targets as surveyed, in the order of the scene's targets.
     is_check : (n,) bool array
         Which of them are check points.
     true_centre : (n, 3) array
         Map coordinates of the targets. Units: m.
+    effects : tuple of Effect
+    reference : Reference
+    streams : dict
+        By file: random streams of its scanner's noise, and of the effects on first and later
+        echoes.
+    beam_streams : dict
+        Random streams of the effects on the beam.
+    seed : int or None
+        Of the random numbers, where it is known.
     """
 
     scenario: Scenario
     scene: Scene
-    pulses: Pulses
-    true_trajectory: Trajectory
-    trajectory: Trajectory
-    mounting: Mounting
+    true_passes: tuple[Trajectory, ...]
+    passes: tuple[Trajectory, ...]
+    true_mountings: tuple[Mounting, ...]
+    mountings: tuple[Mounting, ...]
     targets: ControlPoints
     is_check: np.ndarray
     true_centre: np.ndarray
+    effects: tuple
+    reference: Reference
+    streams: dict
+    beam_streams: dict
+    seed: int | None = None
+
+    @cached_property
+    def true_trajectory(self):
+        """The true trajectory of all passes; between them are gaps."""
+        return join_passes(self.true_passes)
+
+    @cached_property
+    def trajectory(self):
+        """The recorded trajectory of all passes; between them are gaps."""
+        return join_passes(self.passes)
+
+    @property
+    def mounting(self):
+        """The first scanner's recorded Mounting."""
+        return self.mountings[0]
+
+    @property
+    def files(self):
+        """Names of the cloud files, in the order in which they are written."""
+        return tuple(self.streams)
+
+    @property
+    def fired(self):
+        """Number of pulses that all scanners fire on all passes."""
+        return sum(
+            pulses_of_a_pass(trajectory, scanner)
+            for trajectory in self.true_passes
+            for scanner in self.scenario.scanner
+        )
+
+    @cached_property
+    def surfaces(self):
+        """The scene as rays meet it."""
+        return Surfaces(self.scene.mesh)
+
+    def blocks(self, **size):
+        """Blocks of all files in turn, each file in time order; any number of times the same."""
+        scanners = len(self.scenario.scanner)
+        for number, file in enumerate(self.files):
+            yield from self._blocks_of(file, *divmod(number, scanners), **size)
+
+    def _blocks_of(self, file, number, k, **size):
+        """Blocks of a pass and scanner, both counted from 0."""
+        scanner, origin = self.scenario.scanner[k], np.array(self.scenario.origin)
+        noise, *effect = deepcopy(self.streams[file])
+        divergence = apply_effects(
+            self.effects, "beam", 1e-3 * scanner.beam_divergence, self.reference, self.beam_streams
+        )
+        recorded = Platform.of(self.passes[number], self.mountings[k], origin)
+        for shots in shoot(
+            self.surfaces,
+            origin,
+            self.true_passes[number],
+            self.true_mountings[k],
+            scanner,
+            noise,
+            divergence,
+            **size,
+        ):
+            shots = disturb(shots, self.effects, self.reference, effect)
+            # what a wrong clock puts outside the trajectory, no one can georeference
+            shots.kept[recorded.outside(shots.gps_time)] = False
+            pulses = shots.pulses()
+            xyz = recorded.place(
+                pulses.gps_time, pulses.angle, pulses.elevation, pulses.range, origin
+            )
+            cloud = PointCloud(xyz, pulses.gps_time, pulses.intensity)
+            yield Block(file, shots.fired, pulses, cloud)
+
+    @cached_property
+    def pulses(self):
+        """Pulses of all files; for small surveys."""
+        return Pulses.concatenate([block.pulses for block in self.blocks()])
 
     @cached_property
     def cloud(self):
-        """PointCloud of the measured pulses, georeferenced with the recorded trajectory."""
-        xyz = georeference(
-            self.trajectory, self.mounting, self.pulses.scanner_xyz, self.pulses.gps_time
-        )
-        return PointCloud(xyz, self.pulses.gps_time, self.pulses.intensity)
+        """PointCloud of all files, georeferenced with what was recorded; for small surveys."""
+        return PointCloud.concatenate([block.cloud for block in self.blocks()])
 
     @property
     def target(self):
-        """Which target each point truly lies on, board included; -1 for none: (n,) int."""
+        """Which target each point of the cloud truly lies on, board included; -1 for none."""
         return self.scene.target[self.pulses.triangle]
 
-    def write(self, folder):
-        """Write the survey folder with survey.toml, cloud, trajectory, control and truth."""
-        from mlscorr.io.las_writer import write_cloud
-        from mlscorr.io.trajectory import write_trajectory_csv
+    def write(self, folder, progress=None):
+        """Write the survey folder, whole or not at all: survey.toml, clouds, trajectory, control,
+        and the truth. ``progress(title, total)`` returns a function of the pulses just done.
 
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_cloud(
-            folder / CLOUD_FILE,
-            self.cloud,
-            scan_angle=self.pulses.scan_angle,
-            crs=self.scenario.crs,
-            created=CREATED,
-        )
-        write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
-        (folder / "control.csv").write_text(self._control_csv())
-        (folder / "survey.toml").write_text(_survey_toml(self.scenario))
-        np.savez(folder / "truth.npz", **self._truth())
-        truth = {"effect": "none", "params": {}, "scenario": asdict(self.scenario)}
-        (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
+        Raises ValueError when a scanner met nothing on a pass; OSError when writing fails.
+        """
+        from mlscorr.simulate.write import write_survey
 
-    def _control_csv(self):
-        rows = [
-            "name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role",
-        ]
-        t = self.targets
-        for i, name in enumerate(t.name):
-            place = ",".join(f"{v:.4f}" for v in t.position[i])
-            role = "check" if self.is_check[i] else "control"
-            sigma = f"{t.sigma[i, 0]},{t.sigma[i, 2]}"
-            rows.append(f"{name},{place},{sigma},{t.kind[i]},{t.size[i]},{role}")
-        return "\n".join(rows) + "\n"
-
-    def _truth(self):
-        """Arrays of truth.npz: points in file order, trajectory (deg), targets."""
-        angles = np.column_stack(angles_from_attitude(self.true_trajectory.attitude))
-        return {
-            "point_xyz": self.pulses.point,
-            "point_target": self.target.astype(np.int16),
-            "trajectory_gps_time": self.true_trajectory.gps_time,
-            "trajectory_position": self.true_trajectory.position,
-            "trajectory_roll_pitch_heading": np.degrees(angles),
-            "control_name": np.array(self.targets.name),
-            "control_position": self.true_centre,
-            "control_normal": self.scene.targets.normal,
-        }
+        write_survey(self, folder, progress)
 
 
 def simulate(scenario, rng):
     """SimulatedSurvey of a scenario; every stage has its own random stream.
 
-    >>> short = Scenario(duration=2.0, control=2, check=1, points_per_line=50)
+    >>> from mlscorr.simulate.scenario import DriveScenario, ScannerScenario, TargetScenario
+    >>> short = Scenario(
+    ...     drive=DriveScenario(duration=8.0),
+    ...     targets=TargetScenario(control=2, check=1),
+    ...     scanner=(ScannerScenario(points_per_line=50),),
+    ... )
     >>> survey = simulate(short, np.random.default_rng(1))
-    >>> len(survey.trajectory), survey.targets.name
-    (201, ('T01', 'T02', 'T03'))
+    >>> survey.files, survey.targets.name
+    (('pass-1.laz',), ('T01', 'T02', 'T03'))
     """
-    speed_rng, line_rng, scene_rng, drive_rng, scan_rng, pos_rng, control_rng = rng.spawn(7)
+    drive_rng, scene_rng, scan_rng, pos_rng, control_rng, effect_rng = rng.spawn(STREAMS)
+    seed = getattr(rng.bit_generator.seed_seq, "entropy", None)
+    streams = effect_streams(effect_rng)
+    effects = scenario.imperfections
     origin = np.array(scenario.origin)
-    mounting = Mounting(
-        np.array(scenario.lever_arm),
-        Rotation.from_euler("xyz", scenario.boresight, degrees=True),
-    )
 
-    # The street is as long as the drive.
-    elapsed = np.arange(round(scenario.duration * scenario.pose_rate) + 1) / scenario.pose_rate
-    distance = distance_along(elapsed, scenario.speed, speed_rng)
-    line = centre_line(distance[-1], line_rng)
-    count = scenario.control + scenario.check
-    scene = build_scene(line, distance[-1], count, scenario.target_size, scene_rng)
-
-    # The vehicle drives and scans.
-    true = drive(line, distance, scenario.start_time + elapsed, origin, drive_rng)
-    pulses = scan(scene, origin, true, mounting, scenario, scan_rng)
-
-    # The POS and the surveyor record what they can.
-    recorded = record(true, pos_error(elapsed, scenario, pos_rng))
+    # The way, what stands along it, and the drive.
+    line, length, true_passes = drive(scenario, drive_rng)
+    scene = build_scene(scenario, line, length, scene_rng)
     centre = origin + scene.targets.centre
-    targets = _survey_targets(scene.targets, centre, scenario, control_rng)
-    is_check = _spread(count, scenario.check)
+    reference = Reference(
+        true_passes[0].gps_time[0], true_passes[-1].gps_time[-1], centre.mean(axis=0)
+    )
+
+    # What POS, mechanic and surveyor record.
+    recorded = recorded_passes(scenario, scene, true_passes, pos_rng)
+    recorded = apply_effects(effects, "pos", join_passes(recorded), reference, streams)
+    true_mountings = tuple(true_mounting(scanner) for scanner in scenario.scanner)
+    targets = surveyed_targets(scene.targets, centre, scenario.targets, control_rng)
     return SimulatedSurvey(
-        scenario, scene, pulses, true, recorded, mounting, targets, is_check, centre
+        scenario=scenario,
+        scene=scene,
+        true_passes=true_passes,
+        passes=split_passes(recorded, [len(trajectory) for trajectory in true_passes]),
+        true_mountings=true_mountings,
+        mountings=tuple(
+            apply_effects(effects, "mounting", mounting, reference, streams)
+            for mounting in true_mountings
+        ),
+        targets=apply_effects(effects, "control", targets, reference, streams),
+        is_check=spread_checks(len(targets), scenario.targets.check),
+        true_centre=centre,
+        effects=effects,
+        reference=reference,
+        streams=streams_by_file(len(true_passes), len(true_mountings), scan_rng, effect_rng),
+        beam_streams=streams,
+        seed=seed if isinstance(seed, int) else None,
     )
-
-
-def _survey_targets(targets, centre, scenario, rng):
-    """ControlPoints of all targets, with the noise of the survey."""
-    n = len(targets)
-    return ControlPoints(
-        tuple(f"T{i + 1:02d}" for i in range(n)),
-        centre + scenario.survey_noise * rng.standard_normal((n, 3)),
-        np.full((n, 3), scenario.survey_noise),
-        targets.kind,
-        np.full(n, scenario.target_size),
-        targets.normal,
-    )
-
-
-def _spread(count, check):
-    """Which of the targets are check points: evenly among them, not at the ends, (count,) bool."""
-    is_check = np.zeros(count, dtype=bool)
-    is_check[((np.arange(check) + 0.5) * count / max(check, 1)).astype(int)] = True
-    return is_check
-
-
-def _survey_toml(scenario):
-    """survey.toml of the folder, with what is believed of scanner and POS."""
-    roll, pitch, heading = np.degrees(ATTITUDE_ERROR).round(6).tolist()
-    return f"""\
-name = {json.dumps(scenario.name)}
-crs = {json.dumps(scenario.crs)}
-
-[cloud]
-files = ["{CLOUD_FILE}"]
-gps_time = "week"
-
-[trajectory]
-file = "trajectory.csv"
-
-[mounting]
-lever_arm = {list(scenario.lever_arm)}
-boresight = {list(scenario.boresight)}
-
-[control]
-file = "control.csv"
-
-[scanner]
-range_noise = {scenario.range_noise}
-angle_noise = {scenario.angle_noise}
-lines_per_second = {scenario.lines_per_second}
-
-[pos]
-position_sigma = 0.02
-attitude_sigma = {[roll, pitch, heading]}
-correlation_time = 30.0
-"""

@@ -1,0 +1,238 @@
+"""What comes back of each pulse: one echo of a thin beam, or several of a beam with a footprint.
+
+Rays are cast in float32 about a local origin (Open3D); all that is measured is computed in
+float64 on the plane of the triangle that was hit.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, pi, sin, sqrt
+
+import numpy as np
+from numba import njit
+
+from mlscorr.simulate.rays import in_slices
+from mlscorr.simulate.shapes import Mesh, ray_caster
+
+GRAZING = 0.01  # cosine of incidence below which nothing returns
+FADING = 10.0  # m where the strength has fallen to a half; a receiver's near field is flat
+PULSE_LENGTH = 0.6  # m of range within which echoes merge: c / 2 times the usual 4 ns
+BLACK = 1e-12  # strength of what reflects nothing, so that it has a weight
+NEVER = np.uint32(0xFFFFFFFF)  # Open3D's triangle of a ray that hits nothing
+
+# Sub-rays of a beam and their shares of its power: the rule of Radon for a Gaussian, exact to
+# degree 5 with a centre of 1/2 and a hexagon of 1/12 each at two sigma, where the power has fallen
+# to 1/e^2, which is how divergence is stated.
+HEXAGON = np.array([[cos(k * pi / 3), sin(k * pi / 3)] for k in range(6)])
+SUB_RAYS = np.vstack([[0.0, 0.0], HEXAGON])
+POWER = np.array([1 / 2] + [1 / 12] * 6)
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Echoes of n pulses: one row for the first echo of each, seen or not, then the later ones.
+
+    Parameters
+    ----------
+    range : (n + m,) array
+        0 where nothing returns. Units: m.
+    incidence : (n + m,) array
+        Cosine of the angle between beam and normal.
+    strength : (n + m,) array
+        1 for white, square on, near.
+    triangle : (n + m,) int array
+        Of the strongest part.
+    point : (n + m, 3) array
+        Where the middle of the beam has this range, in map coordinates. Units: m.
+    pulse : (m,) int array
+        Which of the n each later echo belongs to.
+    """
+
+    range: np.ndarray
+    incidence: np.ndarray
+    strength: np.ndarray
+    triangle: np.ndarray
+    point: np.ndarray
+    pulse: np.ndarray
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """A mesh that rays can hit."""
+
+    mesh: Mesh
+
+    @cached_property
+    def _caster(self):
+        """Open3D's caster of the triangles, in their order."""
+        return ray_caster(self.mesh.triangles)
+
+    @cached_property
+    def _planes(self):
+        """Unit normal, distance from the origin (m) and reflectance of each triangle: (n, 5)."""
+        a, b, c = np.moveaxis(self.mesh.triangles, 1, 0)
+        normal = np.cross(b - a, c - a)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        normal /= np.where(length > 0, length, 1.0)  # a triangle without area is never hit
+        distance = np.einsum("ij,ij->i", normal, a)
+        return np.column_stack([normal, distance, self.mesh.reflectance])
+
+    def cast(self, rays):
+        """Triangle (n,) that each float32 ray (n, 6) hits first, NEVER for none."""
+        return self._caster.cast_rays(rays)["primitive_ids"].numpy()
+
+    def hits(self, rays, origin, divergence, max_range):
+        """Hits of rays (n, 9) as Platform.aim gives them.
+
+        Parameters
+        ----------
+        origin : (3,) array
+            Map coordinates of the local origin. Units: m.
+        divergence : float
+            Full angle between the directions of 1/e^2 power; 0 for one thin ray. Units: rad.
+        max_range : float
+            Units: m.
+        """
+        n = len(rays)
+        first = np.empty((n, 3)), np.empty(n, np.int32), np.empty((n, 3))
+        if divergence == 0:
+            triangle = self.cast(rays[:, :6].astype(np.float32))
+            in_slices(n, _thin, (rays, triangle, *first), (origin, self._planes, max_range))
+            return Hits(*first[0].T, *first[1:], np.empty(0, np.int64))
+        fan = np.empty((n, len(SUB_RAYS), 6), np.float32)
+        offsets = SUB_RAYS * divergence / 2
+        in_slices(n, _fan, (rays, fan), (offsets,))
+        triangle = self.cast(fan.reshape(-1, 6)).reshape(n, -1)
+        constants = origin, offsets, POWER, self._planes, max_range
+        later = in_slices(n, _wide, (rays, triangle, *first), constants)
+        pulse, more, hit = (
+            np.concatenate([start + rows[0] for start, rows in later]),
+            np.concatenate([rows[1] for _, rows in later]),
+            np.concatenate([rows[2] for _, rows in later]),
+        )
+        point = origin + rays[pulse, :3] + more[:, :1] * rays[pulse, 3:6]
+        whole = [np.concatenate(pair) for pair in zip(first, (more, hit, point), strict=True)]
+        return Hits(*whole[0].T, *whole[1:], pulse)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _meet(ray, x, y, z, plane, max_range):
+    """Range, cosine of incidence and strength where a direction from a ray's start meets a plane.
+
+    Strength falls with the cosine (Lambert) and with the square of the range, beyond a near field.
+    """
+    slope = plane[0] * x + plane[1] * y + plane[2] * z
+    if abs(slope) < GRAZING:
+        return 0.0, 0.0, 0.0
+    away = plane[3] - (plane[0] * ray[0] + plane[1] * ray[1] + plane[2] * ray[2])
+    distance = away / slope
+    if not 0.0 < distance < max_range:
+        return 0.0, 0.0, 0.0
+    return distance, abs(slope), plane[4] * abs(slope) / (1.0 + (distance / FADING) ** 2)
+
+
+@njit(cache=True, nogil=True)
+def _thin(rays, triangle, met, hit, point, origin, planes, max_range):
+    for p in range(len(rays)):
+        ray, hit[p] = rays[p], -1
+        away, slant, strength = 0.0, 0.0, 0.0
+        if triangle[p] != NEVER:
+            away, slant, strength = _meet(
+                ray, ray[3], ray[4], ray[5], planes[triangle[p]], max_range
+            )
+        if away > 0.0:
+            hit[p] = triangle[p]
+        met[p, 0], met[p, 1], met[p, 2] = away, slant, strength
+        for axis in range(3):
+            point[p, axis] = origin[axis] + (ray[axis] + away * ray[3 + axis])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _aside(ray, u, v):
+    """Unit direction (3,) of a sub-ray, u along the sweep and v across it. Units: rad."""
+    ex, ey, ez = ray[6], ray[7], ray[8]
+    fx, fy, fz = ray[4] * ez - ray[5] * ey, ray[5] * ex - ray[3] * ez, ray[3] * ey - ray[4] * ex
+    x, y, z = ray[3] + u * ex + v * fx, ray[4] + u * ey + v * fy, ray[5] + u * ez + v * fz
+    length = sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
+
+
+@njit(cache=True, nogil=True)
+def _fan(rays, fan, offsets):
+    for p in range(len(rays)):
+        for k in range(len(offsets)):
+            for axis in range(3):
+                fan[p, k, axis] = rays[p, axis]
+            x, y, z = _aside(rays[p], offsets[k, 0], offsets[k, 1])
+            fan[p, k, 3], fan[p, k, 4], fan[p, k, 5] = x, y, z
+
+
+@njit(cache=True, nogil=True)
+def _wide(rays, triangle, met, hit, point, origin, offsets, power, planes, max_range):
+    """Fill the rows of the first echoes; returns pulse, met and hit of the later ones."""
+    parts = np.empty((len(offsets), 4))
+    pulse, later, later_hit = np.empty(64, np.int64), np.empty((64, 3)), np.empty(64, np.int32)
+    count = 0
+    for p in range(len(rays)):
+        seen = _parts(rays[p], triangle[p], offsets, power, planes, max_range, parts)
+        met[p], hit[p], start = 0.0, -1, 0
+        while start < seen:
+            end, away, slant, strength, main = _echo(parts, start, seen)
+            if start == 0:
+                met[p, 0], met[p, 1], met[p, 2], hit[p] = away, slant, strength, main
+            else:
+                if count == len(pulse):
+                    pulse = np.concatenate((pulse, pulse))
+                    later = np.concatenate((later, later))
+                    later_hit = np.concatenate((later_hit, later_hit))
+                later[count, 0], later[count, 1], later[count, 2] = away, slant, strength
+                pulse[count], later_hit[count] = p, main
+                count += 1
+            start = end
+        for axis in range(3):
+            point[p, axis] = origin[axis] + (rays[p, axis] + met[p, 0] * rays[p, 3 + axis])
+    return pulse[:count], later[:count], later_hit[:count]
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _parts(ray, triangle, offsets, power, planes, max_range, parts):
+    """What each sub-ray meets, nearest first: rows range, incidence, strength, triangle."""
+    seen = 0
+    for k in range(len(offsets)):
+        if triangle[k] == NEVER:
+            continue
+        x, y, z = _aside(ray, offsets[k, 0], offsets[k, 1])
+        distance, incidence, strength = _meet(ray, x, y, z, planes[triangle[k]], max_range)
+        if distance == 0.0:
+            continue
+        at = seen
+        while at > 0 and parts[at - 1, 0] > distance:
+            parts[at] = parts[at - 1]
+            at -= 1
+        parts[at, 0], parts[at, 1] = distance, incidence
+        parts[at, 2], parts[at, 3] = strength * power[k], triangle[k]
+        seen += 1
+    return seen
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _echo(parts, start, seen):
+    """The echo that starts with a part: the row after it, range, incidence, strength, triangle.
+
+    Parts within a pulse length of the echo so far merge into it, at their mean by strength; so
+    that echoes lie at least that far apart.
+    """
+    first, end = parts[start, 0], start
+    total, mixed, slant, strongest, main = 0.0, 0.0, 0.0, -1.0, -1
+    while end < seen:
+        away = parts[end, 0] - first
+        if total > 0.0 and away - mixed / total >= PULSE_LENGTH:
+            break
+        strength = max(parts[end, 2], BLACK)
+        total += strength
+        mixed += strength * away
+        slant += strength * parts[end, 1]
+        if strength > strongest:
+            strongest, main = strength, int(parts[end, 3])
+        end += 1
+    return end, first + mixed / total, slant / total, total, main

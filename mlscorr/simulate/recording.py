@@ -1,0 +1,127 @@
+"""What POS, scanner and surveyor record of the truth, with the effects that act on it."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.effects import Returns, apply_effects, effect_streams
+from mlscorr.simulate.pos_error import pos_error, record
+from mlscorr.simulate.scanner import noise_streams
+from mlscorr.simulate.scene import sky_elevation
+from mlscorr.survey import ControlPoints, Mounting, Trajectory
+
+ON_PULSES = ("clock", "angle")  # stages of effects at which all echoes of a pulse are one
+ON_ECHOES = ("range", "return")
+
+
+def disturb(shots, effects, reference, streams):
+    """Shots after the effects on clock, angle, range and return.
+
+    Rows of first echoes are all there, seen or not, and later echoes have streams of their own, so
+    that what one effect draws doesn't depend on another. Time and angle are those of the pulse.
+    """
+    if not any(effect.stage in ON_PULSES + ON_ECHOES for effect in effects):
+        return shots
+    first, later = (
+        Returns(*(getattr(shots, name)[rows] for name in Returns.__dataclass_fields__))
+        for rows in (slice(None, shots.fired), slice(shots.fired, None))
+    )
+    for stage in ("clock", "range", "angle", "return"):
+        first = apply_effects(effects, stage, first, reference, streams[0])
+        if stage in ON_ECHOES and len(later):
+            later = apply_effects(effects, stage, later, reference, streams[1])
+    later = replace(later, gps_time=first.gps_time[shots.pulse], angle=first.angle[shots.pulse])
+    changed = ("gps_time", "angle", "range", "kept")
+    return replace(
+        shots, **{name: np.append(getattr(first, name), getattr(later, name)) for name in changed}
+    )
+
+
+def recorded_passes(scenario, scene, true_passes, rng):
+    """What the POS records of each pass."""
+    start = true_passes[0].gps_time[0]
+    passes = []
+    for true, pass_rng in zip(true_passes, rng.spawn(len(true_passes)), strict=True):
+        sky = None
+        if scenario.pos.sky_view:
+            sky = sky_elevation(scene, true, np.array(scenario.origin))
+        passes.append(record(true, pos_error(true, scenario.pos, pass_rng, sky, start)))
+    return passes
+
+
+def streams_by_file(passes, scanners, scan_rng, effect_rng):
+    """Random streams by file name: a scanner's noise, effects on first and on later echoes."""
+    streams = {}
+    for number, (noise, effect) in enumerate(
+        zip(scan_rng.spawn(passes), effect_rng.spawn(passes), strict=True), start=1
+    ):
+        pairs = zip(noise.spawn(scanners), effect.spawn(scanners), strict=True)
+        for k, (noise_rng, file_rng) in enumerate(pairs, start=1):
+            name = f"pass-{number}.laz" if k == 1 else f"pass-{number}-scanner-{k}.laz"
+            echoes = (effect_streams(echo_rng) for echo_rng in file_rng.spawn(2))
+            streams[name] = (noise_streams(noise_rng), *echoes)
+    return streams
+
+
+def true_mounting(scanner):
+    return Mounting(
+        np.array(scanner.lever_arm),
+        Rotation.from_euler("xyz", scanner.boresight, degrees=True),
+    )
+
+
+def join_passes(passes):
+    """One Trajectory of several that follow each other in time."""
+    if len(passes) == 1:
+        return passes[0]
+
+    def stack(name):
+        values = [getattr(trajectory, name) for trajectory in passes]
+        return None if any(value is None for value in values) else np.concatenate(values)
+
+    return Trajectory(
+        stack("gps_time"),
+        stack("position"),
+        Rotation.concatenate([trajectory.attitude for trajectory in passes]),
+        stack("position_sigma"),
+        stack("attitude_sigma"),
+    )
+
+
+def split_passes(trajectory, lengths):
+    """The passes of a joined Trajectory, by their numbers of epochs."""
+
+    def part(rows):
+        sigmas = (trajectory.position_sigma, trajectory.attitude_sigma)
+        return Trajectory(
+            trajectory.gps_time[rows],
+            trajectory.position[rows],
+            trajectory.attitude[rows],
+            *(None if sigma is None else sigma[rows] for sigma in sigmas),
+        )
+
+    ends = np.cumsum(lengths)
+    return tuple(part(slice(end - n, end)) for end, n in zip(ends, lengths, strict=True))
+
+
+def surveyed_targets(targets, centre, scenario, rng):
+    """ControlPoints of all targets, with the noise of the survey."""
+    n = len(targets)
+    horizontal, vertical = scenario.survey_sigma
+    sigma = np.tile([horizontal, horizontal, vertical], (n, 1))
+    return ControlPoints(
+        tuple(f"T{i + 1:02d}" for i in range(n)),
+        centre + sigma * rng.standard_normal((n, 3)),
+        sigma,
+        targets.kind,
+        np.full(n, scenario.size),
+        targets.normal,
+    )
+
+
+def spread_checks(count, check):
+    """Which of the targets are check points: evenly among them, not at the ends, (count,) bool."""
+    is_check = np.zeros(count, dtype=bool)
+    is_check[((np.arange(check) + 0.5) * count / max(check, 1)).astype(int)] = True
+    return is_check

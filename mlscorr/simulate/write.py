@@ -1,0 +1,179 @@
+"""The folder of a simulated survey: what was recorded, as the readers expect it, and the truth."""
+
+import json
+from contextlib import contextmanager
+from dataclasses import asdict
+from datetime import date
+from itertools import groupby
+
+import numpy as np
+
+from mlscorr.io.las_writer import cloud_writer
+from mlscorr.io.npz import npz_writer
+from mlscorr.io.output import output_folder
+from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.survey import Pos, angles_from_attitude
+
+CREATED = date(2015, 1, 1)  # in the LAS header, so that a seed gives the same bytes on any day
+
+
+def write_survey(survey, folder, progress=None):
+    """Write a SimulatedSurvey, whole or not at all; see SimulatedSurvey.write."""
+    done = (progress or _silent)("Simulating pulses", survey.fired)
+    with _disk_errors(folder), output_folder(folder) as part:
+        points = {}
+        with npz_writer(part / "truth.npz") as truth:
+            for file, blocks in groupby(survey.blocks(), key=lambda block: block.file):
+                points[file] = _write_cloud(part / file, survey, blocks, truth, done)
+            for name, array in _truth_arrays(survey).items():
+                truth.put(name, array)
+        write_trajectory_csv(part / "trajectory.csv", survey.trajectory)
+        (part / "control.csv").write_text(_control_csv(survey))
+        (part / "survey.toml").write_text(_survey_toml(survey))
+        (part / "truth.json").write_text(json.dumps(_truth(survey, points), indent=1) + "\n")
+
+
+def _silent(title, total):
+    return lambda pulses: None
+
+
+@contextmanager
+def _disk_errors(folder):
+    """Say of what could not be written which folder it was for."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(
+            f"the survey can't be written to {folder}, and nothing is left of it: "
+            f"{error.strerror or error}."
+        ) from error
+
+
+def _write_cloud(path, survey, blocks, truth, done):
+    """One cloud file and the truth of its points; returns their number."""
+    origin, scenario = np.array(survey.scenario.origin), survey.scenario
+    fired = 0
+    with cloud_writer(path, origin, scenario.crs, created=CREATED) as writer:
+        for block in blocks:
+            pulses = block.pulses
+            writer.write(
+                block.cloud,
+                pulses.scan_angle,
+                pulses.return_number,
+                pulses.number_of_returns,
+            )
+            truth.append("point_xyz", pulses.point)
+            truth.append("point_target", survey.scene.target[pulses.triangle].astype(np.int16))
+            fired += block.fired
+            done(block.fired)
+        if writer.points == 0:
+            raise ValueError(
+                f"None of the {fired} pulses of {path.stem} met anything: the drive leaves the "
+                "scene, or max_range or field_of_view of the scanner leave nothing to see."
+            )
+    return writer.points
+
+
+def _truth_arrays(survey):
+    """Whole arrays of truth.npz beside the points': trajectory (deg) and targets."""
+    true = survey.true_trajectory
+    angles = np.column_stack(angles_from_attitude(true.attitude))
+    return {
+        "trajectory_gps_time": true.gps_time,
+        "trajectory_position": true.position,
+        "trajectory_roll_pitch_heading": np.degrees(angles),
+        "control_name": np.array(survey.targets.name),
+        "control_position": survey.true_centre,
+        "control_normal": survey.scene.targets.normal,
+        "control_support": np.array(survey.scene.targets.support),
+        "control_hidden": np.array(survey.scene.targets.hidden),
+    }
+
+
+def _truth(survey, points):
+    """Content of truth.json: the effects, the mountings as they are and as recorded, the rest."""
+    effects = [(effect.name, asdict(effect)) for effect in survey.effects]
+    single = effects[0][1] if len(effects) == 1 else dict(effects)
+    return {
+        "effect": "+".join(dict(effects)) or "none",
+        "params": single,
+        "effects": [{"name": name, **parameters} for name, parameters in effects],
+        "seed": survey.seed,
+        "points": points,
+        "mountings": {
+            "true": [_mounting(mounting) for mounting in survey.true_mountings],
+            "recorded": [_mounting(mounting) for mounting in survey.mountings],
+        },
+        "scenario": survey.scenario.model_dump(mode="json"),
+    }
+
+
+def _mounting(mounting):
+    """Lever arm (m) and boresight (deg) as survey.toml has them."""
+    boresight = mounting.boresight.as_euler("xyz", degrees=True)
+    return {
+        "lever_arm": np.asarray(mounting.lever_arm).round(9).tolist(),
+        "boresight": boresight.round(9).tolist(),
+    }
+
+
+def _control_csv(survey):
+    """control.csv, with the normals left out, as a surveyor rarely has them."""
+    rows = ["name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role"]
+    t = survey.targets
+    for i, name in enumerate(t.name):
+        place = ",".join(f"{v:.4f}" for v in t.position[i])
+        role = "check" if survey.is_check[i] else "control"
+        rows.append(
+            f"{name},{place},{t.sigma[i, 0]},{t.sigma[i, 2]},{t.kind[i]},{t.size[i]},{role}"
+        )
+    return "\n".join(rows) + "\n"
+
+
+def _survey_toml(survey):
+    """survey.toml, with the first scanner's mounting and what is believed of scanner and POS."""
+    scenario, scanner = survey.scenario, survey.scenario.scanner[0]
+    mounting = _mounting(survey.mounting)
+    noise = {"range_noise": scanner.range_noise, "angle_noise": scanner.angle_noise}
+    believed = [f"{name} = {sigma}" for name, sigma in noise.items() if sigma > 0]
+    position, attitude = _pos_sigmas(survey.trajectory)
+    others = "".join(
+        f"# pass-N-scanner-{k}.laz: lever_arm = {m['lever_arm']}, boresight = {m['boresight']}\n"
+        for k, m in enumerate(map(_mounting, survey.mountings[1:]), start=2)
+    )
+    lines = "\n".join([*believed, f"lines_per_second = {scanner.lines_per_second}"])
+    return f"""\
+name = {json.dumps(scenario.name)}
+crs = {json.dumps(scenario.crs)}
+
+[cloud]
+files = {json.dumps(list(survey.files))}
+gps_time = "week"
+
+[trajectory]
+file = "trajectory.csv"
+
+[mounting]
+lever_arm = {mounting["lever_arm"]}
+boresight = {mounting["boresight"]}
+{others}
+[control]
+file = "control.csv"
+
+[scanner]
+{lines}
+
+[pos]
+position_sigma = {position}
+attitude_sigma = {attitude}
+correlation_time = {Pos.correlation_time}
+"""
+
+
+def _pos_sigmas(trajectory):
+    """Median sigma of position (m) and of roll, pitch, heading (deg) that the POS reports."""
+    if trajectory.position_sigma is None or trajectory.attitude_sigma is None:
+        nominal = Pos()
+        return nominal.position_sigma, np.degrees(nominal.attitude_sigma).round(4).tolist()
+    attitude = np.degrees(np.median(trajectory.attitude_sigma, axis=0))
+    return round(float(np.median(trajectory.position_sigma)), 4), attitude.round(4).tolist()
