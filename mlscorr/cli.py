@@ -91,6 +91,36 @@ def demo(
 
 
 @app.command()
+def simulate(
+    scenario: Annotated[Path, typer.Argument(help="TOML file, as those in examples/scenarios.")],
+    out: Out,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 1,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+):
+    """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
+    with _exit_code(Exit.USAGE):
+        from mlscorr.io.output import check_output
+        from mlscorr.simulate.scenario_file import read_scenario, scenario_files
+
+        check_output(out, [scenario, *scenario_files(read_scenario(scenario))], overwrite)
+    with _exit_code(Exit.BAD_DATA), _progress() as progress:
+        from mlscorr.pipeline import simulate_survey
+
+        made = simulate_survey(scenario, out, seed, overwrite, progress)
+    if as_json:
+        print(json.dumps(made))
+    points = sum(file["points"] for file in made["files"])
+    _say(
+        f"Simulated {made['name']}: {points} points in {len(made['files'])} files, "
+        f"{made['control']} control and {made['check']} check points, "
+        f"{made['passes']} passes in {made['end'] - made['start']:.0f} s."
+    )
+    _say(f"Survey:  {out / 'survey.toml'}")
+    _say(f"Truth:   {out / 'truth.json'} and {out / 'truth.npz'}")
+
+
+@app.command()
 def doctor(as_json: Json = False):
     """Tell what is installed, what is missing, and the line that installs it."""
     from mlscorr.doctor import examine, remedy

@@ -130,3 +130,35 @@ def _unseen_row(name, pass_number, control, role, reason):
         "used": False,
         "reason": reason,
     }
+
+
+def model_section(estimate):
+    """The model section of report.json."""
+    alternatives = [
+        {**_covariance(parameters), "probability": probability}
+        for parameters, probability in estimate.alternatives
+    ]
+    return {
+        "method": "lsc",
+        "order": estimate.order,
+        "covariance": _covariance(estimate.parameters),
+        "estimated_by": "restricted maximum likelihood of the control points",
+        "log_likelihood": estimate.log_likelihood,
+        "sigma0": estimate.sigma0,
+        "outliers": [
+            {"name": o.name, "statistic": o.statistic, "critical": o.critical}
+            for o in estimate.outliers
+        ],
+        "alternatives": alternatives,
+        "warnings": list(estimate.warnings),
+    }
+
+
+def _covariance(parameters):
+    return {
+        "family": parameters.family,
+        "correlation_time": parameters.drift_time,
+        "scale": parameters.drift_scale,
+        "jitter_correlation_time": parameters.jitter_time,
+        "jitter_scale": parameters.jitter_scale,
+    }

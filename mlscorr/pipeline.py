@@ -1,7 +1,7 @@
 """The story from files to files, one screen a command."""
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from mlscorr.correction import ORDER, Estimate, estimate_correction
 from mlscorr.evaluation import (
     CHECK_REASON,
     before_and_after,
+    model_section,
     statistics,
     target_rows,
     unseen_rows,
@@ -76,7 +77,11 @@ def correct(survey, order=ORDER, rng=None, progress=None):
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
     >>> folder = tempfile.mkdtemp()
-    >>> short = Scenario(duration=8.0, control=4, check=1, lines_per_second=75, points_per_line=400)
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
     >>> simulate(short, np.random.default_rng(1)).write(folder)
     >>> result = mlscorr.correct(mlscorr.read_survey(folder))
     >>> max(result.check["after"]["rmse"]) < 0.03
@@ -206,7 +211,7 @@ class CorrectedSurvey:
             "targets": self.targets,
             "control": self.control,
             "check": self.check,
-            "model": _model(self.estimate),
+            "model": model_section(self.estimate),
             "coverage": {
                 "control_span": list(self.estimate.span),
                 "longest_gap_s": float(np.diff(epochs).max(initial=0.0)),
@@ -219,38 +224,6 @@ class CorrectedSurvey:
 
 def _silent(title, total):
     return lambda points: None
-
-
-def _model(estimate):
-    """The model section of report.json."""
-    alternatives = [
-        {**_covariance(parameters), "probability": probability}
-        for parameters, probability in estimate.alternatives
-    ]
-    return {
-        "method": "lsc",
-        "order": estimate.order,
-        "covariance": _covariance(estimate.parameters),
-        "estimated_by": "restricted maximum likelihood of the control points",
-        "log_likelihood": estimate.log_likelihood,
-        "sigma0": estimate.sigma0,
-        "outliers": [
-            {"name": o.name, "statistic": o.statistic, "critical": o.critical}
-            for o in estimate.outliers
-        ],
-        "alternatives": alternatives,
-        "warnings": list(estimate.warnings),
-    }
-
-
-def _covariance(parameters):
-    return {
-        "family": parameters.family,
-        "correlation_time": parameters.drift_time,
-        "scale": parameters.drift_scale,
-        "jitter_correlation_time": parameters.jitter_time,
-        "jitter_scale": parameters.jitter_scale,
-    }
 
 
 def _nothing_found(survey, candidates):
@@ -290,3 +263,38 @@ def demo(out, seed=1, overwrite=False, progress=None):
         simulate(DEMO, np.random.default_rng(seed)).write(simulated)
         result = correct(read_survey(simulated), progress=progress)
         return result.write(Path(folder) / "corrected", progress=progress)
+
+
+def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
+    """Simulate the survey of a scenario file: a survey folder, with truth.npz and truth.json.
+
+    The folder appears whole or not at all. Returns the document of the JSON output. Raises
+    ValueError for a scenario that no survey can have, or a folder that holds an input or, without
+    overwrite, anything; OSError when writing fails.
+    """
+    from mlscorr.simulate import simulate
+    from mlscorr.simulate.scenario_file import read_scenario, scenario_files
+
+    scenario = read_scenario(scenario_path)
+    check_output(out, [scenario_path, *scenario_files(scenario)], overwrite)
+    simulate(scenario, np.random.default_rng(seed)).write(out, progress=progress)
+    return _simulated(read_survey(out), scenario, seed)
+
+
+def _simulated(survey, scenario, seed):
+    """The document of a simulated survey, as it is read again from its folder."""
+    return document(
+        "simulate",
+        {
+            "name": scenario.name,
+            "crs": scenario.crs,
+            "seed": seed,
+            "start": float(survey.trajectory.gps_time[0]),
+            "end": float(survey.trajectory.gps_time[-1]),
+            "passes": len(survey.trajectory.gaps) + 1,
+            "control": len(survey.control),
+            "check": len(survey.check),
+            "effects": [{"name": e.name, **asdict(e)} for e in scenario.imperfections],
+            "files": [{"name": file.path.name, "points": file.points} for file in survey.clouds],
+        },
+    )

@@ -17,7 +17,11 @@ MLSCORR = Path(sys.executable).with_name("mlscorr")
 def street(tmp_path_factory):
     "Folder of a simulated survey of 8 s: 4 control points and 1 check point; copy it to change it"
     folder = tmp_path_factory.mktemp("street")
-    scenario = Scenario(duration=8.0, control=4, check=1, lines_per_second=75, points_per_line=400)
+    scenario = Scenario(
+        drive={"duration": 8.0},
+        targets={"control": 4, "check": 1},
+        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    )
     simulate(scenario, np.random.default_rng(1)).write(folder)
     return folder
 
@@ -37,7 +41,7 @@ def in_part(street, tmp_path_factory):
     "mlscorr correct where the trajectory starts late and has a gap under T02: (process, out)"
     folder = shutil.copytree(street, tmp_path_factory.mktemp("in part") / "survey")
     header, *epochs = (folder / "trajectory.csv").read_text().splitlines()
-    kept = [header, *epochs[51:271], *epochs[360:]]
+    kept = [header, *epochs[51:296], *epochs[360:]]
     (folder / "trajectory.csv").write_text("\n".join(kept) + "\n")
     out = folder.parent / "out"
     command = [MLSCORR, "correct", folder, "-o", out]
