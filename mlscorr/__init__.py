@@ -3,11 +3,13 @@
 from importlib import import_module
 
 _HOMES = {"read_survey": "mlscorr.io.survey_file", "correct": "mlscorr.pipeline"}
-__all__ = ["correct", "read_survey"]
+__all__ = ["correct", "read_survey", "simulate"]
 
 
 def __getattr__(name):
     """Load what is asked for, and the libraries it needs, only then."""
+    if name == "simulate":  # a package that can be called
+        return import_module("mlscorr.simulate")
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'mlscorr' has no attribute '{name}'")

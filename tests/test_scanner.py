@@ -105,9 +105,7 @@ def test_the_fast_georeferencing_is_the_plain_one():
     angle, elevation, away = rng.uniform([-9, -1, 0], [9, 1, 100], (n, 3)).T
     beam = [np.cos(elevation) * np.cos(angle), np.cos(elevation) * np.sin(angle), np.sin(elevation)]
     plain = georeference(trajectory, MOUNTING, away[:, None] * np.column_stack(beam), gps_time)
-    fast = Platform.of(trajectory, MOUNTING, ORIGIN).place(
-        gps_time, angle, elevation, away, ORIGIN
-    )
+    fast = Platform.of(trajectory, MOUNTING, ORIGIN).place(gps_time, angle, elevation, away, ORIGIN)
     assert np.abs(fast - plain).max() < 2e-9  # m: four steps of float64 at UTM size
 
 
@@ -226,7 +224,15 @@ def test_the_sub_rays_make_a_gaussian_beam():
     x, y = SUB_RAYS.T  # of half the divergence, which is two sigma
     sigma = 0.5
     assert POWER.sum() == pytest.approx(1.0)
-    for i, j, moment in ((2, 0, 1), (0, 2, 1), (4, 0, 3), (2, 2, 1), (0, 4, 3), (1, 0, 0), (3, 2, 0)):
+    for i, j, moment in (
+        (2, 0, 1),
+        (0, 2, 1),
+        (4, 0, 3),
+        (2, 2, 1),
+        (0, 4, 3),
+        (1, 0, 0),
+        (3, 2, 0),
+    ):
         expected = moment * sigma ** (i + j)
         assert POWER @ (x**i * y**j) == pytest.approx(expected, abs=1e-12)
     assert len(HEXAGON) == 6
@@ -299,7 +305,7 @@ def test_returns_are_numbered_within_their_pulse():
     for loss in (0.0, 0.5):
         scanner = with_(LINE, points_per_line=4000, beam_divergence=3.0, loss=loss, **QUIET)
         pulses = shoot(join([ROOM, _fence()]), drive(), MOUNTING, scanner)
-        time, first = np.unique(pulses.gps_time, return_index=True)
+        _, first = np.unique(pulses.gps_time, return_index=True)
         assert (np.diff(pulses.gps_time) >= 0).all()
         count = np.diff(np.append(first, len(pulses)))
         assert count.max() >= 2

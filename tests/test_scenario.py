@@ -235,3 +235,15 @@ def test_a_scenario_becomes_a_survey_that_can_be_read(write, tmp_path):
     run("simulate", scenario, "-o", tmp_path / "b", "--seed", 3)
     for file in sorted((tmp_path / "a").iterdir()):
         assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes(), file.name
+
+
+def test_the_package_is_the_function(tmp_path):
+    "mlscorr.simulate(scenario, rng) simulates, also where only mlscorr was imported"
+    (tmp_path / "scenario.toml").write_text(SMALL)
+    lines = (
+        "import mlscorr, numpy",
+        "scenario = mlscorr.simulate.read_scenario('scenario.toml')",
+        "print(mlscorr.simulate(scenario, numpy.random.default_rng(1)).files)",
+    )
+    command = [sys.executable, "-c", "\n".join(lines)]
+    assert "pass-1.laz" in subprocess.check_output(command, text=True, cwd=tmp_path)

@@ -1,13 +1,35 @@
-"""Simulated surveys: a street, a drive, scanners, a POS, and their errors."""
+"""Simulated surveys: a street, a drive, scanners, a POS, and their errors.
+
+The package is called as the function it is about: ``mlscorr.simulate(scenario, rng)``.
+"""
+
+import sys
+from importlib import import_module
+from types import ModuleType
 
 from mlscorr.simulate.scenario import DEMO, Scenario
 
-__all__ = ["DEMO", "Scenario", "SimulatedSurvey", "simulate"]
+__all__ = ["DEMO", "Scenario", "SimulatedSurvey", "read_scenario", "simulate"]
+_HOMES = {
+    "SimulatedSurvey": "mlscorr.simulate.survey",
+    "read_scenario": "mlscorr.simulate.scenario_file",
+    "simulate": "mlscorr.simulate.survey",
+}
 
 
 def __getattr__(name):
-    if name in ("SimulatedSurvey", "simulate"):
-        import mlscorr.simulate.survey
+    """Load what is asked for, and the libraries it needs, only then."""
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'mlscorr.simulate' has no attribute '{name}'")
 
-        return getattr(mlscorr.simulate.survey, name)
-    raise AttributeError(name)
+
+class _Simulate(ModuleType):
+    """This package, callable."""
+
+    def __call__(self, scenario, rng):
+        """SimulatedSurvey of a scenario, as mlscorr.simulate.simulate makes it."""
+        return self.simulate(scenario, rng)
+
+
+sys.modules[__name__].__class__ = _Simulate
