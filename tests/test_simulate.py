@@ -370,6 +370,17 @@ def test_a_written_survey_can_be_corrected(tmp_path):
     assert max(result.check["after"]["rmse"]) < 0.02  # m
 
 
+def test_a_survey_without_any_noise_can_be_read(tmp_path):
+    "Where nothing is uncertain, sigmas are left out or at their rounding, as readers want some"
+    quiet = with_(SCANNER, range_noise=0.0, angle_noise=0.0)
+    exact = TargetScenario(control=2, check=0, survey_sigma=(0.0, 0.0))
+    survey = make(with_(SHORT, scanner=(quiet,), targets=exact))
+    survey.write(tmp_path)
+    read = mlscorr.read_survey(tmp_path)
+    assert (read.control.sigma == 1e-4).all()  # m
+    assert np.abs(read.control.position - survey.true_centre).max() <= 0.5001e-4
+
+
 def test_progress_counts_every_pulse_that_is_fired(pair, tmp_path):
     "What is announced is what is done, in steps of a block, so that the time left is right"
     bars = []
@@ -379,9 +390,11 @@ def test_progress_counts_every_pulse_that_is_fired(pair, tmp_path):
         return bars[-1].append
 
     pair.write(tmp_path, progress)
-    ((title, total, *steps),) = bars
-    assert title == "Simulating pulses"
-    assert total == sum(steps) == pair.fired
+    assert [title for title, *_ in bars] == ["Simulating pulses", "Writing their truth"]
+    for _, total, *steps in bars:
+        assert total == sum(steps)
+    assert bars[0][1] == pair.fired
+    assert bars[1][1] == len(pair.cloud) * (3 * 8 + 2)  # bytes: a point and its target
 
 
 SCRIPT = """

@@ -29,13 +29,6 @@ def cloud_writer(path, corner, crs=None, scale=0.001, created=None):
         Date in the header, today if not given.
 
     Raises ValueError when no points were written, and OSError when the disk refuses.
-
-    >>> import tempfile, numpy as np
-    >>> from mlscorr.survey import PointCloud
-    >>> xyz = np.array([[532_000.0, 3_374_000.0, 42.0]])
-    >>> cloud = PointCloud(xyz, np.array([357_700.0]), np.array([1000]))
-    >>> with cloud_writer(tempfile.mkdtemp() + "/one.laz", xyz[0]) as writer:
-    ...     writer.write(cloud)
     """
     import laspy
 
@@ -62,7 +55,15 @@ def cloud_writer(path, corner, crs=None, scale=0.001, created=None):
 
 
 class CloudWriter:
-    """Appends points to an open file; ``points`` counts them."""
+    """Appends points to an open file; ``points`` counts them.
+
+    >>> import tempfile, numpy as np
+    >>> from mlscorr.survey import PointCloud
+    >>> xyz = np.array([[532_000.0, 3_374_000.0, 42.0]])
+    >>> cloud = PointCloud(xyz, np.array([357_700.0]), np.array([1000]))
+    >>> with cloud_writer(tempfile.mkdtemp() + "/one.laz", xyz[0]) as writer:
+    ...     writer.write(cloud)
+    """
 
     def __init__(self, las):
         self._las = las

@@ -1,6 +1,5 @@
 """Writing .npz files whose arrays are longer than memory, block by block."""
 
-import shutil
 import zipfile
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -43,13 +42,22 @@ def npz_writer(path):
 
 
 class NpzWriter:
-    """Collects named arrays: whole ones, and growing ones of any length."""
+    """Collects named arrays: whole ones, and growing ones of any length.
+
+    ``growing`` is the size of the latter so far, in bytes; ``watch(size)`` is called with the bytes
+    of them just copied, when all is put together at the end.
+    """
 
     def __init__(self, path):
         self._path = path
         self._whole = {}
         self._growing = {}
         self._files = ExitStack()
+        self.watch = lambda size: None
+
+    @property
+    def growing(self):
+        return sum(spool.size for spool in self._growing.values())
 
     def put(self, name, array):
         """A whole array."""
@@ -78,7 +86,9 @@ class NpzWriter:
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_2_0(member, header)
                 with open(spool.path, "rb") as rows:
-                    shutil.copyfileobj(rows, member, BLOCK)
+                    while block := rows.read(BLOCK):
+                        member.write(block)
+                        self.watch(len(block))
             spool.path.unlink()
         for name, array in self._whole.items():
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
@@ -90,7 +100,7 @@ class _Spool:
 
     def __init__(self, path, file, rows):
         self.path, self.file = path, file
-        self.dtype, self.shape, self.length = rows.dtype, rows.shape[1:], 0
+        self.dtype, self.shape, self.length, self.size = rows.dtype, rows.shape[1:], 0, 0
 
     def append(self, rows):
         if (rows.dtype, rows.shape[1:]) != (self.dtype, self.shape):
@@ -100,3 +110,4 @@ class _Spool:
             )
         self.file.write(rows)
         self.length += len(rows)
+        self.size += rows.nbytes

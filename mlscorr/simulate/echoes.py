@@ -11,7 +11,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 from numba import njit
 
-from mlscorr.simulate.rays import in_slices
+from mlscorr.simulate.parallel import in_slices
 from mlscorr.simulate.shapes import Mesh, ray_caster
 
 GRAZING = 0.01  # cosine of incidence below which nothing returns
@@ -81,78 +81,83 @@ class Surfaces:
         """Triangle (n,) that each float32 ray (n, 6) hits first, NEVER for none."""
         return self._caster.cast_rays(rays)["primitive_ids"].numpy()
 
-    def hits(self, rays, origin, divergence, max_range):
-        """Hits of rays (n, 9) as Platform.aim gives them.
+    def hits(self, rays, origin, divergence, max_range, room):
+        """Hits of Rays.
 
         Parameters
         ----------
+        rays : Rays
         origin : (3,) array
             Map coordinates of the local origin. Units: m.
         divergence : float
             Full angle between the directions of 1/e^2 power; 0 for one thin ray. Units: rad.
         max_range : float
             Units: m.
+        room : Room
+            In which the Hits stay until the next ones.
         """
         n = len(rays)
-        first = np.empty((n, 3)), np.empty(n, np.int32), np.empty((n, 3))
+        hit = room.array("hit", n, dtype=np.int32)
+        first = room.array("met", n, 3), hit, room.array("point", n, 3)
         if divergence == 0:
-            triangle = self.cast(rays[:, :6].astype(np.float32))
-            in_slices(n, _thin, (rays, triangle, *first), (origin, self._planes, max_range))
+            rows = rays.ray, self.cast(rays.single), *first
+            in_slices(n, _thin, rows, (origin, self._planes, max_range))
             return Hits(*first[0].T, *first[1:], np.empty(0, np.int64))
-        fan = np.empty((n, len(SUB_RAYS), 6), np.float32)
+        fan = room.array("fan", n, len(SUB_RAYS), 6, dtype=np.float32)
         offsets = SUB_RAYS * divergence / 2
-        in_slices(n, _fan, (rays, fan), (offsets,))
+        in_slices(n, _fan, (rays.ray, fan), (offsets,))
         triangle = self.cast(fan.reshape(-1, 6)).reshape(n, -1)
         constants = origin, offsets, POWER, self._planes, max_range
-        later = in_slices(n, _wide, (rays, triangle, *first), constants)
+        later = in_slices(n, _wide, (rays.ray, triangle, *first), constants)
         pulse, more, hit = (
             np.concatenate([start + rows[0] for start, rows in later]),
             np.concatenate([rows[1] for _, rows in later]),
             np.concatenate([rows[2] for _, rows in later]),
         )
-        point = origin + rays[pulse, :3] + more[:, :1] * rays[pulse, 3:6]
+        point = origin + rays.ray[pulse, :3] + more[:, :1] * rays.ray[pulse, 3:6]
         whole = [np.concatenate(pair) for pair in zip(first, (more, hit, point), strict=True)]
         return Hits(*whole[0].T, *whole[1:], pulse)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _meet(ray, x, y, z, plane, max_range):
+def _meet(rays, p, x, y, z, planes, t, max_range):
     """Range, cosine of incidence and strength where a direction from a ray's start meets a plane.
 
     Strength falls with the cosine (Lambert) and with the square of the range, beyond a near field.
     """
-    slope = plane[0] * x + plane[1] * y + plane[2] * z
+    a, b, c = planes[t, 0], planes[t, 1], planes[t, 2]
+    slope = a * x + b * y + c * z
     if abs(slope) < GRAZING:
         return 0.0, 0.0, 0.0
-    away = plane[3] - (plane[0] * ray[0] + plane[1] * ray[1] + plane[2] * ray[2])
-    distance = away / slope
+    distance = (planes[t, 3] - (a * rays[p, 0] + b * rays[p, 1] + c * rays[p, 2])) / slope
     if not 0.0 < distance < max_range:
         return 0.0, 0.0, 0.0
-    return distance, abs(slope), plane[4] * abs(slope) / (1.0 + (distance / FADING) ** 2)
+    fading = 1.0 + distance * distance / FADING**2
+    return distance, abs(slope), planes[t, 4] * abs(slope) / fading
 
 
 @njit(cache=True, nogil=True)
 def _thin(rays, triangle, met, hit, point, origin, planes, max_range):
     for p in range(len(rays)):
-        ray, hit[p] = rays[p], -1
+        x, y, z = rays[p, 3], rays[p, 4], rays[p, 5]
         away, slant, strength = 0.0, 0.0, 0.0
         if triangle[p] != NEVER:
-            away, slant, strength = _meet(
-                ray, ray[3], ray[4], ray[5], planes[triangle[p]], max_range
-            )
-        if away > 0.0:
-            hit[p] = triangle[p]
+            away, slant, strength = _meet(rays, p, x, y, z, planes, triangle[p], max_range)
+        hit[p] = triangle[p] if away > 0.0 else -1
         met[p, 0], met[p, 1], met[p, 2] = away, slant, strength
-        for axis in range(3):
-            point[p, axis] = origin[axis] + (ray[axis] + away * ray[3 + axis])
+        point[p, 0] = origin[0] + (rays[p, 0] + away * x)
+        point[p, 1] = origin[1] + (rays[p, 1] + away * y)
+        point[p, 2] = origin[2] + (rays[p, 2] + away * z)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _aside(ray, u, v):
+def _aside(rays, p, u, v):
     """Unit direction (3,) of a sub-ray, u along the sweep and v across it. Units: rad."""
-    ex, ey, ez = ray[6], ray[7], ray[8]
-    fx, fy, fz = ray[4] * ez - ray[5] * ey, ray[5] * ex - ray[3] * ez, ray[3] * ey - ray[4] * ex
-    x, y, z = ray[3] + u * ex + v * fx, ray[4] + u * ey + v * fy, ray[5] + u * ez + v * fz
+    dx, dy, dz = rays[p, 3], rays[p, 4], rays[p, 5]
+    ex, ey, ez = rays[p, 6], rays[p, 7], rays[p, 8]
+    x = dx + u * ex + v * (dy * ez - dz * ey)
+    y = dy + u * ey + v * (dz * ex - dx * ez)
+    z = dz + u * ez + v * (dx * ey - dy * ex)
     length = sqrt(x * x + y * y + z * z)
     return x / length, y / length, z / length
 
@@ -163,7 +168,7 @@ def _fan(rays, fan, offsets):
         for k in range(len(offsets)):
             for axis in range(3):
                 fan[p, k, axis] = rays[p, axis]
-            x, y, z = _aside(rays[p], offsets[k, 0], offsets[k, 1])
+            x, y, z = _aside(rays, p, offsets[k, 0], offsets[k, 1])
             fan[p, k, 3], fan[p, k, 4], fan[p, k, 5] = x, y, z
 
 
@@ -174,8 +179,8 @@ def _wide(rays, triangle, met, hit, point, origin, offsets, power, planes, max_r
     pulse, later, later_hit = np.empty(64, np.int64), np.empty((64, 3)), np.empty(64, np.int32)
     count = 0
     for p in range(len(rays)):
-        seen = _parts(rays[p], triangle[p], offsets, power, planes, max_range, parts)
-        met[p], hit[p], start = 0.0, -1, 0
+        seen = _parts(rays, p, triangle, offsets, power, planes, max_range, parts)
+        met[p, 0], met[p, 1], met[p, 2], hit[p], start = 0.0, 0.0, 0.0, -1, 0
         while start < seen:
             end, away, slant, strength, main = _echo(parts, start, seen)
             if start == 0:
@@ -195,22 +200,24 @@ def _wide(rays, triangle, met, hit, point, origin, offsets, power, planes, max_r
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _parts(ray, triangle, offsets, power, planes, max_range, parts):
+def _parts(rays, p, triangle, offsets, power, planes, max_range, parts):
     """What each sub-ray meets, nearest first: rows range, incidence, strength, triangle."""
     seen = 0
     for k in range(len(offsets)):
-        if triangle[k] == NEVER:
+        t = triangle[p, k]
+        if t == NEVER:
             continue
-        x, y, z = _aside(ray, offsets[k, 0], offsets[k, 1])
-        distance, incidence, strength = _meet(ray, x, y, z, planes[triangle[k]], max_range)
+        x, y, z = _aside(rays, p, offsets[k, 0], offsets[k, 1])
+        distance, incidence, strength = _meet(rays, p, x, y, z, planes, t, max_range)
         if distance == 0.0:
             continue
         at = seen
         while at > 0 and parts[at - 1, 0] > distance:
-            parts[at] = parts[at - 1]
+            for column in range(4):
+                parts[at, column] = parts[at - 1, column]
             at -= 1
         parts[at, 0], parts[at, 1] = distance, incidence
-        parts[at, 2], parts[at, 3] = strength * power[k], triangle[k]
+        parts[at, 2], parts[at, 3] = strength * power[k], t
         seen += 1
     return seen
 

@@ -6,36 +6,41 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.effects import Returns, apply_effects, effect_streams
+from mlscorr.simulate.noise import noise_streams
+from mlscorr.simulate.parallel import pool
 from mlscorr.simulate.pos_error import pos_error, record
-from mlscorr.simulate.scanner import noise_streams
 from mlscorr.simulate.scene import sky_elevation
 from mlscorr.survey import ControlPoints, Mounting, Trajectory
 
-ON_PULSES = ("clock", "angle")  # stages of effects at which all echoes of a pulse are one
-ON_ECHOES = ("range", "return")
+CHANGES = {"clock": "gps_time", "angle": "angle", "range": "range", "return": "kept"}  # by stage
+ON_PULSES = ("clock", "angle")  # at which all echoes of a pulse are one
 
 
 def disturb(shots, effects, reference, streams):
     """Shots after the effects on clock, angle, range and return.
 
-    Rows of first echoes are all there, seen or not, and later echoes have streams of their own, so
-    that what one effect draws doesn't depend on another. Time and angle are those of the pulse.
+    Each stage sees what the scanner measured, and changes what it declares. Rows of first echoes
+    are all there, seen or not, and later echoes have streams of their own, so that what one effect
+    draws doesn't depend on another.
     """
-    if not any(effect.stage in ON_PULSES + ON_ECHOES for effect in effects):
-        return shots
     first, later = (
         Returns(*(getattr(shots, name)[rows] for name in Returns.__dataclass_fields__))
         for rows in (slice(None, shots.fired), slice(shots.fired, None))
     )
-    for stage in ("clock", "range", "angle", "return"):
-        first = apply_effects(effects, stage, first, reference, streams[0])
-        if stage in ON_ECHOES and len(later):
-            later = apply_effects(effects, stage, later, reference, streams[1])
-    later = replace(later, gps_time=first.gps_time[shots.pulse], angle=first.angle[shots.pulse])
-    changed = ("gps_time", "angle", "range", "kept")
-    return replace(
-        shots, **{name: np.append(getattr(first, name), getattr(later, name)) for name in changed}
-    )
+
+    def after(stage):
+        name = CHANGES[stage]
+        values = getattr(apply_effects(effects, stage, first, reference, streams[0]), name)
+        if len(later) == 0:
+            return values
+        more = values[shots.pulse]
+        if stage not in ON_PULSES:
+            more = getattr(apply_effects(effects, stage, later, reference, streams[1]), name)
+        return np.append(values, more)
+
+    stages = [stage for stage in CHANGES if any(effect.stage == stage for effect in effects)]
+    changed = zip(stages, pool().map(after, stages), strict=True)
+    return replace(shots, **{CHANGES[stage]: values for stage, values in changed})
 
 
 def recorded_passes(scenario, scene, true_passes, rng):
@@ -101,6 +106,7 @@ def split_passes(trajectory, lengths):
             *(None if sigma is None else sigma[rows] for sigma in sigmas),
         )
 
+    lengths = list(lengths)
     ends = np.cumsum(lengths)
     return tuple(part(slice(end - n, end)) for end, n in zip(ends, lengths, strict=True))
 

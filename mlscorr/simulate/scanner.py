@@ -9,14 +9,13 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from mlscorr.simulate.rays import Platform
+from mlscorr.simulate.echoes import POWER
+from mlscorr.simulate.noise import Noise
+from mlscorr.simulate.parallel import Room, pool
+from mlscorr.simulate.rays import Platform, Turn
 from mlscorr.simulate.scenario import LEAD
 
 RAYS = 1 << 17  # cast at a time: few enough that the arrays of a block stay in cache
-SPECKLE = 0.08  # relative, one sigma: some 150 speckles a footprint, averaged on the receiver
-WEAK = 0.01  # of full strength, where a scenario states the share of returns that are lost
-FULL_SCALE = 65535
-SOURCES = ("range", "angle", "speckle", "loss")  # of noise, each with its own random streams
 
 
 @dataclass(frozen=True)
@@ -113,19 +112,16 @@ class Shots:
             rows, pulse = rows[order], pulse[order]
             number = (np.arange(len(rows)) - np.searchsorted(pulse, pulse) + 1).astype(np.uint8)
             count = np.bincount(pulse, minlength=self.fired)[pulse].astype(np.uint8)
-        taken = {
-            field.name: np.take(getattr(self, field.name), rows, axis=0)
-            for field in fields(Pulses)
-            if field.name not in ("return_number", "number_of_returns")
-        }
-        return Pulses(**taken, return_number=number, number_of_returns=count)
+        names = [field.name for field in fields(Pulses) if hasattr(self, field.name)]
+        taken = pool().map(lambda name: np.take(getattr(self, name), rows, axis=0), names)
+        columns = dict(zip(names, taken, strict=True))
+        return Pulses(**columns, return_number=number, number_of_returns=count)
 
 
-def shots_of_a_turn(scanner):
-    """Time (n,) in turns, angle and elevation (n,) in rad of the pulses that one turn fires.
+def turn_of(scanner):
+    """Turn of a scanner: points_per_line steps, each of which fires all rings, one after another.
 
-    A turn has points_per_line steps, each of which fires all rings in turn; those outside the
-    field of view are not fired.
+    What lies outside the field of view is not fired.
     """
     rings = (0.0,) if scanner.kind == "line" else scanner.rings
     count = scanner.points_per_line * len(rings)
@@ -133,7 +129,9 @@ def shots_of_a_turn(scanner):
     low, high = scanner.field_of_view
     seen = np.mod(360.0 * turned - low, 360.0) <= high - low
     elevation = np.tile(np.radians(rings), scanner.points_per_line)
-    return turned[seen], 2 * np.pi * turned[seen], elevation[seen]
+    return Turn(
+        turned[seen], 2 * np.pi * turned[seen], elevation[seen], float(scanner.lines_per_second)
+    )
 
 
 def turns_of_a_pass(trajectory, scanner):
@@ -144,12 +142,7 @@ def turns_of_a_pass(trajectory, scanner):
 
 def pulses_of_a_pass(trajectory, scanner):
     """Number of pulses that a scanner fires along a trajectory."""
-    return turns_of_a_pass(trajectory, scanner) * len(shots_of_a_turn(scanner)[0])
-
-
-def noise_streams(rng):
-    """Random streams of a scanner on one pass: for first and later echoes, by source."""
-    return tuple(dict(zip(SOURCES, rng.spawn(len(SOURCES)), strict=True)) for _ in range(2))
+    return turns_of_a_pass(trajectory, scanner) * len(turn_of(scanner))
 
 
 def scan(surfaces, origin, trajectory, mounting, scanner, streams, divergence=None, block=RAYS):
@@ -177,53 +170,40 @@ def scan(surfaces, origin, trajectory, mounting, scanner, streams, divergence=No
 
 
 def shoot(surfaces, origin, trajectory, mounting, scanner, streams, divergence=None, block=RAYS):
-    """Blocks of Shots; parameters as of scan."""
+    """Blocks of Shots, each of which lasts until the next one; parameters as of scan."""
     if divergence is None:
         divergence = 1e-3 * scanner.beam_divergence
     streams = deepcopy(streams)
-    platform = Platform.of(trajectory, mounting, origin)
-    turned, angles, elevations = shots_of_a_turn(scanner)
-    beams = platform.beams(angles, elevations)
-    total = turns_of_a_pass(trajectory, scanner) * len(turned)
+    platform, turn = Platform.of(trajectory, mounting, origin), turn_of(scanner)
+    total = turns_of_a_pass(trajectory, scanner) * len(turn)
     start = trajectory.gps_time[0] + LEAD
-    step = block if divergence == 0 else max(1, block // 7)
-    for first in range(0, total, step):
-        turn, slot = np.divmod(np.arange(first, min(first + step, total)), len(turned))
-        gps_time = start + (turn + turned[slot]) / scanner.lines_per_second
-        rays = platform.aim(gps_time, slot, beams)
-        hits = surfaces.hits(rays, origin, divergence, scanner.max_range)
-        yield _measure(scanner, streams, gps_time, angles[slot], elevations[slot], hits)
+    room = Room()
+    step = block if divergence == 0 else max(1, block // len(POWER))
+    sizes = [min(step, total - first) for first in range(0, total, step)]
+    room, ahead = Room(), Noise(scanner, streams, sizes[0]) if sizes else None
+    for i, size in enumerate(sizes):
+        rays = platform.aim(np.arange(i * step, i * step + size), turn, start, room, divergence > 0)
+        hits = surfaces.hits(rays, origin, divergence, scanner.max_range, room)
+        # the next block's noise is drawn while this one is used
+        noise, ahead = ahead, Noise(scanner, streams, sizes[i + 1]) if i + 1 < len(sizes) else None
+        yield _measure(rays, hits, noise)
 
 
-def _measure(scanner, streams, gps_time, angle, elevation, hits):
+def _measure(rays, hits, noise):
     """Shots: what was hit, with noise. All echoes of a pulse share its measured angle."""
-    fired, more = len(gps_time), len(hits.pulse)
-
-    def draw(source, kind="standard_normal"):
-        first, later = (getattr(stream[source], kind) for stream in streams)
-        return np.append(first(fired), later(more)) if more else first(fired)
 
     def all_rows(values):
-        return np.append(values, values[hits.pulse]) if more else values
+        return np.append(values, values[hits.pulse]) if len(hits.pulse) else values
 
-    distance, kept = hits.range, hits.range > 0
-    if scanner.range_noise > 0:
-        distance = distance + scanner.range_noise * draw("range")
-    if scanner.angle_noise > 0:
-        noise = streams[0]["angle"].standard_normal(fired)
-        angle = angle + np.radians(scanner.angle_noise) * noise
-    if scanner.loss > 0:  # the share that is lost grows as strength falls
-        kept &= draw("loss", "random") * hits.strength >= scanner.loss * WEAK
-    strength = FULL_SCALE * hits.strength * (1 + SPECKLE * draw("speckle"))
     return Shots(
-        gps_time=all_rows(gps_time),
-        angle=all_rows(angle),
-        elevation=all_rows(elevation),
-        range=distance,
-        intensity=np.clip(strength, 0, FULL_SCALE).astype(np.uint16),
+        gps_time=all_rows(rays.gps_time),
+        angle=all_rows(noise.angle(rays.angle)),
+        elevation=all_rows(rays.elevation),
+        range=noise.range(hits),
+        intensity=noise.intensity(hits),
         incidence=hits.incidence,
         point=hits.point,
         triangle=hits.triangle,
-        kept=kept,
+        kept=noise.kept(hits),
         pulse=hits.pulse,
     )

@@ -177,5 +177,5 @@ DEMO = Scenario(  # slow and coarse, so that a million points are enough
     drive=DriveScenario(speed=4.2),
     scanner=(ScannerScenario(lines_per_second=75.0, points_per_line=400),),
     # in real time, not smoothed afterwards, so that the drift is easy to see
-    pos=PosScenario(processing="filtered", outages=((15.0, 25.0),), canyons=((3.0, 10.0),)),
+    pos=PosScenario(processing="filtered", outages=((25.0, 25.0),), canyons=((4.0, 12.0),)),
 )

@@ -126,7 +126,9 @@ class SimulatedSurvey:
     def _blocks_of(self, file, number, k, **size):
         """Blocks of a pass and scanner, both counted from 0."""
         scanner, origin = self.scenario.scanner[k], np.array(self.scenario.origin)
-        noise, *effect = deepcopy(self.streams[file])
+        noise, *streams = self.streams[file]
+        used = {effect.name for effect in self.effects}
+        streams = [{name: deepcopy(echo[name]) for name in used} for echo in streams]
         divergence = apply_effects(
             self.effects, "beam", 1e-3 * scanner.beam_divergence, self.reference, self.beam_streams
         )
@@ -141,7 +143,7 @@ class SimulatedSurvey:
             divergence,
             **size,
         ):
-            shots = disturb(shots, self.effects, self.reference, effect)
+            shots = disturb(shots, self.effects, self.reference, streams)
             # what a wrong clock puts outside the trajectory, no one can georeference
             shots.kept[recorded.outside(shots.gps_time)] = False
             pulses = shots.pulses()
@@ -168,7 +170,8 @@ class SimulatedSurvey:
 
     def write(self, folder, progress=None):
         """Write the survey folder, whole or not at all: survey.toml, clouds, trajectory, control,
-        and the truth. ``progress(title, total)`` returns a function of the pulses just done.
+        and the truth. ``progress(title, total)`` returns a function of what was just done: pulses
+        first, then bytes of their truth.
 
         Raises ValueError when a scanner met nothing on a pass; OSError when writing fails.
         """
@@ -191,40 +194,36 @@ def simulate(scenario, rng):
     (('pass-1.laz',), ('T01', 'T02', 'T03'))
     """
     drive_rng, scene_rng, scan_rng, pos_rng, control_rng, effect_rng = rng.spawn(STREAMS)
+    effects, streams = scenario.imperfections, effect_streams(effect_rng)
     seed = getattr(rng.bit_generator.seed_seq, "entropy", None)
-    streams = effect_streams(effect_rng)
-    effects = scenario.imperfections
-    origin = np.array(scenario.origin)
 
     # The way, what stands along it, and the drive.
     line, length, true_passes = drive(scenario, drive_rng)
     scene = build_scene(scenario, line, length, scene_rng)
-    centre = origin + scene.targets.centre
-    reference = Reference(
-        true_passes[0].gps_time[0], true_passes[-1].gps_time[-1], centre.mean(axis=0)
-    )
+    centre = np.array(scenario.origin) + scene.targets.centre
+    span = true_passes[0].gps_time[0], true_passes[-1].gps_time[-1]
+    reference = Reference(*span, centre.mean(axis=0))
 
     # What POS, mechanic and surveyor record.
-    recorded = recorded_passes(scenario, scene, true_passes, pos_rng)
-    recorded = apply_effects(effects, "pos", join_passes(recorded), reference, streams)
-    true_mountings = tuple(true_mounting(scanner) for scanner in scenario.scanner)
+    def with_effects(stage, value):
+        return apply_effects(effects, stage, value, reference, streams)
+
+    recorded = join_passes(recorded_passes(scenario, scene, true_passes, pos_rng))
+    mountings = tuple(true_mounting(scanner) for scanner in scenario.scanner)
     targets = surveyed_targets(scene.targets, centre, scenario.targets, control_rng)
     return SimulatedSurvey(
         scenario=scenario,
         scene=scene,
         true_passes=true_passes,
-        passes=split_passes(recorded, [len(trajectory) for trajectory in true_passes]),
-        true_mountings=true_mountings,
-        mountings=tuple(
-            apply_effects(effects, "mounting", mounting, reference, streams)
-            for mounting in true_mountings
-        ),
-        targets=apply_effects(effects, "control", targets, reference, streams),
+        passes=split_passes(with_effects("pos", recorded), map(len, true_passes)),
+        true_mountings=mountings,
+        mountings=tuple(with_effects("mounting", mounting) for mounting in mountings),
+        targets=with_effects("control", targets),
         is_check=spread_checks(len(targets), scenario.targets.check),
         true_centre=centre,
         effects=effects,
         reference=reference,
-        streams=streams_by_file(len(true_passes), len(true_mountings), scan_rng, effect_rng),
+        streams=streams_by_file(len(true_passes), len(mountings), scan_rng, effect_rng),
         beam_streams=streams,
         seed=seed if isinstance(seed, int) else None,
     )

@@ -14,12 +14,14 @@ from mlscorr.io.output import output_folder
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.survey import Pos, angles_from_attitude
 
+ROUNDING = 1e-4  # m, of control.csv: no coordinate in it is better
 CREATED = date(2015, 1, 1)  # in the LAS header, so that a seed gives the same bytes on any day
 
 
 def write_survey(survey, folder, progress=None):
     """Write a SimulatedSurvey, whole or not at all; see SimulatedSurvey.write."""
-    done = (progress or _silent)("Simulating pulses", survey.fired)
+    progress = progress or _silent
+    done = progress("Simulating pulses", survey.fired)
     with _disk_errors(folder), output_folder(folder) as part:
         points = {}
         with npz_writer(part / "truth.npz") as truth:
@@ -27,6 +29,7 @@ def write_survey(survey, folder, progress=None):
                 points[file] = _write_cloud(part / file, survey, blocks, truth, done)
             for name, array in _truth_arrays(survey).items():
                 truth.put(name, array)
+            truth.watch = progress("Writing their truth", truth.growing)
         write_trajectory_csv(part / "trajectory.csv", survey.trajectory)
         (part / "control.csv").write_text(_control_csv(survey))
         (part / "survey.toml").write_text(_survey_toml(survey))
@@ -34,7 +37,7 @@ def write_survey(survey, folder, progress=None):
 
 
 def _silent(title, total):
-    return lambda pulses: None
+    return lambda done: None
 
 
 @contextmanager
@@ -124,9 +127,8 @@ def _control_csv(survey):
     for i, name in enumerate(t.name):
         place = ",".join(f"{v:.4f}" for v in t.position[i])
         role = "check" if survey.is_check[i] else "control"
-        rows.append(
-            f"{name},{place},{t.sigma[i, 0]},{t.sigma[i, 2]},{t.kind[i]},{t.size[i]},{role}"
-        )
+        horizontal, vertical = np.maximum(t.sigma[i, [0, 2]], ROUNDING)
+        rows.append(f"{name},{place},{horizontal},{vertical},{t.kind[i]},{t.size[i]},{role}")
     return "\n".join(rows) + "\n"
 
 
@@ -174,6 +176,13 @@ def _pos_sigmas(trajectory):
     """Median sigma of position (m) and of roll, pitch, heading (deg) that the POS reports."""
     if trajectory.position_sigma is None or trajectory.attitude_sigma is None:
         nominal = Pos()
-        return nominal.position_sigma, np.degrees(nominal.attitude_sigma).round(4).tolist()
+        return nominal.position_sigma, [
+            _short(sigma) for sigma in np.degrees(nominal.attitude_sigma)
+        ]
     attitude = np.degrees(np.median(trajectory.attitude_sigma, axis=0))
-    return round(float(np.median(trajectory.position_sigma)), 4), attitude.round(4).tolist()
+    return _short(np.median(trajectory.position_sigma)), [_short(sigma) for sigma in attitude]
+
+
+def _short(number):
+    """A number to three digits."""
+    return float(f"{number:.3g}")
