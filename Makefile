@@ -15,6 +15,7 @@ test: $(VENV)/ready
 
 bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench.py
+	$(RUN)/python benchmarks/bench_simulate.py
 
 examples: $(VENV)/ready
 	for script in examples/*.py; do $(RUN)/python $$script || exit 1; done

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 WORKERS = min(os.cpu_count() or 1, 8)  # threads; beyond, memory is what they wait for
-FEW = 20_000  # rows that are not worth a thread
+FEW = 4_000  # rows that are not worth a thread
 
 
 class Room:
@@ -44,3 +44,6 @@ def in_slices(n, kernel, rows, constants):
 def pool():
     """Threads that stay, as starting them for every block costs more than the work."""
     return ThreadPoolExecutor(WORKERS, thread_name_prefix="mlscorr")
+
+
+os.register_at_fork(after_in_child=pool.cache_clear)  # a forked process has no threads of these
