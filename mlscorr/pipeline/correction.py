@@ -1,8 +1,7 @@
-"""The story from files to files, one screen a command."""
+"""``correct``: from a survey to corrected clouds, trajectory and report."""
 
 import warnings
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from mlscorr.evaluation import (
     target_rows,
     unseen_rows,
 )
-from mlscorr.io.las import read_chunks, sha256, write_corrected
+from mlscorr.io.las import sha256, write_corrected
 from mlscorr.io.output import (
     check_output,
     document,
@@ -23,39 +22,10 @@ from mlscorr.io.output import (
     write_json,
     write_targets_csv,
 )
-from mlscorr.io.survey_file import input_files, read_survey
+from mlscorr.io.survey_file import input_files
 from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.matching import match
+from mlscorr.pipeline.finding import find_targets, silent
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
-from mlscorr.targets.candidates import collect, search_radius
-from mlscorr.targets.extract import extract_targets
-
-SEED = 0  # of the random samples in the plane fit: the same survey gives the same result
-
-
-def find_targets(survey, rng=None, progress=None):
-    """Find the surveyed targets in the cloud and match them: (Matches, Candidates).
-
-    Raises ValueError when no target is found, or none of those found matches.
-    """
-    surveyed = survey.control + survey.check
-    progress = progress or _silent
-    done = progress("Reading the cloud", sum(file.points for file in survey.clouds))
-    candidates = collect(survey.clouds, survey.trajectory, surveyed, read_chunks, done)
-    rng = np.random.default_rng(SEED) if rng is None else rng
-    found = extract_targets(
-        candidates, surveyed, survey.trajectory, survey.scanner, rng, survey.mounting
-    )
-    if len(found) == 0:
-        raise ValueError(_nothing_found(survey, candidates))
-    matches = match(found, surveyed, survey.trajectory)
-    if len(matches.matched) == 0:
-        reasons = " ".join(refusal.reason for refusal in matches.refusals[:3])
-        raise ValueError(
-            f"{len(found)} targets were found, and none of them matches one of the "
-            f"{len(surveyed)} surveyed points. {reasons} Are control and cloud in the same CRS?"
-        )
-    return matches, candidates
 
 
 def correct(survey, order=ORDER, rng=None, progress=None):
@@ -174,7 +144,7 @@ class CorrectedSurvey:
 
         check_output(out, input_files(self.survey.path), overwrite)
         with output_folder(out) as folder:
-            files, outside = self._write_clouds(folder, progress or _silent)
+            files, outside = self._write_clouds(folder, progress or silent)
             report = document("report", self._report(files, outside))
             write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
             write_targets_csv(folder / "targets.csv", report["targets"])
@@ -220,81 +190,3 @@ class CorrectedSurvey:
             },
             "files": files,
         }
-
-
-def _silent(title, total):
-    return lambda points: None
-
-
-def _nothing_found(survey, candidates):
-    """The sentence for a cloud in which no target was found."""
-    surveyed = survey.control + survey.check
-    radius = search_radius(survey.trajectory, surveyed).max()
-    intensity = candidates.cloud.intensity
-    if len(candidates.unplaced) > len(candidates.cloud):
-        return (
-            f"No target was found: {len(candidates.unplaced)} of the points near surveyed points "
-            "were measured in gaps of the trajectory or outside it. Export the whole trajectory."
-        )
-    if len(intensity) == 0:
-        return (
-            f"No point of the cloud lies within {radius:.1f} m of any of the {len(surveyed)} "
-            "surveyed points. Are control and cloud in the same CRS and of the same street?"
-        )
-    return (
-        f"None of the {len(surveyed)} surveyed targets was found among {len(intensity)} points "
-        f"within {radius:.1f} m of them (intensity {intensity.min():.0f} to "
-        f"{intensity.max():.0f}). Targets are circles or squares of the surveyed size, brighter "
-        "than what surrounds them: check kind and size in the control file, and the intensity."
-    )
-
-
-def demo(out, seed=1, overwrite=False, progress=None):
-    """Simulate a small survey and correct it: a folder with ``survey`` and ``corrected``.
-
-    Returns the corrected survey's document of report.json.
-    """
-    from mlscorr.simulate import DEMO, simulate
-
-    check_output(out, [], overwrite)
-    with output_folder(out) as folder:
-        simulated = Path(folder) / "survey"
-        simulated.mkdir()
-        simulate(DEMO, np.random.default_rng(seed)).write(simulated)
-        result = correct(read_survey(simulated), progress=progress)
-        return result.write(Path(folder) / "corrected", progress=progress)
-
-
-def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
-    """Simulate the survey of a scenario file: a survey folder, with truth.npz and truth.json.
-
-    The folder appears whole or not at all. Returns the document of the JSON output. Raises
-    ValueError for a scenario that no survey can have, or a folder that holds an input or, without
-    overwrite, anything; OSError when writing fails.
-    """
-    from mlscorr.simulate import simulate
-    from mlscorr.simulate.scenario_file import read_scenario, scenario_files
-
-    scenario = read_scenario(scenario_path)
-    check_output(out, [scenario_path, *scenario_files(scenario)], overwrite)
-    simulate(scenario, np.random.default_rng(seed)).write(out, progress=progress)
-    return _simulated(read_survey(out), scenario, seed)
-
-
-def _simulated(survey, scenario, seed):
-    """The document of a simulated survey, as it is read again from its folder."""
-    return document(
-        "simulate",
-        {
-            "name": scenario.name,
-            "crs": scenario.crs,
-            "seed": seed,
-            "start": float(survey.trajectory.gps_time[0]),
-            "end": float(survey.trajectory.gps_time[-1]),
-            "passes": len(survey.trajectory.gaps) + 1,
-            "control": len(survey.control),
-            "check": len(survey.check),
-            "effects": [{"name": e.name, **asdict(e)} for e in scenario.imperfections],
-            "files": [{"name": file.path.name, "points": file.points} for file in survey.clouds],
-        },
-    )

@@ -1,0 +1,34 @@
+"""The commands: read, call, write; nothing else. What they do is told by pipeline."""
+
+import signal
+import warnings
+
+import typer
+
+from mlscorr.cli.correct import correct
+from mlscorr.cli.demo import demo
+from mlscorr.cli.doctor import doctor
+from mlscorr.cli.simulate import simulate
+from mlscorr.cli.terminal import interrupt, say
+
+COMMANDS = (correct, demo, simulate, doctor)
+
+app = typer.Typer(
+    help="Correct mobile laser scans with surveyed targets by least squares collocation.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in COMMANDS:
+    app.command()(command)
+
+
+def main():
+    """Entry point of the command line."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
+        signal.signal(number, interrupt)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as it is under nohup
+        signal.signal(signal.SIGHUP, interrupt)
+    warnings.showwarning = lambda message, *_, **__: say(f"Warning: {message}")
+    app()

@@ -1,0 +1,5 @@
+"""python -m mlscorr.cli"""
+
+from mlscorr.cli import main
+
+main()

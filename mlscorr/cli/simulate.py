@@ -1,0 +1,38 @@
+"""The command that simulates a survey."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, exit_code, progress_bars, say
+
+
+def simulate(
+    scenario: Annotated[Path, typer.Argument(help="TOML file, as those in examples/scenarios.")],
+    out: Out,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 1,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+):
+    """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
+    with exit_code(Exit.USAGE):
+        from mlscorr.io.output import check_output
+        from mlscorr.simulate.scenario_file import read_scenario, scenario_files
+
+        check_output(out, [scenario, *scenario_files(read_scenario(scenario))], overwrite)
+    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
+        from mlscorr.pipeline import simulate_survey
+
+        made = simulate_survey(scenario, out, seed, overwrite, progress)
+    if as_json:
+        print(json.dumps(made))
+    points = sum(file["points"] for file in made["files"])
+    say(
+        f"Simulated {made['name']}: {points} points in {len(made['files'])} files, "
+        f"{made['control']} control and {made['check']} check points, "
+        f"{made['passes']} passes in {made['end'] - made['start']:.0f} s."
+    )
+    say(f"Survey:  {out / 'survey.toml'}")
+    say(f"Truth:   {out / 'truth.json'} and {out / 'truth.npz'}")

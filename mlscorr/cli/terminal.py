@@ -1,0 +1,82 @@
+"""What all commands share: options, exit codes, sentences and bars on stderr."""
+
+import signal
+import sys
+from contextlib import contextmanager
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SurveyFile = Annotated[Path, typer.Argument(help="survey.toml, or the folder that holds it.")]
+Out = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
+Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in the folder.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+
+
+class Exit(IntEnum):
+    """Exit codes of the commands."""
+
+    DONE = 0
+    USAGE = 2
+    BAD_DATA = 3
+    IN_PART = 4
+    READ_OR_WRITE = 5
+    LIBRARY_MISSING = 7
+    INTERRUPTED = 130
+
+
+def interrupt(number, frame):
+    """Raise KeyboardInterrupt, and again after a second where a library swallowed it."""
+    signal.setitimer(signal.ITIMER_REAL, 1.0)
+    raise KeyboardInterrupt
+
+
+@contextmanager
+def exit_code(code):
+    """End with one sentence and an exit code where the user's input or the system is at fault."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        stop()
+    except OSError as error:
+        if isinstance(error, FileNotFoundError) and error.errno is None:  # survey.toml names it
+            fail(error, Exit.USAGE)
+        fail(f"Reading or writing failed: {error}", Exit.READ_OR_WRITE)
+    except ImportError as error:
+        if signal.getitimer(signal.ITIMER_REAL)[0]:  # it was the import that was interrupted
+            stop()
+        fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
+    except ValueError as error:
+        fail(error, code)
+
+
+def fail(message, code):
+    say(f"Error: {message}")
+    raise typer.Exit(code) from None
+
+
+def stop():
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    say("Interrupted; nothing was written.")
+    raise typer.Exit(Exit.INTERRUPTED) from None
+
+
+def say(text):
+    print(text, file=sys.stderr)
+
+
+@contextmanager
+def progress_bars():
+    """Bars on stderr, on a terminal: progress(title, total) gives a function of points done."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as bars:
+
+        def progress(title, total):
+            task = bars.add_task(title, total=total)
+            return lambda points: bars.advance(task, points)
+
+        yield progress

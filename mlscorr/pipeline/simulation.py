@@ -1,0 +1,61 @@
+"""``simulate`` and ``demo``: from a scenario to a survey folder."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.output import check_output, document, output_folder
+from mlscorr.io.survey_file import read_survey
+from mlscorr.pipeline.correction import correct
+
+
+def demo(out, seed=1, overwrite=False, progress=None):
+    """Simulate a small survey and correct it: a folder with ``survey`` and ``corrected``.
+
+    Returns the corrected survey's document of report.json.
+    """
+    from mlscorr.simulate import DEMO, simulate
+
+    check_output(out, [], overwrite)
+    with output_folder(out) as folder:
+        simulated = Path(folder) / "survey"
+        simulated.mkdir()
+        simulate(DEMO, np.random.default_rng(seed)).write(simulated)
+        result = correct(read_survey(simulated), progress=progress)
+        return result.write(Path(folder) / "corrected", progress=progress)
+
+
+def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
+    """Simulate the survey of a scenario file: a survey folder, with truth.npz and truth.json.
+
+    The folder appears whole or not at all. Returns the document of the JSON output. Raises
+    ValueError for a scenario that no survey can have, or a folder that holds an input or, without
+    overwrite, anything; OSError when writing fails.
+    """
+    from mlscorr.simulate import simulate
+    from mlscorr.simulate.scenario_file import read_scenario, scenario_files
+
+    scenario = read_scenario(scenario_path)
+    check_output(out, [scenario_path, *scenario_files(scenario)], overwrite)
+    simulate(scenario, np.random.default_rng(seed)).write(out, progress=progress)
+    return _simulated(read_survey(out), scenario, seed)
+
+
+def _simulated(survey, scenario, seed):
+    """The document of a simulated survey, as it is read again from its folder."""
+    return document(
+        "simulate",
+        {
+            "name": scenario.name,
+            "crs": scenario.crs,
+            "seed": seed,
+            "start": float(survey.trajectory.gps_time[0]),
+            "end": float(survey.trajectory.gps_time[-1]),
+            "passes": len(survey.trajectory.gaps) + 1,
+            "control": len(survey.control),
+            "check": len(survey.check),
+            "effects": [{"name": e.name, **asdict(e)} for e in scenario.imperfections],
+            "files": [{"name": file.path.name, "points": file.points} for file in survey.clouds],
+        },
+    )
