@@ -1,0 +1,1 @@
+"""Which effect explains the difference between a survey and its simulation."""
