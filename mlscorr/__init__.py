@@ -2,8 +2,12 @@
 
 from importlib import import_module
 
-_HOMES = {"read_survey": "mlscorr.io.survey_file", "correct": "mlscorr.pipeline"}
-__all__ = ["correct", "read_survey", "simulate"]
+_HOMES = {
+    "calibrate": "mlscorr.pipeline",
+    "correct": "mlscorr.pipeline",
+    "read_survey": "mlscorr.io.survey_file",
+}
+__all__ = ["calibrate", "correct", "read_survey", "simulate"]
 
 
 def __getattr__(name):

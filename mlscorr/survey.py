@@ -132,10 +132,15 @@ class _Epochs(Trajectory):
 
 @dataclass(frozen=True)
 class Mounting:
-    """Scanner frame to body frame: lever_arm (3,) in m and boresight R_L^P."""
+    """Scanner frame to body frame: lever_arm (3,) in m and boresight R_L^P.
+
+    covariance (6, 6), if known, is that of the lever arm (m) and of a small rotation of the
+    boresight about the body axes (rad).
+    """
 
     lever_arm: np.ndarray
     boresight: Rotation
+    covariance: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

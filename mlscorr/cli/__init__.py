@@ -5,13 +5,14 @@ import warnings
 
 import typer
 
+from mlscorr.cli.calibrate import calibrate
 from mlscorr.cli.correct import correct
 from mlscorr.cli.demo import demo
 from mlscorr.cli.doctor import doctor
 from mlscorr.cli.simulate import simulate
 from mlscorr.cli.terminal import interrupt, say
 
-COMMANDS = (correct, demo, simulate, doctor)
+COMMANDS = (correct, calibrate, demo, simulate, doctor)
 
 app = typer.Typer(
     help="Correct mobile laser scans with surveyed targets by least squares collocation.",

@@ -1,7 +1,16 @@
 """The story from files to files, one module a command."""
 
+from mlscorr.pipeline.calibration import CalibratedSurvey, calibrate
 from mlscorr.pipeline.correction import CorrectedSurvey, correct
 from mlscorr.pipeline.finding import find_targets
 from mlscorr.pipeline.simulation import demo, simulate_survey
 
-__all__ = ["CorrectedSurvey", "correct", "demo", "find_targets", "simulate_survey"]
+__all__ = [
+    "CalibratedSurvey",
+    "CorrectedSurvey",
+    "calibrate",
+    "correct",
+    "demo",
+    "find_targets",
+    "simulate_survey",
+]

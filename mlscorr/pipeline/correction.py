@@ -26,6 +26,7 @@ from mlscorr.io.survey_file import input_files
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.finding import find_targets, silent
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
+from mlscorr.uncertainty import PointSigma
 
 
 def correct(survey, order=ORDER, rng=None, progress=None):
@@ -133,8 +134,10 @@ class CorrectedSurvey:
     def _statistics(self, observations, points: ControlPoints):
         return before_and_after(observations, points, self.estimate.correction)
 
-    def write(self, out, overwrite=False, progress=None):
+    def write(self, out, overwrite=False, progress=None, sigma=False):
         """Write corrected clouds, trajectory, targets and report into a folder.
+
+        With sigma, each point gets the fields sigma_easting, sigma_northing and sigma_height.
 
         The folder appears whole or not at all. Returns the document of report.json. Raises
         ValueError when the folder holds an input, or holds anything without overwrite; OSError
@@ -144,7 +147,7 @@ class CorrectedSurvey:
 
         check_output(out, input_files(self.survey.path), overwrite)
         with output_folder(out) as folder:
-            files, outside = self._write_clouds(folder, progress or silent)
+            files, outside = self._write_clouds(folder, progress or silent, sigma)
             report = document("report", self._report(files, outside))
             write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
             write_targets_csv(folder / "targets.csv", report["targets"])
@@ -154,7 +157,13 @@ class CorrectedSurvey:
             write_pictures(folder / "pictures", self.survey, self.estimate.correction, report)
         return report
 
-    def _write_clouds(self, folder, progress):
+    @property
+    def point_sigma(self):
+        """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m."""
+        correction = self.estimate.correction
+        return PointSigma.of(correction, self.survey.scanner, self.survey.mounting)
+
+    def _write_clouds(self, folder, progress, sigma):
         """The corrected clouds; rows of report.json, and points outside (trajectory, control)."""
         first, last = self.estimate.span
         files, outside_trajectory, outside_control = [], 0, 0
@@ -165,10 +174,10 @@ class CorrectedSurvey:
             outside_control += int(np.count_nonzero((times < first) | (times > last)))
             done(len(times))
 
+        correction, point_sigma = self.estimate.correction, self.point_sigma if sigma else None
         for file in self.survey.clouds:
             target = folder / file.path.name
-            correction = self.estimate.correction
-            outside_trajectory += write_corrected(file, target, correction, watch)
+            outside_trajectory += write_corrected(file, target, correction, watch, point_sigma)
             files.append({"name": file.path.name, "points": file.points, "sha256": sha256(target)})
         return files, (outside_trajectory, outside_control)
 
