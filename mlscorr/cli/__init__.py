@@ -9,7 +9,7 @@ from mlscorr.cli.correct import correct
 from mlscorr.cli.demo import demo
 from mlscorr.cli.doctor import doctor
 from mlscorr.cli.simulate import simulate
-from mlscorr.cli.terminal import interrupt, say
+from mlscorr.cli.terminal import interrupt, warn
 
 COMMANDS = (correct, demo, simulate, doctor)
 
@@ -30,5 +30,5 @@ def main():
         signal.signal(number, interrupt)
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as it is under nohup
         signal.signal(signal.SIGHUP, interrupt)
-    warnings.showwarning = lambda message, *_, **__: say(f"Warning: {message}")
+    warnings.showwarning = lambda message, *_, **__: warn(f"Warning: {message}")
     app()
