@@ -78,6 +78,6 @@ def test_every_quantity_can_be_asked():
 )
 def test_other_sentences_are_refused_with_the_way_out(text, words):
     "A gate that can't be read says how to write one, or the nearest name"
-    with pytest.raises(ValueError, match=".*") as error:
+    with pytest.raises(ValueError) as error:
         read_gate(text)
     assert words in str(error.value)

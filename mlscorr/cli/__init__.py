@@ -5,13 +5,15 @@ import warnings
 
 import typer
 
+from mlscorr.cli.compare import compare
 from mlscorr.cli.correct import correct
 from mlscorr.cli.demo import demo
 from mlscorr.cli.doctor import doctor
+from mlscorr.cli.render import render
 from mlscorr.cli.simulate import simulate
 from mlscorr.cli.terminal import interrupt, warn
 
-COMMANDS = (correct, demo, simulate, doctor)
+COMMANDS = (correct, compare, render, demo, simulate, doctor)
 
 app = typer.Typer(
     help="Correct mobile laser scans with surveyed targets by least squares collocation.",
