@@ -26,20 +26,32 @@ def _rows(observations, control):
 
 
 def statistics(residuals):
-    """RMSE, mean, least and largest residual per axis of (n, 3) in m, as lists of three.
+    """Statistics per axis of (n, 3) residuals in m, as lists of three, and of their lengths.
 
-    None stands for each where there is no residual.
+    rmse, mean, std (of the sample), min and max are E, N, H; rmse_horizontal, rmse_3d,
+    max_horizontal and max_3d are of the distances in plan and in space. None stands for what so
+    few residuals do not have.
 
-    >>> statistics(np.array([[0.3, 0.0, -0.1], [-0.4, 0.0, 0.1]]))["rmse"]
-    [0.3535..., 0.0, 0.1]
+    >>> found = statistics(np.array([[0.3, 0.0, -0.1], [-0.4, 0.0, 0.1]]))
+    >>> found["rmse"], found["max_horizontal"]
+    ([0.3535..., 0.0, 0.1], 0.4)
     """
+    names = ("rmse", "mean", "std", "min", "max")
+    lengths = ("rmse_horizontal", "rmse_3d", "max_horizontal", "max_3d")
     if len(residuals) == 0:
-        return {"rmse": None, "mean": None, "min": None, "max": None}
+        return dict.fromkeys(names + lengths)
+    plan = np.linalg.norm(residuals[:, :2], axis=1)
+    space = np.linalg.norm(residuals, axis=1)
     return {
         "rmse": np.sqrt(np.mean(residuals**2, axis=0)).tolist(),
         "mean": residuals.mean(axis=0).tolist(),
+        "std": residuals.std(axis=0, ddof=1).tolist() if len(residuals) > 1 else None,
         "min": residuals.min(axis=0).tolist(),
         "max": residuals.max(axis=0).tolist(),
+        "rmse_horizontal": float(np.sqrt(np.mean(plan**2))),
+        "rmse_3d": float(np.sqrt(np.mean(space**2))),
+        "max_horizontal": float(plan.max()),
+        "max_3d": float(space.max()),
     }
 
 

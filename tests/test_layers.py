@@ -15,7 +15,7 @@ FLOORS = (  # from the ground up; rooms on one floor do not know each other
     ("georeference", "collocation"),
     ("effects", "matching", "io", "uncertainty"),
     ("targets", "correction", "calibration", "baselines"),
-    ("simulate", "evaluation"),
+    ("simulate", "evaluation", "quality"),
     ("gap", "report"),
     ("pipeline", "doctor"),
     ("cli",),

@@ -5,14 +5,15 @@ from typing import Annotated
 
 import typer
 
+from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.terminal import (
     Exit,
     Json,
     Out,
     Overwrite,
+    Quiet,
     SurveyFile,
     exit_code,
-    progress_bars,
     say,
 )
 
@@ -28,6 +29,7 @@ def calibrate(
     ] = False,
     overwrite: Overwrite = False,
     as_json: Json = False,
+    quiet: Quiet = False,
 ):
     """Calibrate lever arm and boresight of a survey's scanner with its control points."""
     with exit_code(Exit.USAGE):

@@ -9,6 +9,7 @@ import io
 import os
 import shutil
 import struct
+from functools import partial
 from pathlib import Path
 
 import lazrs
@@ -21,6 +22,7 @@ from mlscorr.survey import PointCloud
 PLACES = 65  # sampled over a file
 CHUNK_SIZE = 1_000_000  # points
 BLOCK = 1 << 20  # bytes
+INTEGER_LIMIT = 2**31 - 1  # of the coordinates in a file
 
 
 def sample_gps_times(path):
@@ -72,7 +74,7 @@ def write_corrected(cloud_file, target, correction, watch=None, sigma=None):
     cloud_file : CloudFile
     target : path
         ``.las`` or ``.laz``, not the input.
-    correction : Correction
+    correction : Correction, or anything else with ``apply(cloud) -> cloud``
     watch : function, optional
         Called with the gps_time (n,) of each chunk that is done, in the trajectory's system.
     sigma : PointSigma, optional
@@ -86,6 +88,7 @@ def write_corrected(cloud_file, target, correction, watch=None, sigma=None):
     layout, target = read_layout(cloud_file.path), Path(target)
     part = target.with_name(target.name + ".part")
     _check_target(layout.path, target, part)
+    shift = getattr(correction, "shift_integers", None) or partial(_shift_integers, correction)
     try:
         with _Output(part) as output, open(layout.path, "rb") as file:
             written = layout if sigma is None else add_sigma_fields(layout)
@@ -94,7 +97,7 @@ def write_corrected(cloud_file, target, correction, watch=None, sigma=None):
             for records in _chunks(layout, CHUNK_SIZE):
                 _check_channels(layout, target, records)
                 xyz = [records[name] for name in "XYZ"]
-                outside += correction.shift_integers(
+                outside += shift(
                     xyz, layout.scale, layout.offset, records["gps_time"], cloud_file.time_constant
                 )
                 low = np.minimum(low, [v.min() for v in xyz])
@@ -115,6 +118,23 @@ def write_corrected(cloud_file, target, correction, watch=None, sigma=None):
         part.unlink(missing_ok=True)
         raise
     return outside
+
+
+def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
+    """Correction.shift_integers for what has only ``apply``; no point lies outside of that."""
+    old = np.column_stack(xyz)
+    places = old * scale + offset
+    cloud = PointCloud(places, gps_time + time_constant, np.zeros(len(gps_time)))
+    new = old + np.rint((correction.apply(cloud).xyz - places) / scale)
+    overflow = int((np.abs(new) > INTEGER_LIMIT).any(axis=1).sum())
+    if overflow:
+        raise ValueError(
+            f"{overflow} corrected points do not fit the file's scale {scale} m and offset "
+            f"{offset} m: the correction or the file's header is wrong by kilometres."
+        )
+    for values, corrected in zip(xyz, new.T, strict=True):
+        values[:] = corrected
+    return 0
 
 
 def sha256(path):

@@ -1,14 +1,17 @@
 """The story from files to files, one module a command."""
 
 from mlscorr.pipeline.calibration import CalibratedSurvey, calibrate
+from mlscorr.pipeline.comparison import ComparedSurvey, compare
 from mlscorr.pipeline.correction import CorrectedSurvey, correct
 from mlscorr.pipeline.finding import find_targets
 from mlscorr.pipeline.simulation import demo, simulate_survey
 
 __all__ = [
     "CalibratedSurvey",
+    "ComparedSurvey",
     "CorrectedSurvey",
     "calibrate",
+    "compare",
     "correct",
     "demo",
     "find_targets",

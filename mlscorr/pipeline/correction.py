@@ -24,7 +24,7 @@ from mlscorr.io.output import (
 )
 from mlscorr.io.survey_file import input_files
 from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.pipeline.finding import find_targets, silent
+from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
 from mlscorr.uncertainty import PointSigma
 
@@ -58,19 +58,7 @@ def correct(survey, order=ORDER, rng=None, progress=None):
     >>> max(result.check["after"]["rmse"]) < 0.03
     True
     """
-    if len(survey.control) == 0:
-        raise ValueError(
-            f"{survey.path} names {len(survey.check)} check points and no control point: check "
-            "points never enter an estimate. Give some of them the role control."
-        )
-    matches, candidates = find_targets(survey, rng, progress)
-    is_control = np.array([name in survey.control.name for name in matches.matched.name])
-    control, check = matches.matched[is_control], matches.matched[~is_control]
-    if len(control) == 0:
-        raise ValueError(
-            f"None of the {len(survey.control)} control points was found in the cloud, only "
-            f"{len(check)} check points, which must not take part in the estimate."
-        )
+    control, check, refusals, candidates = find_control(survey, rng, progress)
     estimate = estimate_correction(survey.trajectory, control, survey.control, survey.pos, order)
     for sentence in estimate.warnings:
         warnings.warn(sentence, stacklevel=2)
@@ -79,7 +67,7 @@ def correct(survey, order=ORDER, rng=None, progress=None):
         estimate=estimate,
         control_observations=control,
         check_observations=check,
-        unseen=unseen_rows(survey, matches.refusals, candidates),
+        unseen=unseen_rows(survey, refusals, candidates),
     )
 
 

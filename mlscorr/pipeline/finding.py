@@ -35,6 +35,28 @@ def find_targets(survey, rng=None, progress=None):
     return matches, candidates
 
 
+def find_control(survey, rng=None, progress=None):
+    """Find the targets and tell them apart by role: (control, check, refusals, candidates).
+
+    control and check are TargetObservations. Raises ValueError as find_targets does, and when no
+    control point was surveyed or found.
+    """
+    if len(survey.control) == 0:
+        raise ValueError(
+            f"{survey.path} names {len(survey.check)} check points and no control point: check "
+            "points never enter an estimate. Give some of them the role control."
+        )
+    matches, candidates = find_targets(survey, rng, progress)
+    is_control = np.array([name in survey.control.name for name in matches.matched.name])
+    control, check = matches.matched[is_control], matches.matched[~is_control]
+    if len(control) == 0:
+        raise ValueError(
+            f"None of the {len(survey.control)} control points was found in the cloud, only "
+            f"{len(check)} check points, which must not take part in the estimate."
+        )
+    return control, check, matches.refusals, candidates
+
+
 def silent(title, total):
     """A progress that tells nobody."""
     return lambda points: None

@@ -1,6 +1,7 @@
 """The report of a correction: figures and one self-contained page."""
 
+from mlscorr.report.comparison import basis, verdict, write_comparison
 from mlscorr.report.figures import write_pictures
 from mlscorr.report.html import write_report
 
-__all__ = ["write_pictures", "write_report"]
+__all__ = ["basis", "verdict", "write_comparison", "write_pictures", "write_report"]
