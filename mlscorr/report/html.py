@@ -12,7 +12,7 @@ from mlscorr.report import tables
 from mlscorr.report.figures import drawings
 
 LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib")
-SHOWN_ELSEWHERE = ("outliers", "alternatives", "warnings")
+SHOWN_ELSEWHERE = ("outliers", "alternatives", "orders", "tests", "warnings")
 WORDS = {
     "estimated_by": "estimated by",
     "order": "order of the polynomial trend",
@@ -63,7 +63,14 @@ def content(survey, correction, document):
         "groups": [(name, tables.ordered(document["targets"], name)) for name in tables.GROUPS],
         "model": flat({k: v for k, v in document["model"].items() if k not in SHOWN_ELSEWHERE}),
         "outliers": document["model"].get("outliers") or [],
-        "alternatives": document["model"].get("alternatives") or [],
+        "comparisons": [
+            (title, document["model"].get(key) or [])
+            for key, title in (
+                ("alternatives", "Models that were compared"),
+                ("orders", "Orders of the trend, side by side"),
+                ("tests", "What the other control points say of each"),
+            )
+        ],
         "coverage": coverage(correction, document),
         "zero_time": f"{np.floor(correction.recorded.gps_time[0]):.0f}",
         "gaps": len(correction.recorded.gaps),
