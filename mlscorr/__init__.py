@@ -2,8 +2,12 @@
 
 from importlib import import_module
 
-_HOMES = {"read_survey": "mlscorr.io.survey_file", "correct": "mlscorr.pipeline"}
-__all__ = ["correct", "read_survey", "simulate"]
+_HOMES = {
+    "read_survey": "mlscorr.io.survey_file",
+    "correct": "mlscorr.pipeline",
+    "extract": "mlscorr.pipeline",
+}
+__all__ = ["correct", "extract", "read_survey", "simulate"]
 
 
 def __getattr__(name):

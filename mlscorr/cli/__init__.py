@@ -8,10 +8,11 @@ import typer
 from mlscorr.cli.correct import correct
 from mlscorr.cli.demo import demo
 from mlscorr.cli.doctor import doctor
+from mlscorr.cli.extract import extract
 from mlscorr.cli.simulate import simulate
 from mlscorr.cli.terminal import interrupt, say
 
-COMMANDS = (correct, demo, simulate, doctor)
+COMMANDS = (correct, extract, demo, simulate, doctor)
 
 app = typer.Typer(
     help="Correct mobile laser scans with surveyed targets by least squares collocation.",

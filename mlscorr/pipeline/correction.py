@@ -26,6 +26,7 @@ from mlscorr.io.survey_file import input_files
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.finding import find_targets, silent
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
+from mlscorr.targets.fit import FittedTarget
 
 
 def correct(survey, order=ORDER, rng=None, progress=None):
@@ -57,12 +58,19 @@ def correct(survey, order=ORDER, rng=None, progress=None):
     >>> max(result.check["after"]["rmse"]) < 0.03
     True
     """
+    if len(survey.control) + len(survey.check) == 0:
+        raise ValueError(
+            f"{survey.path} gives no control points: it has no section [control], or the file "
+            "named there is empty. A correction needs surveyed points; mlscorr extract lists the "
+            "targets of a cloud without them."
+        )
     if len(survey.control) == 0:
         raise ValueError(
             f"{survey.path} names {len(survey.check)} check points and no control point: check "
             "points never enter an estimate. Give some of them the role control."
         )
-    matches, candidates = find_targets(survey, rng, progress)
+    finding = find_targets(survey, rng, progress)
+    matches, candidates = finding.matches, finding.candidates
     is_control = np.array([name in survey.control.name for name in matches.matched.name])
     control, check = matches.matched[is_control], matches.matched[~is_control]
     if len(control) == 0:
@@ -79,6 +87,7 @@ def correct(survey, order=ORDER, rng=None, progress=None):
         control_observations=control,
         check_observations=check,
         unseen=unseen_rows(survey, matches.refusals, candidates),
+        fitted=finding.fitted,
     )
 
 
@@ -87,7 +96,8 @@ class CorrectedSurvey:
     """A corrected survey: the estimate, the targets, the statistics, and ``write``.
 
     ``control`` and ``check`` hold n and the misclosures' statistics before and after, in m;
-    ``unseen`` are the surveyed points without an observation, as rows of report.json.
+    ``unseen`` are the surveyed points without an observation, as rows of report.json; ``fitted``
+    the targets by (pass number, gps_time), for their figures.
     """
 
     survey: Survey
@@ -95,6 +105,7 @@ class CorrectedSurvey:
     control_observations: TargetObservations
     check_observations: TargetObservations
     unseen: list[dict] = field(default_factory=list)
+    fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
 
     @property
     def trajectory(self) -> Trajectory:
@@ -149,9 +160,10 @@ class CorrectedSurvey:
             write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
             write_targets_csv(folder / "targets.csv", report["targets"])
             write_json(folder / "report.json", report)
-            write_report(folder / "report.html", self.survey, self.estimate.correction, report)
+            correction = self.estimate.correction
+            write_report(folder / "report.html", self.survey, correction, report, self.fitted)
             (folder / "pictures").mkdir()
-            write_pictures(folder / "pictures", self.survey, self.estimate.correction, report)
+            write_pictures(folder / "pictures", self.survey, correction, report)
         return report
 
     def _write_clouds(self, folder, progress):

@@ -2,5 +2,6 @@
 
 from mlscorr.report.figures import write_pictures
 from mlscorr.report.html import write_report
+from mlscorr.report.target_figures import write_contact_sheet
 
-__all__ = ["write_pictures", "write_report"]
+__all__ = ["write_contact_sheet", "write_pictures", "write_report"]
