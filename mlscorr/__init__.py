@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-_PIPELINE = ("calibrate", "compare", "correct")
+_PIPELINE = ("calibrate", "compare", "correct", "extract")
 _HOMES = {"read_survey": "mlscorr.io.survey_file"} | dict.fromkeys(_PIPELINE, "mlscorr.pipeline")
 __all__ = [*_PIPELINE, "read_survey", "simulate"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.spatial.transform import Rotation
 
-from mlscorr.io.control import read_control
+from mlscorr.io.control import NO_POINTS, holds_points, read_control
 from mlscorr.io.las import sample_gps_times
 from mlscorr.io.sbet import check_crs, describe_projection
 from mlscorr.io.settings import read_settings_file
@@ -111,7 +111,7 @@ class Settings(_Section):
     cloud: CloudSection
     trajectory: TrajectorySection
     mounting: MountingSection | None = None
-    control: ControlSection
+    control: ControlSection | None = None
     scanner: ScannerSection = ScannerSection()
     pos: PosSection = PosSection()
     scene: SceneSection = SceneSection()
@@ -120,6 +120,7 @@ class Settings(_Section):
 def read_survey(path):
     """Survey of a survey.toml, or of a folder that holds one.
 
+    Without a section [control], or with a file that holds no point, control and check are empty.
     Raises ValueError for anything wrong in survey.toml, in the files it names, or between them
     (times, coordinates); FileNotFoundError for files that aren't there.
     """
@@ -128,8 +129,10 @@ def read_survey(path):
     clouds, trajectory_file, accuracy, control_file, reference = _files(path, settings)
     crs = check_crs(settings.crs) if settings.crs else None
     trajectory = read_trajectory(trajectory_file, settings.crs, accuracy)
-    control, check = read_control(control_file)
-    _check_together(control_file, control + check, trajectory)
+    control = check = NO_POINTS
+    if control_file is not None and holds_points(control_file):
+        control, check = read_control(control_file)
+        _check_together(control_file, control + check, trajectory)
     notes = [f"Coordinates are in {settings.crs} ({crs.name})." if crs else "No CRS was given."]
     if trajectory_file.suffix.lower() in SBET_SUFFIXES:
         notes += describe_projection(settings.crs)
@@ -212,7 +215,7 @@ def _files(path, settings):
         clouds,
         existing("trajectory.file", settings.trajectory.file),
         existing("trajectory.accuracy", settings.trajectory.accuracy),
-        existing("control.file", settings.control.file),
+        existing("control.file", settings.control and settings.control.file),
         existing("scene.reference", settings.scene.reference),
     )
 

@@ -13,7 +13,7 @@ from mlscorr.io.output import check_output, document, output_folder, write_json
 from mlscorr.io.survey_copy import mounting_values, write_survey_copy
 from mlscorr.io.survey_file import FILE_NAME, input_files
 from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.pipeline.finding import find_targets, silent
+from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.survey import Survey, TargetObservations
 
 TOGETHER = 0.1  # of the shorter file's time: more than the overlap of two tiles of one scan
@@ -56,15 +56,13 @@ def calibrate(survey, rng=None, progress=None):
             "(deg) that the cloud was georeferenced with. Add that section."
         )
     warn_of_scanners(survey)
-    matches, candidates = find_targets(survey, rng, progress)
-    is_control = np.array([name in survey.control.name for name in matches.matched.name])
-    control, check = matches.matched[is_control], matches.matched[~is_control]
+    control, check, finding = find_control(survey, rng, progress)
     calibration = estimate_mounting(
         survey.trajectory, survey.mounting, control, survey.control, survey.pos
     )
     for sentence in calibration.warnings:
         warnings.warn(sentence, stacklevel=2)
-    unseen = unseen_rows(survey, matches.refusals, candidates)
+    unseen = unseen_rows(survey, finding.matches.refusals, finding.candidates)
     return CalibratedSurvey(survey, calibration, control, check, unseen)
 
 

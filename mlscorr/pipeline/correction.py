@@ -26,6 +26,7 @@ from mlscorr.io.survey_file import input_files
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
+from mlscorr.targets.fit import FittedTarget
 from mlscorr.uncertainty import PointSigma
 
 
@@ -58,7 +59,7 @@ def correct(survey, order=ORDER, rng=None, progress=None):
     >>> max(result.check["after"]["rmse"]) < 0.03
     True
     """
-    control, check, refusals, candidates = find_control(survey, rng, progress)
+    control, check, finding = find_control(survey, rng, progress)
     estimate = estimate_correction(survey.trajectory, control, survey.control, survey.pos, order)
     for sentence in estimate.warnings:
         warnings.warn(sentence, stacklevel=2)
@@ -67,7 +68,8 @@ def correct(survey, order=ORDER, rng=None, progress=None):
         estimate=estimate,
         control_observations=control,
         check_observations=check,
-        unseen=unseen_rows(survey, refusals, candidates),
+        unseen=unseen_rows(survey, finding.matches.refusals, finding.candidates),
+        fitted=finding.fitted,
     )
 
 
@@ -76,7 +78,8 @@ class CorrectedSurvey:
     """A corrected survey: the estimate, the targets, the statistics, and ``write``.
 
     ``control`` and ``check`` hold n and the misclosures' statistics before and after, in m;
-    ``unseen`` are the surveyed points without an observation, as rows of report.json.
+    ``unseen`` are the surveyed points without an observation, as rows of report.json; ``fitted``
+    the targets by (pass number, gps_time), for their figures.
     """
 
     survey: Survey
@@ -84,6 +87,7 @@ class CorrectedSurvey:
     control_observations: TargetObservations
     check_observations: TargetObservations
     unseen: list[dict] = field(default_factory=list)
+    fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
 
     @property
     def trajectory(self) -> Trajectory:
@@ -140,9 +144,10 @@ class CorrectedSurvey:
             write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
             write_targets_csv(folder / "targets.csv", report["targets"])
             write_json(folder / "report.json", report)
-            write_report(folder / "report.html", self.survey, self.estimate.correction, report)
+            correction = self.estimate.correction
+            write_report(folder / "report.html", self.survey, correction, report, self.fitted)
             (folder / "pictures").mkdir()
-            write_pictures(folder / "pictures", self.survey, self.estimate.correction, report)
+            write_pictures(folder / "pictures", self.survey, correction, report)
         return report
 
     @property

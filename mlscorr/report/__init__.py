@@ -3,5 +3,13 @@
 from mlscorr.report.comparison import basis, verdict, write_comparison
 from mlscorr.report.figures import write_pictures
 from mlscorr.report.html import write_report
+from mlscorr.report.target_figures import write_contact_sheet
 
-__all__ = ["basis", "verdict", "write_comparison", "write_pictures", "write_report"]
+__all__ = [
+    "basis",
+    "verdict",
+    "write_comparison",
+    "write_contact_sheet",
+    "write_pictures",
+    "write_report",
+]

@@ -10,6 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from mlscorr.report import tables
 from mlscorr.report.figures import drawings
+from mlscorr.report.target_figures import target_drawings
 
 LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib")
 SHOWN_ELSEWHERE = ("outliers", "alternatives", "orders", "tests", "warnings")
@@ -21,7 +22,7 @@ WORDS = {
 }
 
 
-def write_report(path, survey, correction, document):
+def write_report(path, survey, correction, document, fitted=None):
     """Write the self-contained page of a correction.
 
     Parameters
@@ -33,6 +34,8 @@ def write_report(path, survey, correction, document):
         Its corrected trajectory may hold the sigmas after the estimate.
     document : dict
         The content of report.json; a value that was not determined is None.
+    fitted : dict, optional
+        FittedTarget by (pass number, gps_time), each of which gets a figure.
     """
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -43,11 +46,13 @@ def write_report(path, survey, correction, document):
     )
     environment.filters |= {"number": tables.number, "show": show, "norm": tables.norm}
     environment.globals |= {"group": tables.group, "AXES": tables.AXES}
-    page = environment.get_template("report.html").render(content(survey, correction, document))
+    page = environment.get_template("report.html").render(
+        content(survey, correction, document, fitted or {})
+    )
     Path(path).write_text(page, encoding="utf-8")
 
 
-def content(survey, correction, document):
+def content(survey, correction, document, fitted):
     """Everything that the template shows."""
     sentences, worse = tables.verdict(document)
     figures = drawings(survey, correction, document).items()
@@ -60,6 +65,10 @@ def content(survey, correction, document):
         "warnings": warnings(document),
         "rmse_rows": tables.rmse_rows(document),
         "figures": {name: data_uri(picture) for name, picture in figures},
+        "target_figures": [
+            (title, data_uri(picture, "image/png"))
+            for title, picture in target_drawings(document["targets"], fitted)
+        ],
         "groups": [(name, tables.ordered(document["targets"], name)) for name in tables.GROUPS],
         "model": flat({k: v for k, v in document["model"].items() if k not in SHOWN_ELSEWHERE}),
         "outliers": document["model"].get("outliers") or [],
@@ -80,9 +89,9 @@ def content(survey, correction, document):
     }
 
 
-def data_uri(picture):
-    """An SVG (bytes) as the address of an image that lies in the page itself."""
-    return "data:image/svg+xml;base64," + base64.b64encode(picture).decode()
+def data_uri(picture, form="image/svg+xml"):
+    """A picture (bytes) as the address of an image that lies in the page itself."""
+    return f"data:{form};base64," + base64.b64encode(picture).decode()
 
 
 def show(value):
