@@ -12,7 +12,7 @@ import numpy as np
 STANDARD = "ASPRS Positional Accuracy Standards for Digital Geospatial Data, Edition 2 (2023)"
 FEWEST = 30  # check points
 TWICE = 2.0  # how much more accurate the points must be than the product
-WORDS = {"h": "horizontal", "v": "vertical"}
+AXES = ("horizontal", "vertical")
 
 
 def positional_accuracy(residuals, survey_sigma, points, based_on="check"):
@@ -35,12 +35,12 @@ def positional_accuracy(residuals, survey_sigma, points, based_on="check"):
 
     >>> residuals, sigma = np.full((30, 3), 0.03), np.full((30, 3), 0.004)
     >>> found = positional_accuracy(residuals, sigma, 30)
-    >>> found["rmse_h"], found["class_h_cm"], found["conformant"]
+    >>> found["rmse_horizontal"], found["class_horizontal_cm"], found["conformant"]
     (0.0428..., 5, True)
     """
     if len(residuals) == 0:
         based_on = None
-    fit, survey = ({"rmse_h": _rms(v, 2), "rmse_v": _rms(v[:, 2:], 1)} for v in (
+    fit, survey = ({"rmse_horizontal": _rms(v, 2), "rmse_vertical": _rms(v[:, 2:], 1)} for v in (
         np.asarray(residuals, float).reshape(-1, 3), np.asarray(survey_sigma, float).reshape(-1, 3)
     ))  # fmt: skip
     both = {key: _joined(fit[key], survey[key]) for key in fit}
@@ -53,8 +53,8 @@ def positional_accuracy(residuals, survey_sigma, points, based_on="check"):
         "survey": survey,
         **both,
         "rmse_3d": _joined(*both.values()),
-        "class_h_cm": _class(both["rmse_h"]),
-        "class_v_cm": _class(both["rmse_v"]),
+        "class_horizontal_cm": _class(both["rmse_horizontal"]),
+        "class_vertical_cm": _class(both["rmse_vertical"]),
         "conformant": based_on == "check" and points >= FEWEST,
     }
     return {**found, "statement": _statement(found)}
@@ -83,7 +83,7 @@ def _statement(found):
             "Not determined: there are no check points, and too few control points to leave one "
             "out in turn."
         ]
-    return [_test(found), *(_classes(found, axis) for axis in WORDS), *_doubts(found)]
+    return [_test(found), *(_classes(found, axis) for axis in AXES), *_doubts(found)]
 
 
 def _test(found):
@@ -104,10 +104,10 @@ def _test(found):
 
 
 def _classes(found, axis):
-    rmse, name = found[f"rmse_{axis}"], f"RMSE_{axis.upper()}"
+    rmse, name = found[f"rmse_{axis}"], f"RMSE_{axis[0].upper()}"
     tested = "It meets" if found["conformant"] else "It would meet"
     return (
-        f"{tested} the {found[f'class_{axis}_cm']}-cm {WORDS[axis]} accuracy class: {name} is "
+        f"{tested} the {found[f'class_{axis}_cm']}-cm {axis} accuracy class: {name} is "
         f"{100 * rmse:.1f} cm ({100 * found['fit'][f'rmse_{axis}']:.1f} cm fit to the points, "
         f"{100 * found['survey'][f'rmse_{axis}']:.1f} cm survey of the points)."
     )
@@ -115,10 +115,10 @@ def _classes(found, axis):
 
 def _doubts(found):
     """Where the surveyed points aren't accurate enough to test such a product."""
-    for axis, words in WORDS.items():
+    for axis in AXES:
         survey, product = (found[part][f"rmse_{axis}"] for part in ("survey", "fit"))
         if TWICE * survey > product:
             yield (
-                f"The {words} survey error of the points, {100 * survey:.1f} cm, is more than half "
+                f"The {axis} survey error of the points, {100 * survey:.1f} cm, is more than half "
                 "of what they found: points for a test should be twice as accurate as the product."
             )

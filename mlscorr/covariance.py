@@ -2,13 +2,26 @@
 
 All are Markov, in one, two and three states. The paper calls the first one Gaussian (Eq. 20); it
 is exponential. Inertial drift is an integrated process, which the smoother two describe better.
+
+In state-space form (Särkkä and Solin 2019, section 12.3) a process of d states is s and its first
+d - 1 derivatives, each divided by the rate to its order, so that every state is of order one:
+
+    s(t + dt) = F s(t) + w,   w ~ N(0, Q),   with x = rate dt:
+    F(x) = exp(-x) sum_k (N x)^k / k!,       N nilpotent (all poles of the process are -rate)
+    Q(x) = q int_0^x f(u) f(u)^T du,         f the last column of F
+
+The integrals are incomplete gamma functions, summed without cancellation: Q is right to its last
+digits at any step, though its elements fall as x to the power 2 d - 1.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 FAMILIES = ("exponential", "matern32", "matern52")
+SERIES_BELOW = 1.0  # beyond it 1 - exp(-y) sum loses no more than three digits
+FADED = 600.0  # exp(-x) times any polynomial is nothing
 
 
 @dataclass(frozen=True)
@@ -40,3 +53,74 @@ class Covariance:
             return (1.0 + a) * np.exp(-a)
         a = np.sqrt(5.0) * ratio
         return (1.0 + a + a * a / 3.0) * np.exp(-a)
+
+    @property
+    def states(self):
+        """Number of states of the process."""
+        return FAMILIES.index(self.family) + 1
+
+    @property
+    def rate(self):
+        """Rate of the process's poles. Units: 1/s."""
+        return np.sqrt(2.0 * self.states - 1.0) / self.correlation_time
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def transition(states, x):
+    """F(x), row by row; zeros where there are fewer than three states."""
+    x = min(x, FADED)  # not infinite
+    e = np.exp(-x)
+    if states == 1:
+        return e, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if states == 2:
+        return e * (1.0 + x), e * x, 0.0, -e * x, e * (1.0 - x), 0.0, 0.0, 0.0, 0.0
+    h = 0.5 * x * x
+    first = e * (1.0 + x + h), e * (x + 2.0 * h), e * h
+    second = -e * h, e * (1.0 + x - 2.0 * h), e * (x - h)
+    third = e * (h - x), e * (2.0 * h - 3.0 * x), e * (1.0 - 2.0 * x + h)
+    return first + second + third
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def process_noise(states, x):
+    """Q(x), the upper triangle row by row, with zeros as transition; Q(inf) is stationary."""
+    x = min(x, FADED)
+    y = 2.0 * x
+    if states == 1:
+        return -np.expm1(-y), 0.0, 0.0, 0.0, 0.0, 0.0
+    e = np.exp(-x) ** 2
+    if states == 2:  # f = exp(-u) (u, 1 - u), q = 4
+        gamma = _incomplete_gamma(3, y, e)
+        return gamma, 0.5 * e * y * y, 0.0, gamma + 2.0 * e * y, 0.0, 0.0
+    # f = exp(-u) (u^2 / 2, u - u^2 / 2, 1 - 2 u + u^2 / 2), q = 16 / 3
+    y2 = y * y  # int u^k exp(-2 u) du = k! / 2^(k + 1) P(k + 1, y)
+    gamma = _incomplete_gamma(5, y, e)
+    i4 = 4.0 * gamma  # all integrals times q
+    gamma += e * y2 * y2 / 24.0
+    i3 = 2.0 * gamma
+    gamma += e * y2 * y / 6.0
+    i2 = 4.0 / 3.0 * gamma
+    gamma += e * y2 / 2.0
+    i1 = 4.0 / 3.0 * gamma
+    i0 = 8.0 / 3.0 * (gamma + e * y)
+    first = 0.25 * i4, 0.5 * i3 - 0.25 * i4, 0.5 * i2 - i3 + 0.25 * i4
+    second = i2 - i3 + 0.25 * i4, i1 - 2.5 * i2 + 1.5 * i3 - 0.25 * i4
+    return first + second + (i0 - 4.0 * i1 + 5.0 * i2 - 2.0 * i3 + 0.25 * i4,)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _incomplete_gamma(k, y, e):
+    """P(k, y) = exp(-y) sum_(j >= k) y^j / j!, with e = exp(-y)."""
+    term = e
+    below = 0.0
+    for j in range(k):
+        below += term
+        term *= y / (j + 1)
+    if y > SERIES_BELOW:
+        return 1.0 - below
+    above = 0.0
+    while term > 1e-17 * above:
+        above += term
+        k += 1
+        term *= y / k
+    return above

@@ -3,6 +3,7 @@
 import numpy as np
 
 from mlscorr.accuracy import positional_accuracy
+from mlscorr.correction import COMPONENTS
 from mlscorr.survey import PointCloud
 from mlscorr.targets.candidates import search_radius
 
@@ -168,12 +169,14 @@ def _unseen_row(name, pass_number, control, role, reason):
 
 
 def model_section(estimate):
-    """The model section of report.json."""
-    alternatives = [
-        {**_covariance(parameters), "probability": probability}
-        for parameters, probability in estimate.alternatives
-    ]
-    return {
+    """The model section of report.json.
+
+    ``alternatives`` are the covariance families that the correction averages over; ``orders`` sets
+    other orders of the trend beside the one in use; ``tests`` has one row per used target, with w,
+    redundancy and detectable error for each pass; ``determined`` says which components of the pose
+    the control points tell, by the ratio of posterior to prior variance.
+    """
+    section = {
         "method": "lsc",
         "order": estimate.order,
         "covariance": _covariance(estimate.parameters),
@@ -184,8 +187,21 @@ def model_section(estimate):
             {"name": o.name, "statistic": o.statistic, "critical": o.critical}
             for o in estimate.outliers
         ],
-        "alternatives": alternatives,
+        "alternatives": [
+            {**_covariance(parameters), "probability": probability}
+            for parameters, probability in estimate.families
+        ],
         "warnings": list(estimate.warnings),
+    }
+    return {
+        **section,
+        "global_test": _global_test(estimate.guards.global_test),
+        "orders": [_order(alternative) for alternative in estimate.alternatives],
+        "tests": [_test(test) for test in estimate.tests],
+        "determined": _by_component(estimate.guards.determined),
+        "variance_ratio": _by_component(estimate.guards.variance_ratio),
+        "longest_gap": list(estimate.guards.gap),
+        "passes_without_control": [list(one) for one in estimate.guards.passes_without_control],
     }
 
 
@@ -196,4 +212,49 @@ def _covariance(parameters):
         "scale": parameters.drift_scale,
         "jitter_correlation_time": parameters.jitter_time,
         "jitter_scale": parameters.jitter_scale,
+        "bias_correlation_time": parameters.bias_time,
+        "bias_scale": parameters.bias_scale,
+        "attitude_scale": parameters.attitude_scale,
     }
+
+
+def _global_test(test):
+    if test is None:
+        return None
+    return {
+        "statistic": test.statistic,
+        "redundancy": test.redundancy,
+        "limits": [test.lower, test.upper],
+        "passed": test.passed,
+    }
+
+
+def _order(alternative):
+    return {
+        "order": alternative.order,
+        "family": alternative.parameters.family,
+        "log_likelihood": alternative.log_likelihood,
+        "probability": alternative.probability,
+        "leave_one_out_rmse": _numbers(alternative.leave_one_out),
+    }
+
+
+def _test(test):
+    statistic = float(test.statistic)
+    return {
+        "name": test.name,
+        "statistic": statistic if np.isfinite(statistic) else None,
+        "critical": test.critical,
+        "w": [_numbers(row) for row in test.w],
+        "redundancy": [_numbers(row) for row in test.redundancy],
+        "detectable": [_numbers(row) for row in test.detectable],
+    }
+
+
+def _by_component(values):
+    return dict(zip(COMPONENTS, values.tolist(), strict=True))
+
+
+def _numbers(values):
+    """A list of floats, or None where they are not numbers, which JSON can't hold."""
+    return values.tolist() if np.isfinite(values).all() else None

@@ -148,9 +148,9 @@ BAD = [
     # survey.toml: exit code 2
     (
         "missing key",
-        edit("survey.toml", '[control]\nfile = "control.csv"', ""),
+        edit("survey.toml", '[trajectory]\nfile = "trajectory.csv"', ""),
         2,
-        ["control is missing"],
+        ["trajectory is missing"],
     ),
     (
         "unknown key",

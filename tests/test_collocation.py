@@ -5,7 +5,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation import Signal, collocate
+from mlscorr.collocation import Signal, collocate_dense
 from mlscorr.covariance import FAMILIES, Covariance
 
 START = 413_200.0  # s of week
@@ -17,6 +17,12 @@ def one_thread():
     "The matrices are small: on a busy machine threads would wait longer than they work"
     with threadpool_limits(1, "blas"):
         yield
+
+
+def collocate(gps_time, misclosure, noise, design, signals):
+    "Dense collocation of single rows, whose noise may be correlated in any manner"
+    signals = [Signal(signal.mixing[:, None], signal.covariance) for signal in signals]
+    return collocate_dense(gps_time, misclosure[:, None], noise, design[:, None], signals)
 
 
 def legendre(gps_time, order):

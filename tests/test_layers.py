@@ -13,7 +13,7 @@ PACKAGE = Path(mlscorr.__file__).parent
 FLOORS = (  # from the ground up; rooms on one floor do not know each other
     ("survey", "covariance", "accuracy"),
     ("georeference", "collocation"),
-    ("effects", "matching", "io"),
+    ("effects", "matching", "io", "uncertainty"),
     ("targets", "correction", "calibration", "baselines"),
     ("simulate", "evaluation", "quality"),
     ("gap", "report"),

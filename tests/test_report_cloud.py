@@ -182,10 +182,10 @@ def test_survey_error_counts_into_the_accuracy():
     residuals = np.tile([0.03, -0.04, 0.02], (40, 1))
     sigma = np.tile([0.012, 0.0, 0.015], (40, 1))
     found = positional_accuracy(residuals, sigma, 40)
-    assert found["rmse_h"] == pytest.approx(np.hypot(0.05, 0.012))
-    assert found["rmse_v"] == pytest.approx(0.025)
-    assert found["rmse_3d"] == pytest.approx(np.hypot(found["rmse_h"], 0.025))
-    assert (found["class_h_cm"], found["class_v_cm"]) == (6, 3)
+    assert found["rmse_horizontal"] == pytest.approx(np.hypot(0.05, 0.012))
+    assert found["rmse_vertical"] == pytest.approx(0.025)
+    assert found["rmse_3d"] == pytest.approx(np.hypot(found["rmse_horizontal"], 0.025))
+    assert (found["class_horizontal_cm"], found["class_vertical_cm"]) == (6, 3)
     assert found["conformant"]
     assert "meets the 6-cm horizontal" in found["statement"][1]
     assert "twice as accurate" in found["statement"][-1]  # 1.5 cm against 2 cm in height
@@ -194,7 +194,7 @@ def test_survey_error_counts_into_the_accuracy():
 def test_an_accuracy_of_exactly_a_class_belongs_to_it():
     "3 cm is the 3-cm class, not the next one for a rounding error"
     found = positional_accuracy(np.tile([0.0, 0.03, 0.01], (30, 1)), np.zeros((30, 3)), 30)
-    assert (found["class_h_cm"], found["class_v_cm"]) == (3, 1)
+    assert (found["class_horizontal_cm"], found["class_vertical_cm"]) == (3, 1)
 
 
 @pytest.mark.parametrize(("points", "conformant"), [(29, False), (30, True)])
@@ -217,7 +217,11 @@ def test_points_left_out_in_turn_are_an_estimate_and_no_test():
 def test_without_any_point_the_accuracy_is_not_determined():
     "No number is made up"
     found = positional_accuracy(np.empty((0, 3)), np.empty((0, 3)), 0)
-    assert found["rmse_h"] is None and found["class_v_cm"] is None and found["based_on"] is None
+    assert (
+        found["rmse_horizontal"] is None
+        and found["class_vertical_cm"] is None
+        and found["based_on"] is None
+    )
     assert "Not determined" in found["statement"][0]
 
 
@@ -230,8 +234,8 @@ def test_report_json_tells_the_accuracy_and_the_files(commanded):
     report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     check = report["check"]["after"]
     assert report["accuracy"]["points"] == 1 and not report["accuracy"]["conformant"]
-    assert report["accuracy"]["fit"]["rmse_h"] == pytest.approx(check["rmse_horizontal"])
-    assert report["accuracy"]["rmse_h"] > check["rmse_horizontal"]
+    assert report["accuracy"]["fit"]["rmse_horizontal"] == pytest.approx(check["rmse_horizontal"])
+    assert report["accuracy"]["rmse_horizontal"] > check["rmse_horizontal"]
     assert [row["what"] for row in report["inputs"]][:4] == [
         "survey", "cloud", "trajectory", "control"
     ]  # fmt: skip

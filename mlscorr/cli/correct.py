@@ -25,6 +25,9 @@ def correct(
     order: Annotated[
         int, typer.Option(min=0, max=9, help="Order of the polynomial trend of the position.")
     ] = 1,
+    sigma: Annotated[
+        bool, typer.Option("--sigma", help="Add to each point one sigma of its E, N and H.")
+    ] = False,
     fail_if: Annotated[
         list[str],
         typer.Option(
@@ -49,7 +52,7 @@ def correct(
         from mlscorr.pipeline import correct
 
         result = correct(recorded, order, progress=progress)
-        report = result.write(out, overwrite, progress)
+        report = result.write(out, overwrite, progress, sigma)
     tell(report, out, as_json)
     outside = report["coverage"]["points_outside_trajectory"]
     if outside:

@@ -15,6 +15,7 @@ from pathlib import Path
 import lazrs
 import numpy as np
 
+from mlscorr.io.extra_bytes import add_sigma_fields, with_sigmas
 from mlscorr.io.las_layout import COMPRESSED, LASZIP, RECORD_LENGTHS, read_layout
 from mlscorr.survey import PointCloud
 
@@ -60,7 +61,7 @@ def read_chunks(cloud_file, chunk_size=CHUNK_SIZE):
         yield PointCloud(xyz, times, records["intensity"].copy())
 
 
-def write_corrected(cloud_file, target, correction, watch=None):
+def write_corrected(cloud_file, target, correction, watch=None, sigma=None):
     """Copy a CloudFile with corrected coordinates; all else stays as it was, byte for byte.
 
     What changes: X, Y, Z of each point, the bounds in the header, and where it must, the
@@ -76,6 +77,8 @@ def write_corrected(cloud_file, target, correction, watch=None):
     correction : Correction, or anything else with ``apply(cloud) -> cloud``
     watch : function, optional
         Called with the gps_time (n,) of each chunk that is done, in the trajectory's system.
+    sigma : PointSigma, optional
+        Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
 
     Returns the number of points outside the trajectory, which are unchanged. Raises ValueError
     for bad input, a target that is the input, coordinates that overflow, and LAZ files with
@@ -88,7 +91,8 @@ def write_corrected(cloud_file, target, correction, watch=None):
     shift = getattr(correction, "shift_integers", None) or partial(_shift_integers, correction)
     try:
         with _Output(part) as output, open(layout.path, "rb") as file:
-            head, encoder = _start(layout, output, target.suffix.lower() == ".laz")
+            written = layout if sigma is None else add_sigma_fields(layout)
+            head, encoder = _start(written, output, target.suffix.lower() == ".laz")
             outside, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
             for records in _chunks(layout, CHUNK_SIZE):
                 _check_channels(layout, target, records)
@@ -98,11 +102,16 @@ def write_corrected(cloud_file, target, correction, watch=None):
                 )
                 low = np.minimum(low, [v.min() for v in xyz])
                 high = np.maximum(high, [v.max() for v in xyz])
-                output.encode(encoder.compress_many, records.view(np.uint8))
+                raw = records.view(np.uint8)
+                if sigma is not None:
+                    scaled = layout.scale, layout.offset, records["gps_time"]
+                    sigmas = sigma.of_integers(xyz, *scaled, cloud_file.time_constant)
+                    raw = with_sigmas(records, sigmas)
+                output.encode(encoder.compress_many, raw)
                 if watch is not None:
                     watch(records["gps_time"] + cloud_file.time_constant)
             output.encode(encoder.done)
-            _finish(layout, head, np.stack([high, low]), file, output)
+            _finish(written, head, np.stack([high, low]), file, output)
         _check_copy(layout, part)
         os.replace(part, target)
     except BaseException:

@@ -47,7 +47,8 @@ def compare(survey, rng=None, progress=None):
     >>> compared.row("lsc")["check"]["rmse_3d"] < compared.row("raw")["check"]["rmse_3d"]
     True
     """
-    control, check, refusals, candidates = find_control(survey, rng, progress)
+    control, check, finding = find_control(survey, rng, progress)
+    candidates = finding.candidates
     load_open3d()  # takes seconds, which are not the method's
     is_few = len(set(check.name)) < FEW
     groups = _groups(control) if is_few else []
@@ -71,7 +72,7 @@ def compare(survey, rng=None, progress=None):
         rows=tuple(rows),
         corrections=corrections,
         groups=len(groups),
-        unseen=unseen_rows(survey, refusals, candidates),
+        unseen=unseen_rows(survey, finding.matches.refusals, candidates),
     )
 
 

@@ -27,6 +27,8 @@ from mlscorr.io.survey_file import input_files, named_files
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
+from mlscorr.targets.fit import FittedTarget
+from mlscorr.uncertainty import PointSigma
 
 
 def correct(survey, order=ORDER, rng=None, progress=None):
@@ -58,7 +60,7 @@ def correct(survey, order=ORDER, rng=None, progress=None):
     >>> max(result.check["after"]["rmse"]) < 0.03
     True
     """
-    control, check, refusals, candidates = find_control(survey, rng, progress)
+    control, check, finding = find_control(survey, rng, progress)
     estimate = estimate_correction(survey.trajectory, control, survey.control, survey.pos, order)
     for sentence in estimate.warnings:
         warnings.warn(sentence, stacklevel=2)
@@ -67,7 +69,8 @@ def correct(survey, order=ORDER, rng=None, progress=None):
         estimate=estimate,
         control_observations=control,
         check_observations=check,
-        unseen=unseen_rows(survey, refusals, candidates),
+        unseen=unseen_rows(survey, finding.matches.refusals, finding.candidates),
+        fitted=finding.fitted,
     )
 
 
@@ -76,7 +79,8 @@ class CorrectedSurvey:
     """A corrected survey: the estimate, the targets, the statistics, and ``write``.
 
     ``control`` and ``check`` hold n and the misclosures' statistics before and after, in m;
-    ``unseen`` are the surveyed points without an observation, as rows of report.json.
+    ``unseen`` are the surveyed points without an observation, as rows of report.json; ``fitted``
+    the targets by (pass number, gps_time), for their figures.
     """
 
     survey: Survey
@@ -84,6 +88,7 @@ class CorrectedSurvey:
     control_observations: TargetObservations
     check_observations: TargetObservations
     unseen: list[dict] = field(default_factory=list)
+    fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
 
     @property
     def trajectory(self) -> Trajectory:
@@ -139,8 +144,10 @@ class CorrectedSurvey:
     def _statistics(self, observations, points: ControlPoints):
         return before_and_after(observations, points, self.estimate.correction)
 
-    def write(self, out, overwrite=False, progress=None):
+    def write(self, out, overwrite=False, progress=None, sigma=False):
         """Write corrected clouds, trajectory, targets and report into a folder.
+
+        With sigma, each point gets the fields sigma_easting, sigma_northing and sigma_height.
 
         The folder appears whole or not at all. Returns the document of report.json. Raises
         ValueError when the folder holds an input, or holds anything without overwrite; OSError
@@ -151,7 +158,7 @@ class CorrectedSurvey:
         check_output(out, input_files(self.survey.path), overwrite)
         correction = self.estimate.correction
         with output_folder(out) as folder:
-            files, outside = self._write_clouds(folder, progress or silent)
+            files, outside = self._write_clouds(folder, progress or silent, sigma)
             report = document("report", self._report(files, outside))
             write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
             write_targets_csv(folder / "targets.csv", report["targets"])
@@ -159,12 +166,19 @@ class CorrectedSurvey:
             report["outputs"] = [described(what, folder / name) for what, name in made]
             write_json(folder / "report.json", report)
             seen = view_cloud(self.survey, correction, report["targets"], progress or silent)
-            write_report(folder / "report.html", self.survey, correction, report, seen)
+            page = folder / "report.html"
+            write_report(page, self.survey, correction, report, seen, self.fitted)
             (folder / "pictures").mkdir()
             write_pictures(folder / "pictures", self.survey, correction, report)
         return report
 
-    def _write_clouds(self, folder, progress):
+    @property
+    def point_sigma(self):
+        """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m."""
+        correction = self.estimate.correction
+        return PointSigma.of(correction, self.survey.scanner, self.survey.mounting)
+
+    def _write_clouds(self, folder, progress, sigma):
         """The corrected clouds; rows of report.json, and points outside (trajectory, control)."""
         first, last = self.estimate.span
         files, outside_trajectory, outside_control = [], 0, 0
@@ -175,10 +189,10 @@ class CorrectedSurvey:
             outside_control += int(np.count_nonzero((times < first) | (times > last)))
             done(len(times))
 
+        correction, point_sigma = self.estimate.correction, self.point_sigma if sigma else None
         for file in self.survey.clouds:
             target = folder / file.path.name
-            correction = self.estimate.correction
-            outside_trajectory += write_corrected(file, target, correction, watch)
+            outside_trajectory += write_corrected(file, target, correction, watch, point_sigma)
             files.append({"name": file.path.name, "points": file.points, "sha256": sha256(target)})
         return files, (outside_trajectory, outside_control)
 

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from mlscorr.report import tables
 from mlscorr.report.figures import drawings
 from mlscorr.report.shown import shown
+from mlscorr.report.target_figures import target_drawings
 from mlscorr.report.used import coverage, files, used
 
 PAGE = Path(__file__).parent / "page"  # each section is a file there
@@ -23,6 +24,7 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "correction": "Over time",
     "map": "Map",
     "residuals": "Every target",
+    "targets": "As found",
     "model": "Model",
     "used": "What was used",
     "conventions": "Conventions",
@@ -30,15 +32,17 @@ SECTIONS = {  # in their order; one without anything to show is left out
 LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib")
 SHOWN_ELSEWHERE = ("outliers", "warnings")
 WORDS = {
+    "alternatives": "models that were compared",
+    "orders": "orders of the trend, side by side",
+    "tests": "what the other control points say of each",
     "estimated_by": "estimated by",
     "order": "order of the polynomial trend",
     "sigma0": "sigma0 (1 when the stated sigmas are right)",
     "correlation_time": "correlation time (s)",
-    "alternatives": "models that were compared",
 }
 
 
-def write_report(path, survey, correction, document, seen=None):
+def write_report(path, survey, correction, document, seen=None, fitted=None):
     """Write the self-contained page of a correction.
 
     Parameters
@@ -52,6 +56,8 @@ def write_report(path, survey, correction, document, seen=None):
         The content of report.json; a value that was not determined is None.
     seen : CloudViews, optional
         Pictures of the cloud and the scene of the 3D view; without them both are left out.
+    fitted : dict, optional
+        FittedTarget by (pass number, gps_time), each of which gets a figure.
     """
     environment = Environment(
         loader=FileSystemLoader(PAGE),
@@ -62,13 +68,15 @@ def write_report(path, survey, correction, document, seen=None):
     )
     environment.filters |= {"number": tables.number, "show": show, "norm": tables.norm}
     environment.globals |= {"group": tables.group, "AXES": tables.AXES, "raw": raw}
+    missing = {name for name in ("pictures", "turn") if seen is None}
+    missing |= {name for name in ("targets",) if not fitted}
     environment.globals["sections"] = {
-        name: title
-        for name, title in SECTIONS.items()
-        if seen is not None or name not in ("pictures", "turn")
+        name: title for name, title in SECTIONS.items() if name not in missing
     }
     found = content(survey, correction, document)
     found |= shown(seen, document) if seen is not None else {}
+    figures = target_drawings(document["targets"], fitted or {})
+    found["target_figures"] = [(title, data_uri(picture, "png")) for title, picture in figures]
     page = environment.get_template("report.html").render(found)
     Path(path).write_text(page, encoding="utf-8")
 

@@ -14,6 +14,8 @@ FEWEST_POINTS = 20  # on a target: fewer can't tell plane and outline
 LINK_SHARES = 0.2, 0.4  # of the target's size: beside a bright post; with wide scan lines
 BACKGROUND = 4.0  # times the points of the fullest place: so many bright ones are road and walls
 
+CHEAP = 1500  # bright points that are looked at in any case
+
 
 def split_by_time(gps_time, pause):
     """Runs of points without a pause longer than this (s): a list of index arrays, in time."""
@@ -37,7 +39,7 @@ def bright_components(xyz, intensity, size):
     Yields (level, rows); a component that stays the same over levels comes once, at the highest.
     """
     low, high = np.percentile(intensity, 1), intensity.max()
-    background = max(BACKGROUND * _fullest(xyz, size), len(intensity) / 4)
+    background = max(BACKGROUND * _fullest(xyz, size), len(intensity) / 4, CHEAP)
     seen = set()
     for level in np.geomspace(max(high, 1.0), max(low, 1.0), LEVELS + 1)[1:]:
         bright = np.flatnonzero(intensity >= level)
@@ -59,12 +61,12 @@ def _fullest(xyz, size):
 
 def _components(xyz, rows, link):
     """Rows of each connected component among some rows, each in order."""
-    label = _connected(xyz[rows], link)
+    label = connected(xyz[rows], link)
     order = np.argsort(label, kind="stable")
     return np.split(rows[order], np.flatnonzero(np.diff(label[order])) + 1)
 
 
-def _connected(xyz, link):
+def connected(xyz, link):
     """Component number of each point: occupied voxels first, so that density costs nothing."""
     voxel = link / 3
     cells, cell_of = np.unique(np.floor(xyz / voxel).astype(np.int64), axis=0, return_inverse=True)

@@ -1,0 +1,170 @@
+"""The paper's predictor as printed (Mao et al. 2015, Eq. 13-15, 19 and 20).
+
+Two covariances there describe the same signal and don't fit each other: D_Lambda, between the
+control epochs, is diagonal and holds the variances v(Lambda) that the POS states; D_Lambda'Lambda,
+between them and other epochs, is C0 exp(-t / dt). C0 stands in the second alone, so the predicted
+signal is proportional to it: the squared RMS of any residuals is exactly a parabola in C0, whose
+value at C0 = 0 is that of the trend alone. The paper's Table 3 shows it: parabolas through its
+rows leave R^2 = 1 - 1e-6, and the one of 21 points starts at 0.1619 m, LS of order 5 having
+0.1618 m. If C0 stood in D_Lambda too, the signal would grow less than in proportion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky
+
+from mlscorr.collocation.dense import CHUNK, DenseSolver
+from mlscorr.collocation.model import NOT_POSITIVE, Collocation, Noise, solve_trend
+from mlscorr.covariance import Covariance
+
+
+@dataclass(frozen=True)
+class LiteralSignal:
+    """Random variables Lambda of one correlation time.
+
+    Parameters
+    ----------
+    partials : (n, r, k) array
+        B at n epochs with r observations each.
+    variance : (k,) or (n, k) array
+        v(Lambda), the diagonal of D_Lambda (section 2.5).
+    base : (k,) array
+        C0 of Eq. 20.
+    correlation_time : float
+        dt of Eq. 20. Units: s.
+    """
+
+    partials: np.ndarray
+    variance: np.ndarray
+    base: np.ndarray
+    correlation_time: float
+
+
+@dataclass(frozen=True)
+class LiteralCollocation:
+    """A solved literal collocation, to be asked as a Collocation.
+
+    Covariances of predictions are None. The paper gives none, and its own covariances can't: as
+    they are no joint covariance, the error variance that follows from them may be negative.
+    """
+
+    gps_time: np.ndarray
+    misclosure: np.ndarray
+    noise: Noise
+    design: np.ndarray
+    signals: tuple[LiteralSignal, ...]
+    least_squares: Collocation  # of the trend, with V = B D_Lambda B^T + D_omega
+
+    @property
+    def trend(self):
+        return self.least_squares.trend
+
+    @property
+    def trend_covariance(self):
+        return self.least_squares.trend_covariance
+
+    @property
+    def weights(self):
+        return self.least_squares.weights
+
+    @property
+    def log_likelihood(self):
+        return self.least_squares.log_likelihood
+
+    @property
+    def sigma0(self):
+        return self.least_squares.sigma0
+
+    def predict(self, gps_time, design, partials):
+        """Trend plus signal at other epochs: (q, r), and None for its covariance.
+
+        gps_time (q,), design (q, r, p) and a list of partials (q, r, k), one for each signal, by
+        which Lambda' enters.
+        """
+        weights = self.weights.reshape(self.misclosure.shape)
+        mean = design @ self.trend
+        step = max(CHUNK // max(len(self.gps_time), 1), 1)
+        for signal, partial in zip(self.signals, partials, strict=True):
+            correlation = Covariance("exponential", signal.correlation_time)
+            weighted = np.einsum("nrk,nr->nk", signal.partials, weights)  # B^T V^-1 (l - A Y)
+            for i in range(0, len(gps_time), step):
+                part = slice(i, i + step)
+                lag = gps_time[part, None] - self.gps_time
+                predicted = signal.base * (correlation(lag) @ weighted)  # Eq. 20 in Eq. 15
+                mean[part] += np.einsum("qrk,qk->qr", partial[part], predicted)
+        return mean, None
+
+    def determined_without(self, rows):
+        """Whether the observations other than these determine the trend."""
+        return self.least_squares.determined_without(rows)
+
+    def leave_out(self, rows):
+        """What the other epochs say of some: residuals (l - prediction), and None.
+
+        Raises ValueError when the others don't determine the trend, or when rows are not those of
+        whole epochs.
+        """
+        n, r = self.misclosure.shape
+        out = np.zeros(n * r, dtype=bool)
+        out[rows] = True
+        epochs = out.reshape(n, r).any(axis=1)
+        if epochs.sum() * r != len(rows):
+            raise ValueError(
+                f"{len(rows)} rows of {epochs.sum()} epochs are left out: an epoch's {r} rows go "
+                "together."
+            )
+        others = collocate_literal(
+            self.gps_time[~epochs],
+            self.misclosure[~epochs],
+            self.noise.select(~epochs),
+            self.design[~epochs],
+            [_select(signal, ~epochs) for signal in self.signals],
+        )
+        partials = [signal.partials[epochs] for signal in self.signals]
+        mean, _ = others.predict(self.gps_time[epochs], self.design[epochs], partials)
+        residuals = np.full((n, r), np.nan)
+        residuals[epochs] = self.misclosure[epochs] - mean
+        return residuals.ravel()[rows], None
+
+
+def _select(signal, epochs):
+    """The signal at some of the epochs."""
+    variance = signal.variance if np.ndim(signal.variance) == 1 else signal.variance[epochs]
+    return LiteralSignal(signal.partials[epochs], variance, signal.base, signal.correlation_time)
+
+
+def collocate_literal(gps_time, misclosure, noise, design, signals):
+    """Collocation as the paper prints it; for its experiments, not for surveys.
+
+    Without signals, or with C0 = 0, it is least squares of the trend: with weights
+    (B D_Lambda B^T + D_omega)^-1, so plain LS where these are the same at all epochs.
+
+    Parameters
+    ----------
+    gps_time, misclosure, noise, design : as in collocate
+    signals : sequence of LiteralSignal
+
+    Returns a LiteralCollocation. Raises ValueError as collocate does.
+
+    >>> time, one = np.array([0.0, 10.0, 20.0]) + 413200.0, np.ones((3, 1, 1))
+    >>> signal = LiteralSignal(one, np.array([0.08]), np.array([0.04]), 30.0)
+    >>> misclosure = np.array([[0.4], [0.6], [0.5]])
+    >>> solved = collocate_literal(time, misclosure, Noise(0.02 * one), one, [signal])
+    >>> solved.trend.round(6)
+    array([0.5])
+    >>> solved.predict(time[:1] - 1e4, one[:1], [one[:1]])[0].round(6)  # far away: the trend
+    array([[0.5]])
+    """
+    n, r = np.shape(misclosure)
+    blocks = np.zeros((n, r, n, r))
+    for signal in signals:  # B D_Lambda B^T of Eq. 13 and 14, without correlation in time
+        scaled = signal.partials * np.sqrt(np.atleast_2d(signal.variance))[:, None, :]
+        blocks[np.arange(n), :, np.arange(n), :] += scaled @ scaled.swapaxes(1, 2)
+    try:
+        factor = cholesky(blocks.reshape(n * r, n * r) + noise.matrix, lower=True)
+    except LinAlgError as problem:
+        raise ValueError(NOT_POSITIVE.format(n * r)) from problem
+    solver = DenseSolver(np.repeat(gps_time, r), (), (), factor)
+    solved = solve_trend(solver, misclosure.ravel(), design.reshape(n * r, -1))  # Eq. 13
+    return LiteralCollocation(gps_time, misclosure, noise, design, tuple(signals), solved)

@@ -1,0 +1,221 @@
+"""What a collocation is about: signals, noise, and the generalised least squares they share."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mlscorr.covariance import Covariance
+
+DETERMINED = 1e-9  # least share of the trend's information that must remain without some rows
+NOT_POSITIVE = (
+    "The covariance of the {} misclosures is not positive definite: two observations of one time "
+    "without noise, or a sigma of zero. Give each observation and control point the sigma that it "
+    "has."
+)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Random processes of one covariance function, and how they enter the observations.
+
+    Parameters
+    ----------
+    mixing : (n, r, k) array
+        B times the sigmas of k independent processes, each of unit variance, at n epochs with r
+        observations each.
+    covariance : Covariance
+    """
+
+    mixing: np.ndarray
+    covariance: Covariance
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of n epochs with r observations each (Mao et al. 2015, Eq. 19).
+
+    Parameters
+    ----------
+    own : (n, r, r) array
+        Covariance of what each epoch has alone: the extraction. Units: m^2.
+    group : (n,) int array, optional
+        Which target each epoch has seen, as a row of ``shared``.
+    shared : (g, r) array, optional
+        Sigmas of the error that all epochs of a target have in common: its survey. Units: m.
+    """
+
+    own: np.ndarray
+    group: np.ndarray | None = None
+    shared: np.ndarray | None = None
+
+    @cached_property
+    def separate(self):
+        """Covariance (n, r, r) of each epoch's noise, without what it shares with others."""
+        if self.group is None:
+            return self.own
+        alone = ~np.isin(self.group, self._repeated)
+        variance = np.where(alone[:, None], self.shared[self.group] ** 2, 0.0)
+        return self.own + variance[:, :, None] * np.eye(variance.shape[1])
+
+    @cached_property
+    def common(self):
+        """Columns (n r, c) of the errors shared by several epochs, each of unit variance."""
+        n, r = self.own.shape[:2]
+        if self.group is None:
+            return np.zeros((n * r, 0))
+        seen = self.group[:, None] == self._repeated
+        sigma = np.where(seen[:, :, None], self.shared[self._repeated], 0.0)
+        return np.einsum("ngk,jk->njgk", sigma, np.eye(r)).reshape(n * r, seen.shape[1] * r)
+
+    @property
+    def _repeated(self):
+        """Groups that have several epochs and an error to share."""
+        groups, count = np.unique(self.group, return_counts=True)
+        return groups[(count > 1) & np.any(self.shared[groups] > 0, axis=1)]
+
+    @property
+    def matrix(self):
+        """All of it as one covariance matrix (n r, n r)."""
+        return self.block(np.arange(self.own.shape[0] * self.own.shape[1]))
+
+    def block(self, rows):
+        """Covariance of some rows, numbered as in a Collocation."""
+        epoch, row = np.divmod(np.asarray(rows, dtype=int), self.own.shape[1])
+        separate = self.separate[epoch[:, None], row[:, None], row]
+        common = self.common[rows]
+        return np.where(epoch[:, None] == epoch, separate, 0.0) + common @ common.T
+
+    def select(self, epochs):
+        """The noise of some epochs: their numbers, or an (n,) mask."""
+        group = None if self.group is None else self.group[epochs]
+        return Noise(self.own[epochs], group, self.shared)
+
+
+@dataclass(frozen=True)
+class Collocation:
+    """A solved collocation: trend, and what is needed to predict the signal at any epoch.
+
+    Rows are numbered as in ``misclosure.ravel()``: observation j of epoch i is row i r + j.
+
+    Parameters
+    ----------
+    trend, trend_covariance : (p,), (p, p) array
+        x (Eq. 13) and its covariance.
+    log_likelihood : float
+        Restricted log-likelihood of the misclosures.
+    sigma0 : float
+        Square root of the weighted residual sum of squares over the redundancy m - p; one if the
+        model is right.
+    weights : (m,) array
+        V^-1 (l - A x), with V = B D B^T + N.
+    """
+
+    solver: object  # of V: dense, or the Markov recursion
+    misclosure: np.ndarray  # (m,)
+    design: np.ndarray  # (m, p)
+    trend: np.ndarray
+    trend_root: np.ndarray  # (p, p), its square is the covariance
+    weights: np.ndarray
+    log_likelihood: float
+    sigma0: float
+
+    @property
+    def trend_covariance(self):
+        return self.trend_root @ self.trend_root.T
+
+    def predict(self, gps_time, design, mixings):
+        """Trend plus signal at other epochs, with covariance  (Eq. 15).
+
+        Parameters
+        ----------
+        gps_time : (q,) array
+            Units: s.
+        design : (q, r, p) array
+        mixings : list of (q, r, k) arrays, one for each signal
+            Row q of the result is design @ x + sum of mixing @ s(gps_time).
+
+        Returns
+        -------
+        mean, covariance : (q, r), (q, r, r) array
+            The covariance is that of the error: it falls where there are observations, and it
+            includes that of the trend.
+        """
+        return self._predictor(np.asarray(gps_time, dtype=float), design, mixings)
+
+    @cached_property
+    def _predictor(self):
+        columns = np.column_stack([self.design, self.misclosure - self.design @ self.trend])
+        return self.solver.predictor(columns, self.trend, self.trend_root)
+
+    @cached_property
+    def _leverage(self):
+        """Orthonormal basis (m, p) of the columns of A."""
+        return np.linalg.qr(self.design)[0]
+
+    @cached_property
+    def _projected(self):
+        """V^-1 A times the root of the trend's covariance, (m, p)."""
+        return self.solver.solve(self.design) @ self.trend_root
+
+    def determined_without(self, rows):
+        """Whether the observations other than these determine the trend."""
+        basis = self._leverage[rows]
+        if basis.shape[1] == 0:
+            return True
+        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < 1.0 - DETERMINED)
+
+    def leave_out(self, rows):
+        """What the other observations say of some: residuals (l - prediction) and covariance.
+
+        The covariance includes the noise of the observations left out, which is what a test of
+        them needs. Both come from the block of V^-1 less the trend's part, without solving again
+        (Dubrule 1983, Math. Geology 15, 687-699). Raises ValueError when the others don't
+        determine the trend.
+        """
+        if not self.determined_without(rows):
+            raise ValueError(
+                f"Without the {len(rows)} observations that are left out the other "
+                f"{len(self.misclosure) - len(rows)} do not determine the trend."
+            )
+        projected = self._projected[rows]
+        covariance = np.linalg.inv(self.solver.precision(rows) - projected @ projected.T)
+        return covariance @ self.weights[rows], covariance
+
+
+def solve_trend(solver, misclosure, design):
+    """Generalised least squares, x = (A^T V^-1 A)^-1 A^T V^-1 l  (Eq. 13), as a Collocation.
+
+    A solver of V has: ``whiten(columns)``, of which W^T W = c^T V^-1 c; ``log_determinant``;
+    ``solve(columns)``, V^-1 c; ``precision(rows)``, a block of V^-1; ``predictor(columns, trend,
+    root)``.
+
+    The likelihood is the restricted one, of what the trend leaves (Rasmussen and Williams 2006,
+    Eq. 2.45 with the trend's prior infinitely wide). Raises ValueError when the rank of A is less
+    than its columns.
+    """
+    p = design.shape[1]
+    whitened = solver.whiten(np.column_stack([design, misclosure]))
+    if len(misclosure) < p or np.linalg.matrix_rank(whitened[:, :p]) < p:
+        raise ValueError(
+            f"{p} trend parameters are not determined by {len(misclosure)} "
+            "misclosures. Lower the order or observe more control points."
+        )
+    basis, triangle = np.linalg.qr(whitened[:, :p])
+    root = np.linalg.inv(triangle)
+    trend = root @ (basis.T @ whitened[:, p])
+    residual = whitened[:, p] - whitened[:, :p] @ trend
+    squares = float(residual @ residual)
+    redundancy = len(misclosure) - p
+    determinants = solver.log_determinant + 2 * np.log(np.abs(np.diag(triangle))).sum()
+    log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
+    return Collocation(
+        solver=solver,
+        misclosure=misclosure,
+        design=design,
+        trend=trend,
+        trend_root=root,
+        weights=solver.solve((misclosure - design @ trend)[:, None])[:, 0],
+        log_likelihood=float(log_likelihood),
+        sigma0=float(np.sqrt(squares / redundancy)) if redundancy else float("nan"),
+    )
