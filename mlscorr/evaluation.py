@@ -2,11 +2,29 @@
 
 import numpy as np
 
+from mlscorr.accuracy import positional_accuracy
 from mlscorr.correction import COMPONENTS
 from mlscorr.survey import PointCloud
 from mlscorr.targets.candidates import search_radius
 
 CHECK_REASON = "check point"  # why it took no part in the estimate
+
+
+def accuracy(check_observations, check, control_observations, control, correction, left_out):
+    """Accuracy by the check points; without any, by the control points left out in turn.
+
+    left_out (n, 3) are the misclosures of the control points once the others alone have corrected
+    them, NaN where that isn't known. Units: m.
+    """
+    if len(check_observations):
+        residuals, kind = misclosures(check_observations, check, correction), "check"
+        observations, points = check_observations, check
+    else:
+        known = np.isfinite(left_out).all(axis=1)
+        residuals, kind = left_out[known], "leave_one_out"
+        observations, points = control_observations[known], control
+    sigma = points.sigma[_rows(observations, points)]
+    return positional_accuracy(residuals, sigma, len(set(observations.name)), kind)
 
 
 def misclosures(observations, control, correction=None):
@@ -29,30 +47,31 @@ def _rows(observations, control):
 def statistics(residuals):
     """Statistics per axis of (n, 3) residuals in m, as lists of three, and of their lengths.
 
-    rmse, mean, std (of the sample), min and max are E, N, H; rmse_horizontal, rmse_3d,
-    max_horizontal and max_3d are of the distances in plan and in space. None stands for what so
-    few residuals do not have.
+    rmse, mean, std (of the sample), min and max are E, N, H; those that end in _horizontal and
+    _3d are of the distances in plan and in space. None stands for what so few residuals do not
+    have.
 
     >>> found = statistics(np.array([[0.3, 0.0, -0.1], [-0.4, 0.0, 0.1]]))
     >>> found["rmse"], found["max_horizontal"]
     ([0.3535..., 0.0, 0.1], 0.4)
     """
-    names = ("rmse", "mean", "std", "min", "max")
-    lengths = ("rmse_horizontal", "rmse_3d", "max_horizontal", "max_3d")
-    if len(residuals) == 0:
-        return dict.fromkeys(names + lengths)
-    plan = np.linalg.norm(residuals[:, :2], axis=1)
-    space = np.linalg.norm(residuals, axis=1)
+    found = _of(residuals)
+    for name, axes in (("horizontal", 2), ("3d", 3)):
+        lengths = np.linalg.norm(residuals[:, :axes], axis=1)
+        found |= {f"{what}_{name}": value for what, value in _of(lengths).items()}
+    return found
+
+
+def _of(values):
+    """Statistics over the first axis of values, None for what so few do not have."""
+    if len(values) == 0:
+        return dict.fromkeys(("rmse", "mean", "std", "min", "max"))
     return {
-        "rmse": np.sqrt(np.mean(residuals**2, axis=0)).tolist(),
-        "mean": residuals.mean(axis=0).tolist(),
-        "std": residuals.std(axis=0, ddof=1).tolist() if len(residuals) > 1 else None,
-        "min": residuals.min(axis=0).tolist(),
-        "max": residuals.max(axis=0).tolist(),
-        "rmse_horizontal": float(np.sqrt(np.mean(plan**2))),
-        "rmse_3d": float(np.sqrt(np.mean(space**2))),
-        "max_horizontal": float(plan.max()),
-        "max_3d": float(space.max()),
+        "rmse": np.sqrt(np.mean(values**2, axis=0)).tolist(),
+        "mean": values.mean(axis=0).tolist(),
+        "std": values.std(axis=0, ddof=1).tolist() if len(values) > 1 else None,
+        "min": values.min(axis=0).tolist(),
+        "max": values.max(axis=0).tolist(),
     }
 
 
@@ -65,17 +84,19 @@ def before_and_after(observations, control, correction):
     }
 
 
-def target_rows(observations, control, correction, role, reasons):
+def target_rows(observations, control, correction, role, reasons, left_out=None):
     """One row for each observation of these surveyed points, as report.json has them.
 
     reasons (n,) say why an observation took no part in the estimate; None where it did. sigma is
-    that of the misclosure: survey and extraction together (Eq. 19).
+    that of the misclosure: survey and extraction together (Eq. 19). left_out (n, 3) is what
+    remains once the other points alone have corrected it; NaN and None where that isn't known.
     """
     surveyed = _rows(observations, control)
     before = misclosures(observations, control)
     after = misclosures(observations, control, correction)
     extraction = np.einsum("nii->ni", observations.covariance)
     sigma = np.sqrt(control.sigma[surveyed] ** 2 + extraction)
+    left_out = np.full_like(before, np.nan) if left_out is None else left_out
     return [
         {
             "name": name,
@@ -87,6 +108,7 @@ def target_rows(observations, control, correction, role, reasons):
             "sigma": sigma[i].tolist(),
             "before": before[i].tolist(),
             "after": after[i].tolist(),
+            "left_out": left_out[i].tolist() if np.isfinite(left_out[i]).all() else None,
             "used": reasons[i] is None,
             "reason": reasons[i],
         }
@@ -140,6 +162,7 @@ def _unseen_row(name, pass_number, control, role, reason):
         "sigma": None,
         "before": None,
         "after": None,
+        "left_out": None,
         "used": False,
         "reason": reason,
     }

@@ -11,7 +11,7 @@ import mlscorr
 
 PACKAGE = Path(mlscorr.__file__).parent
 FLOORS = (  # from the ground up; rooms on one floor do not know each other
-    ("survey", "covariance"),
+    ("survey", "covariance", "accuracy"),
     ("georeference", "collocation"),
     ("effects", "matching", "io", "uncertainty"),
     ("targets", "correction", "calibration", "baselines"),

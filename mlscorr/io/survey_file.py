@@ -174,9 +174,19 @@ def input_files(path):
 
     Raises as read_settings does, and FileNotFoundError for files that aren't there.
     """
+    return [file for _, file in named_files(path)]
+
+
+def named_files(path):
+    """Pairs (what it is, path) of a survey.toml and of every file that it names.
+
+    Raises as input_files does.
+    """
     path = _survey_toml(path)
     clouds, *others = _files(path, read_settings(path))
-    return [path, *clouds, *(other for other in others if other is not None)]
+    files = [("survey", path), *(("cloud", cloud) for cloud in clouds)]
+    files += zip(("trajectory", "trajectory accuracy", "control", "reference"), others, strict=True)
+    return [(what, file) for what, file in files if file is not None]
 
 
 def _survey_toml(path):

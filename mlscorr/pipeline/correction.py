@@ -8,6 +8,7 @@ import numpy as np
 from mlscorr.correction import ORDER, Estimate, estimate_correction
 from mlscorr.evaluation import (
     CHECK_REASON,
+    accuracy,
     before_and_after,
     model_section,
     statistics,
@@ -22,7 +23,7 @@ from mlscorr.io.output import (
     write_json,
     write_targets_csv,
 )
-from mlscorr.io.survey_file import input_files
+from mlscorr.io.survey_file import input_files, named_files
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
@@ -98,7 +99,7 @@ class CorrectedSurvey:
     def control(self):
         fit = self._statistics(self.control_observations, self.survey.control)
         left_out = self.estimate.left_out[np.isfinite(self.estimate.left_out).all(axis=1)]
-        return {**fit, "leave_one_out": {"rmse": statistics(left_out)["rmse"]}}
+        return {**fit, "leave_one_out": {"n": len(left_out), **statistics(left_out)}}
 
     @property
     def check(self):
@@ -117,11 +118,28 @@ class CorrectedSurvey:
             for name in self.control_observations.name
         ]
         rows = target_rows(
-            self.control_observations, self.survey.control, correction, "control", reasons
+            self.control_observations,
+            self.survey.control,
+            correction,
+            "control",
+            reasons,
+            self.estimate.left_out,
         )
         none = [CHECK_REASON] * len(self.check_observations)
         rows += target_rows(self.check_observations, self.survey.check, correction, "check", none)
         return rows + self.unseen
+
+    @property
+    def accuracy(self):
+        """Accuracy by ASPRS 2023, as report.json has it: mlscorr.accuracy."""
+        return accuracy(
+            self.check_observations,
+            self.survey.check,
+            self.control_observations,
+            self.survey.control,
+            self.estimate.correction,
+            self.estimate.left_out,
+        )
 
     def _statistics(self, observations, points: ControlPoints):
         return before_and_after(observations, points, self.estimate.correction)
@@ -135,17 +153,21 @@ class CorrectedSurvey:
         ValueError when the folder holds an input, or holds anything without overwrite; OSError
         when writing fails.
         """
-        from mlscorr.report import write_pictures, write_report
+        from mlscorr.report import view_cloud, write_pictures, write_report
 
         check_output(out, input_files(self.survey.path), overwrite)
+        correction = self.estimate.correction
         with output_folder(out) as folder:
             files, outside = self._write_clouds(folder, progress or silent, sigma)
             report = document("report", self._report(files, outside))
             write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
             write_targets_csv(folder / "targets.csv", report["targets"])
+            made = ("corrected trajectory", "trajectory.csv"), ("targets", "targets.csv")
+            report["outputs"] = [described(what, folder / name) for what, name in made]
             write_json(folder / "report.json", report)
-            correction = self.estimate.correction
-            write_report(folder / "report.html", self.survey, correction, report, self.fitted)
+            seen = view_cloud(self.survey, correction, report["targets"], progress or silent)
+            page = folder / "report.html"
+            write_report(page, self.survey, correction, report, seen, self.fitted)
             (folder / "pictures").mkdir()
             write_pictures(folder / "pictures", self.survey, correction, report)
         return report
@@ -183,6 +205,7 @@ class CorrectedSurvey:
             "targets": self.targets,
             "control": self.control,
             "check": self.check,
+            "accuracy": self.accuracy,
             "model": model_section(self.estimate),
             "coverage": {
                 "control_span": list(self.estimate.span),
@@ -191,4 +214,10 @@ class CorrectedSurvey:
                 "points_outside_control": outside[1],
             },
             "files": files,
+            "inputs": [described(what, path) for what, path in named_files(self.survey.path)],
         }
+
+
+def described(what, path):
+    """A file as a row of report.json."""
+    return {"what": what, "name": path.name, "bytes": path.stat().st_size, "sha256": sha256(path)}
