@@ -1,6 +1,6 @@
 """Centre errors, recall and honesty of covariances of simulated targets, by kind and points.
 
-python benchmarks/target_study.py [views per row]
+python benchmarks/target_study.py [views per row [looks, with commas [first seed]]]
 """
 
 import sys
@@ -25,7 +25,7 @@ WITHIN_95 = 7.815  # chi-squared of 3 axes
 
 
 def look_at(look, size, condition, seed, known=True):
-    """(points on the target, error (3,), normalised square, false targets, late, size error)."""
+    """(points on the target, error (3,), normalised square, false targets, score)."""
     rng = np.random.default_rng([seed, len(look), int(1000 * size)])
     seen = view(look, size, rng, *CONDITIONS[condition])
     shape = TARGETS[look][0], size if known else None
@@ -58,7 +58,7 @@ def row(label, results):
     )
 
 
-def study(number, looks=TARGETS, sizes=(0.6, 0.3)):
+def study(number, looks=TARGETS, first=0, sizes=(0.6, 0.3)):
     print(
         f"{'look, size, condition':44s}    n found% of>=60 med(mm)   95 %     max chi2/3 "
         "in95% false"
@@ -68,7 +68,8 @@ def study(number, looks=TARGETS, sizes=(0.6, 0.3)):
         started = time.perf_counter()
         for size in sizes:
             for condition in CONDITIONS:
-                results = [look_at(look, size, condition, seed) for seed in range(number)]
+                seeds = range(first, first + number)
+                results = [look_at(look, size, condition, seed) for seed in seeds]
                 row(f"{look} {size} m {condition}", results)
                 everything += results
         for low, high in pairwise(COUNTS):
@@ -79,4 +80,5 @@ def study(number, looks=TARGETS, sizes=(0.6, 0.3)):
 
 if __name__ == "__main__":
     looks = sys.argv[2].split(",") if len(sys.argv) > 2 else TARGETS
-    study(int(sys.argv[1]) if len(sys.argv) > 1 else 200, looks)
+    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    study(int(sys.argv[1]) if len(sys.argv) > 1 else 200, looks, first)

@@ -365,13 +365,15 @@ def straight(sigma=None):
 
 
 def test_search_radius_grows_with_the_stated_sigma():
-    "Half the diagonal and 2 m; four sigmas where the POS states more, and only there"
+    "Half the diagonal and 2 m; four sigmas where the POS states more, and only there; never > 10 m"
     trajectory = straight(lambda t: np.where(t > 90.0, 1.5, 0.01))
     control = control_point(ORIGIN + np.array([5.0, 100.0, 1.0]), "square")
     lost = control_point(ORIGIN + np.array([5.0, 950.0, 1.0]), "square")
     radius = search_radius(trajectory, control + lost)
     assert radius - SIZE / np.sqrt(2) == pytest.approx([2.0, 6.0])  # m
     assert search_radius(straight(), control) - SIZE / np.sqrt(2) == pytest.approx([2.0])
+    hopeless = straight(lambda t: np.full(len(t), 15.0))
+    assert search_radius(hopeless, control) - SIZE / np.sqrt(2) == pytest.approx([10.0])
 
 
 def test_collect_by_chunks_is_the_whole():

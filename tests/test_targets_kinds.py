@@ -1,5 +1,6 @@
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -21,11 +22,11 @@ def fit(seen, kind, size=SIZE, seed=0):
 @cache
 def views(look, count=VIEWS):
     "Views, up to 60 deg oblique and a third hidden, with at least 60 points on the target"
-    seen = [
+    seen = (
         view(look, SIZE, np.random.default_rng([7, i]), 60.0, 0.3, step=STEP)
         for i in range(2 * count)
-    ]
-    return [one for one in seen if one.on_target >= 60][:count]
+    )
+    return list(islice((one for one in seen if one.on_target >= 60), count))
 
 
 @pytest.mark.parametrize("look", TARGETS)

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 SIGMAS = 4.0  # of the stated position sigma
 LEAST_GATE = 1.0  # m: datum and mounting errors are not in the POS's sigma
+LARGEST_GATE = 10.0  # m: a lone GNSS receiver errs by 8 m (GPS SPS 2020, 95 %); a POS, no more
 SIZE_TOLERANCE = 0.01  # m
 
 
@@ -33,7 +34,7 @@ def gates(sigma, n):
     """Largest credible misclosure (n,) by stated sigmas (n, 3), or None of them. Units: m."""
     if sigma is None:
         return np.full(n, LEAST_GATE)
-    return np.maximum(LEAST_GATE, SIGMAS * np.linalg.norm(sigma, axis=1))
+    return np.clip(SIGMAS * np.linalg.norm(sigma, axis=1), LEAST_GATE, LARGEST_GATE)
 
 
 def same_appearance(observations, row, control, columns):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlscorr.matching.pairs import same_appearance
+from mlscorr.matching.pairs import LARGEST_GATE, same_appearance
 
 NEAR = 3.0  # m; what is farther from the place that its neighbours tell is another object
 POSSIBLE = 0.001  # probability from which a rival is named
@@ -38,6 +38,11 @@ class _Case:
 
     def when(self, row):
         return f"{self.observations.gps_time[row]:.1f} s"
+
+    def limit(self, row):
+        """The gate of an observation, in words."""
+        at_most = ", the largest however much the POS states"
+        return f"gate {self.gate[row]:.2f} m{at_most if self.gate[row] >= LARGEST_GATE else ''}"
 
     def name(self, column):
         return self.control.name[column]
@@ -140,7 +145,7 @@ def _wrong_place(case, row):
         f"{case.name(one)} lies {case.off(row, one):.2f} m from where the observation at "
         f"{case.when(row)} says once corrected; {case.corrected(row)}. Its surveyed point is "
         f"wrong, or this is another object (probability {wrong[one]:.3f} by {passes} "
-        f"observations; misclosure {misclosure:.2f} m, gate {case.gate[row]:.2f} m)."
+        f"observations; misclosure {misclosure:.2f} m, {case.limit(row)})."
     )
 
 
@@ -150,7 +155,7 @@ def _doubt(case, row):
     if probability.max(initial=0.0) < DOUBTFUL:
         return None
     one, chance = column[0], probability[0]
-    end = f"(gate {case.gate[row]:.2f} m, probability {chance:.3f}"
+    end = f"({case.limit(row)}, probability {chance:.3f}"
     if len(column) > 1 and probability[1] >= POSSIBLE:
         apart = np.linalg.norm(case.control.position[one] - case.control.position[column[1]])
         return column[:2], (
@@ -192,8 +197,8 @@ def _not_there(case, row):
     return [one], (
         f"{case.name(one)} lies {case.off(row, one):.2f} m from where the observation at "
         f"{case.when(row)} says once corrected; {case.corrected(row)}. This is another object "
-        f"(misclosure {np.linalg.norm(case.misclosure(row, one)):.2f} m, gate "
-        f"{case.gate[row]:.2f} m)."
+        f"(misclosure {np.linalg.norm(case.misclosure(row, one)):.2f} m, "
+        f"{case.limit(row)})."
     )
 
 
@@ -206,7 +211,7 @@ def _alone(case, row, tree):
     distance, nearest = tree.query(seen.position[row])
     taken = "" if case.free(row, [nearest])[0] else ", another observation of this pass,"
     return (
-        f"No surveyed point is left for the {what} (gate {case.gate[row]:.2f} m); the nearest, "
+        f"No surveyed point is left for the {what} ({case.limit(row)}); the nearest, "
         f"{case.name(nearest)}{taken} a {case.control.kind[nearest]} of "
         f"{case.control.size[nearest]:.2f} m, lies {distance:.2f} m away."
     )
@@ -225,6 +230,6 @@ def _unseen(case, refused):
         found = f"the nearest one found, at {case.when(row)}, lies {away:.2f} m away"
         if column[row] >= 0:
             found += f" and is {case.name(column[row])}"
-        reason = f"No target is left for it; {found} (gate {case.gate[row]:.2f} m)."
+        reason = f"No target is left for it; {found} ({case.limit(row)})."
         refusals.append(Refusal(case.name(one), None, reason))
     return refusals

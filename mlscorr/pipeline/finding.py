@@ -63,6 +63,7 @@ def fit_while_reading(survey, read, rng=None, progress=None):
     """
     surveyed = survey.control + survey.check
     rng = np.random.default_rng(SEED) if rng is None else rng
+    seed = rng.integers(2**63)
     fitted, near = [], Near()
 
     def finished(file, cloud, segment):
@@ -72,7 +73,8 @@ def fit_while_reading(survey, read, rng=None, progress=None):
         near.darkest = min(near.darkest, float(cloud.intensity.min()))
         near.brightest = max(near.brightest, float(cloud.intensity.max()))
         part = Candidates(cloud, segment, NO_POINTS, {})
-        arguments = part, surveyed, survey.trajectory, survey.scanner, rng, survey.mounting
+        same = np.random.default_rng(seed)  # whatever was looked at before
+        arguments = part, surveyed, survey.trajectory, survey.scanner, same, survey.mounting
         fitted.extend((file, segment, t) for segment, t in fit_near_control(*arguments))
 
     clouds, trajectory = survey.clouds, survey.trajectory

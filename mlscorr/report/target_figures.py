@@ -25,7 +25,7 @@ COLUMNS = 6  # of the contact sheet
 MOST_SHOWN = 120  # on the contact sheet, those with the highest scores
 DOTS_PER_INCH = 170
 SMALL = 1.85, 2.15  # inch, width and height of one figure
-LOW_SCORE = 0.9  # hardly any true target has less, see benchmarks/bench_targets.py
+LOW_SCORE = 0.9  # most true targets have more; less is a reason to look, not to reject
 
 
 @styled

@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from mlscorr.matching import LARGEST_GATE
 from mlscorr.survey import PointCloud
 
 MINIMUM_RADIUS = 2.0  # m: a POS that states less than it errs (datum, mounting) is still found
@@ -36,8 +37,8 @@ class Candidates:
 def search_radius(trajectory, control):
     """Radius (n,) in m about each control point in which its image must lie.
 
-    The largest stated sigma of the trajectory within reach times four, at least two metres, and
-    the target's own half diagonal.
+    The largest stated sigma of the trajectory within reach times four, at least two metres and
+    at most the largest gate of the matching, and the target's own half diagonal.
     """
     half = control.size / np.sqrt(2)
     if trajectory.position_sigma is None:
@@ -47,7 +48,7 @@ def search_radius(trajectory, control):
     tree = cKDTree(trajectory.position[::thin, :2])
     near = tree.query_ball_point(control.position[:, :2], REACH)
     largest = np.array([sigma[::thin][rows].max(initial=0.0) for rows in near])
-    return half + np.maximum(MINIMUM_RADIUS, SIGMAS * largest)
+    return half + np.clip(SIGMAS * largest, MINIMUM_RADIUS, LARGEST_GATE)
 
 
 def collect(clouds, trajectory, control, read_chunks, progress=None, finished=None):

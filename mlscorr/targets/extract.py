@@ -11,7 +11,7 @@ from mlscorr.targets.candidates import search_radius
 from mlscorr.targets.fit import fit_targets
 from mlscorr.targets.intensity import why_useless
 from mlscorr.targets.shapes import BY_EDGES
-from mlscorr.targets.visits import PAUSE, motion_covariance, split_visits
+from mlscorr.targets.visits import PAUSE, motion_covariance, scanner_path, split_visits
 
 
 def extract_targets(candidates, control, trajectory, scanner, rng, mounting=None):
@@ -45,31 +45,42 @@ def fit_near_control(candidates, control, trajectory, scanner, rng, mounting=Non
     _warn_of_intensity(candidates.cloud.intensity, control.kind)
     passes = candidates.pass_number
     lever_arm = np.zeros(3) if mounting is None else mounting.lever_arm
+    scanned_from = scanner_path(candidates.cloud.gps_time, trajectory, lever_arm)
+    seed = rng.integers(2**63)  # of each piece alike: no target depends on another
     tree = cKDTree(candidates.cloud.xyz)
     found = []
     for index, radius in enumerate(search_radius(trajectory, control)):
         rows = np.sort(np.array(tree.query_ball_point(control.position[index], radius), int))
         shape = control.kind[index], float(control.size[index])
         for number in np.unique(passes[rows]):
-            cloud = candidates.cloud[rows[passes[rows] == number]]
-            for target in _targets_of_pass(cloud, *shape, trajectory, lever_arm, scanner, rng):
+            here = rows[passes[rows] == number]
+            piece = candidates.cloud[here], scanned_from[here]
+            for target in _targets_of_pass(*piece, shape, scanner, np.random.default_rng(seed)):
                 if not any(number == n and _same(target, other) for n, other in found):
                     found.append((int(number), target))
     found.sort(key=lambda pair: (pair[0], pair[1].gps_time))
-    return found
+    return _with_motion(found, trajectory)
 
 
-def _targets_of_pass(cloud, kind, size, trajectory, lever_arm, scanner, rng):
+def _targets_of_pass(cloud, scanned_from, shape, scanner, rng):
     """Targets of a kind and size near one control point in one pass, at each visit of it."""
-    pose = trajectory.at(cloud.gps_time)
-    origin = pose.position + pose.attitude.apply(lever_arm)
-    found = []
-    for rows in split_visits(cloud.gps_time, origin):
-        sight = cloud.xyz[rows] - origin[rows]
-        for target in fit_targets(cloud[rows], sight, [(kind, size)], scanner, rng):
-            motion = motion_covariance(trajectory, target.gps_time, target.duration)
-            found.append(replace(target, covariance=target.covariance + motion))
-    return found
+    return [
+        target
+        for rows in split_visits(cloud.gps_time, scanned_from)
+        for target in fit_targets(
+            cloud[rows], cloud.xyz[rows] - scanned_from[rows], [shape], scanner, rng
+        )
+    ]
+
+
+def _with_motion(found, trajectory):
+    """The targets with the motion of the POS error in their covariances."""
+    time, duration = [[getattr(t, name) for _, t in found] for name in ("gps_time", "duration")]
+    motion = motion_covariance(trajectory, time, duration)
+    return [
+        (number, replace(target, covariance=target.covariance + moved))
+        for (number, target), moved in zip(found, motion, strict=True)
+    ]
 
 
 def _same(one, other):

@@ -1,46 +1,22 @@
 """Targets of one piece of cloud: what extraction near control and search without it both call."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.survey import PointCloud
-from mlscorr.targets.beams import Pulses, beams_at_plane, missed_points
+from mlscorr.targets.beams import Pulses
 from mlscorr.targets.clusters import FEWEST_POINTS
 from mlscorr.targets.intensity import why_useless
-from mlscorr.targets.judge import Verdict, judge
-from mlscorr.targets.outline import Outline, Size, fit_outline
-from mlscorr.targets.plane import aligned, centre_of, fit_plane
-from mlscorr.targets.seeds import (
-    BLOOMED,
-    Seed,
-    bright_seeds,
-    hole_seeds,
-    plate_seeds,
-    spot_seeds,
-)
-from mlscorr.targets.shapes import (
-    BRIGHT,
-    BY_EDGES,
-    DARK,
-    PASSED,
-    diameter,
-    distance_inside,
-    form_of,
-    sides,
-)
+from mlscorr.targets.plane import centre_of
+from mlscorr.targets.seeds import bright_seeds, hole_seeds, plate_seeds, spot_seeds
+from mlscorr.targets.shapes import BY_EDGES, sides
+from mlscorr.targets.stages import exact_fit, met_target, rough_fit
 
 THICKNESS = 0.03  # m off a plane: less than a post's or a frame's depth
-FEWEST_DARK = 5  # points that tell how dark it is beside a target
-ALIKE = 0.7  # dark over bright, from which on they may be the same surface
-BEAM_DIVERGENCE = 0.35e-3  # rad, RIEGL VQ-250 data sheet: four sigmas of its width
-ROUNDING = 0.0003  # m, one sigma of a coordinate at the usual LAS scale of 1 mm
-MADE = 0.0005  # m, one sigma of a target's size as made and measured
-REACH = 1.0  # sizes about the centre, within which beams are looked at
 SETTLED = 0.93  # overlap of a rough fit that needs no second
-ROUGH_BLUR = 40.0  # the size over the blur of a rough fit
-CONTRADICTED = 0.05  # share of the beams that met nothing, found well inside the outline
+SAME_PLACE = 0.1  # of the size, from a settled fit to a seed of another level of the same blob
 
 
 @dataclass(frozen=True)
@@ -119,22 +95,6 @@ class FittedTarget:
     view: TargetView
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """A shape fitted at a seed, with the beams that tell it."""
-
-    seed: Seed
-    kind: str
-    size: float | None
-    beams: tuple
-    outline: Outline
-    verdict: Verdict
-
-    @property
-    def position(self):
-        return self.seed.plane.origin + self.outline.centre @ self.seed.plane.axes[:2]
-
-
 def fit_targets(cloud, sight, shapes, scanner, rng, spot=None):
     """Fit targets of the given shapes in one piece of cloud of one pass and visit.
 
@@ -149,7 +109,7 @@ def fit_targets(cloud, sight, shapes, scanner, rng, spot=None):
     scanner : Scanner
         Noise that blurs the outline.
     rng : numpy.random.Generator
-        For the random samples of the plane fit.
+        For the random samples in which flat patches are looked for.
     spot : Spot, optional
         The one bright blob to look at.
 
@@ -170,12 +130,12 @@ def fit_targets(cloud, sight, shapes, scanner, rng, spot=None):
         if spot is None or blind:
             seeds = _seeds(pulses, kind, size, blind, rng)
         else:
-            seeds = spot_seeds(pulses, spot, origin, kind, size, rng)
+            seeds = spot_seeds(pulses, spot, origin, kind, size)
         for seed in seeds:
             if not any(_settled(fit, seed, kind, size) for fit in roughly):
-                fit = _rough_fit(pulses, seed, kind, size)
+                fit = rough_fit(pulses, seed, kind, size)
                 roughly += [fit] if fit is not None else []
-    exact = [_exact_fit(pulses, fit, scanner, rng) for fit in _best(roughly)]
+    exact = [exact_fit(pulses, fit, scanner) for fit in _best(roughly)]
     exact = _best([fit for fit in exact if fit is not None])
     return [_as_target(pulses, fit, origin) for fit in exact]
 
@@ -185,7 +145,7 @@ def _seeds(pulses, kind, size, blind, rng):
         return hole_seeds(pulses, size, rng)
     if kind in BY_EDGES or blind:
         return plate_seeds(pulses, kind, size, rng)
-    return bright_seeds(pulses, kind, size, rng)
+    return bright_seeds(pulses, kind, size)
 
 
 def _settled(fit, seed, kind, size):
@@ -193,7 +153,7 @@ def _settled(fit, seed, kind, size):
     if (fit.kind, fit.size) != (kind, size) or fit.outline.overlap < SETTLED:
         return False
     middle = seed.plane.origin + seed.middle @ seed.plane.axes[:2]
-    return np.linalg.norm(fit.position - middle) < 0.1 * fit.outline.size
+    return np.linalg.norm(fit.position - middle) < SAME_PLACE * fit.outline.size
 
 
 def _best(fits):
@@ -209,165 +169,11 @@ def _best(fits):
     return best
 
 
-def _rough_fit(pulses, seed, kind, size):
-    """A quick fit of the shape at a seed, or None where it can't be one."""
-    known = _size(seed, size, 0.0)
-    beams = _beams(pulses, seed, kind, known.high)
-    if not seed.by_edges:
-        beyond = np.linalg.norm(beams[0] - seed.middle, axis=1) > 0.65 * diameter(kind, known.mean)
-        bright = pulses.intensity[seed.rows]
-        beams, level = _with_threshold(pulses.intensity, beams, bright, beyond, seed.threshold)
-        seed = replace(seed, threshold=float(level))
-    points, state, _ = beams
-    blur = known.mean / ROUGH_BLUR
-    start = seed.middle
-    outline = fit_outline(points, state, kind, known, blur, start, seed.by_edges, rough=True)
-    if kind == "circle" and not seed.by_edges and _dark_inside(points, state, outline):
-        outline = fit_outline(points, state, kind, known, blur, start, ring=True, rough=True)
-    verdict = judge(beams, outline, kind, seed, pulses, blur)
-    return _Fit(seed, kind, size, beams, outline, verdict) if verdict.plausible else None
-
-
-def _beams(pulses, seed, kind, size):
-    """Crossings, state and rows of the beams about a seed; row -1 where nothing returned."""
-    points, state, rows = beams_at_plane(
-        pulses, seed.plane, seed.middle, REACH * size, seed.threshold
-    )
-    if kind == "hole":
-        return points, state, rows
-    missed = missed_points(pulses, seed.rows, seed.plane)
-    unreturned = np.full(len(missed), -1)
-    return (
-        np.vstack([points, missed]),
-        np.append(state, np.full(len(missed), PASSED)),
-        np.append(rows, unreturned),
-    )
-
-
-def _exact_fit(pulses, fit, scanner, rng):
-    """The fit with its exact outline, or None where that doesn't fit or hold the centre."""
-    if _on_target(fit).sum() < FEWEST_POINTS / 2:
-        return None
-    fit = _refined(pulses, fit, rng)
-    seed, kind, ring = fit.seed, fit.kind, fit.outline.inner > 0
-    points, state, rows = fit.beams
-    blur, footprint = _blur(pulses, fit, scanner)
-    known, start = _size(seed, fit.size, footprint), seed.middle
-    outline = fit_outline(points, state, kind, known, blur, start, seed.by_edges, ring)
-    hidden = _contradicted(points[rows < 0], outline, form_of(kind, seed.by_edges), blur)
-    if hidden:
-        points, state, rows = points[rows >= 0], state[rows >= 0], rows[rows >= 0]
-        outline = fit_outline(points, state, kind, known, blur, start, seed.by_edges, ring)
-    beams = points, state, rows
-    verdict = judge(beams, outline, kind, seed, pulses, blur, hidden)
-    fit = replace(fit, beams=beams, outline=outline, verdict=verdict)
-    seen = _on_target(fit).sum() >= FEWEST_POINTS / 2
-    return fit if verdict.accepted and seen else None
-
-
-def _refined(pulses, fit, rng):
-    """The fit with plane and beams anew from all points that are on the target by the rough one."""
-    seed = fit.seed
-    on_target = fit.beams[2][_on_target(fit)]
-    plane = aligned(fit_plane(pulses.xyz[on_target], pulses.tolerance, rng), seed.plane)
-    shift = (fit.position - plane.origin) @ plane.axes[:2].T
-    seed = replace(seed, rows=on_target, plane=plane, middle=shift)
-    points, state, rows = beams = _beams(pulses, seed, fit.kind, fit.outline.size)
-    fit = replace(fit, seed=seed, outline=replace(fit.outline, centre=shift))
-    if not seed.by_edges and fit.kind != "checkerboard":  # whose threshold holds for both
-        inside = distance_inside(points, fit.outline.row, form_of(fit.kind, False))
-        beyond = inside < -0.05 * fit.outline.size
-        bright = pulses.intensity[rows[(state != PASSED) & (inside > 0)]]
-        beams, level = _with_threshold(pulses.intensity, beams, bright, beyond, seed.threshold)
-        seed = replace(seed, threshold=float(level))
-    return replace(fit, seed=seed, beams=beams)
-
-
-def _contradicted(missed, outline, form, blur):
-    """Whether beams that met nothing lie well inside the outline: then something out of sight
-    stood in front, and they say nothing."""
-    inside = distance_inside(missed, outline.row, form) > 3 * blur + 0.02 * outline.size
-    return inside.sum() > max(2, CONTRADICTED * len(missed))
-
-
-def _size(seed, size, footprint):
-    """What is known of the outline's size: the beam's width moves it to and fro."""
-    if size is None and seed.mesh:  # a hole is smaller than the gap by less than the mesh
-        low = max(seed.extent - 2 * seed.mesh, seed.extent / 2)
-        return Size((low + seed.extent) / 2, np.inf, low, seed.extent + seed.mesh / 2)
-    if size is None:
-        return Size(0.85 * seed.extent, np.inf, 0.55 * seed.extent, 1.2 * seed.extent)
-    sigma = np.hypot(MADE, footprint)
-    if seed.bloomed:
-        return Size(1.1 * size, np.inf, size - 4 * sigma, BLOOMED * size)
-    return Size(size, sigma, size - 4 * sigma, size + 4 * sigma)
-
-
-def _dark_inside(points, state, outline):
-    """Whether what lies about the centre of a disc is dark: then it is a ring."""
-    about = np.linalg.norm(points - outline.centre, axis=1) < 0.2 * outline.size
-    return (about & (state == DARK)).sum() > max(3, 0.5 * about.sum())
-
-
-def _on_target(fit):
-    """Which of the beams met the target: about a hole, the board within another radius."""
-    points, state, _ = fit.beams
-    row = fit.outline.row
-    row[4] = 0.0
-    inside = distance_inside(points, row, form_of(fit.kind, fit.seed.by_edges))
-    if fit.kind == "hole":
-        inside = np.where(inside < 0, inside + fit.outline.size / 2, -1.0)
-    on_plane = state != PASSED
-    if fit.kind in ("circle", "square") and not fit.seed.by_edges:
-        on_plane = state == BRIGHT
-    return on_plane & (inside > 0)
-
-
-def _with_threshold(intensity, beams, bright, outside, otherwise):
-    """The beams with their state by a threshold, and it: half way between bright and dark.
-
-    bright are intensities on the target, outside tells which beams certainly aren't; where none
-    of these returned from the plane, half as bright is dark, and where they are nearly as bright,
-    the threshold is the one given.
-    """
-    points, state, rows = beams
-    dark = intensity[rows[outside & (state != PASSED)]]
-    # the brighter of what lies outside: beside a dark board, the wall that it hangs on
-    dark = np.percentile(dark, 90) if len(dark) >= FEWEST_DARK else 0.0
-    bright = np.median(bright)
-    threshold = (bright + dark) / 2 if dark < ALIKE * bright else otherwise
-    returned = np.where(intensity[rows] >= threshold, BRIGHT, DARK)
-    return (points, np.where(state == PASSED, PASSED, returned), rows), threshold
-
-
-def _blur(pulses, fit, scanner):
-    """One sigma (m) of a beam's place across the outline, and that of the outline's size.
-
-    From angle noise and the beam's own width. A beam counts as bright from half its width on, and
-    how exactly half is as good as intensities repeat; at edges of plates nobody knows the share
-    that returns, but it is the same all round.
-    """
-    _, state, rows = fit.beams
-    on_target = _on_target(fit)
-    sight = pulses.sight[rows[on_target]].mean(axis=0)
-    distance = np.linalg.norm(sight)
-    cosine = abs(sight @ fit.seed.plane.axes[2]) / distance
-    slant = np.sqrt((1 + 1 / cosine**2) / 2)  # both ways in the plane, on average
-    beam = distance * BEAM_DIVERGENCE / 4 * slant
-    intensity = pulses.intensity[rows[on_target & (state == BRIGHT)]].astype(float)
-    speckle = 0.2
-    if len(intensity) > 5 and not fit.seed.by_edges:
-        spread = 0.74 * np.subtract(*np.percentile(intensity, [75, 25]))
-        speckle = float(np.clip(spread / max(np.median(intensity), 1e-9), 0.05, 0.5))
-    angle = distance * scanner.angle_noise * slant
-    return float(np.sqrt(angle**2 + (1.25 * speckle * beam) ** 2 + ROUNDING**2)), float(beam)
-
-
 def _as_target(pulses, fit, origin):
     """The fit in the map: centre, covariance, normal towards the scanner, time at the centre."""
     points, state, rows = fit.beams
     plane, outline = fit.seed.plane, fit.outline
-    met = rows[_on_target(fit) & (rows >= 0)]
+    met = rows[met_target(fit) & (rows >= 0)]
     centre = centre_of(pulses, plane, outline, met)
     turned = -plane.axes[2] if centre.away else plane.axes[2]
     size = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)

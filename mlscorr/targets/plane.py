@@ -6,6 +6,8 @@ import numpy as np
 
 FLOOR = 0.0001  # m, one sigma: what rounding leaves in a mean of many points
 TRIALS = 60  # finds a plane that holds half the points with probability 1 - 3e-4
+GOLDEN = 0.8191725133961645, 0.6710436067037893, 0.5497004779019703  # steps in three dimensions
+TRIPLES = (0.5 + np.arange(1, TRIALS + 1)[:, None] * np.array(GOLDEN)) % 1.0
 
 
 @dataclass(frozen=True)
@@ -51,16 +53,19 @@ def consensus(distance, tolerance):
     return np.clip(1.0 - (distance / tolerance) ** 2, 0.0, None).sum(axis=0)
 
 
-def fit_plane(xyz, tolerance, rng):
+def fit_plane(xyz, tolerance):
     """Plane through most points (n, 3), those within the tolerance (m) of it.
 
-    Source: Fischler and Bolles 1981; the consensus set is refined twice by least squares, the
-    second time within three sigmas. Raises ValueError for fewer than three points.
+    Source: Fischler and Bolles 1981, on triples that are spread evenly over all (Roberts 2018,
+    the R sequence) in place of random ones, so that the same points give the same plane; the
+    consensus set is refined twice by least squares, the second time within three sigmas.
+
+    Raises ValueError for fewer than three points.
     """
     if len(xyz) < 3:
         raise ValueError(f"A plane needs 3 points, there are {len(xyz)}.")
     local = xyz - xyz.mean(axis=0)
-    corners = local[rng.integers(len(local), size=(TRIALS, 3))]
+    corners = local[(TRIPLES * len(local)).astype(int)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     normals, corners = normals[length > 1e-9], corners[length > 1e-9]

@@ -8,6 +8,7 @@ from mlscorr.targets.candidates import PAUSE, Neighbourhoods
 from mlscorr.targets.clusters import split_by_time
 from mlscorr.targets.fit import fit_targets
 from mlscorr.targets.seeds import Spot
+from mlscorr.targets.visits import scanner_path
 
 OVERLAP = 1.0  # s: the scanner passes a target in less than that
 MOST_CARRIED = 0.25  # of a chunk: points that are looked at again, so that no target is cut in two
@@ -96,7 +97,8 @@ def _pieces(cloud, trajectory, lever_arm):
     near = cloud[rows]
     segment = trajectory.segment(near.gps_time)
     sight = np.full((len(rows), 3), np.nan)
-    sight[segment >= 0] = _sight(near[segment >= 0], trajectory, lever_arm)
+    placed = near[segment >= 0]
+    sight[segment >= 0] = placed.xyz - scanner_path(placed.gps_time, trajectory, lever_arm)
     for ball, spot in zip(balls, spots, strict=True):
         inside = np.searchsorted(rows, ball)
         for number in np.unique(segment[inside][segment[inside] >= 0]):
@@ -105,15 +107,3 @@ def _pieces(cloud, trajectory, lever_arm):
                 surplus = max(0, len(visit) - MOST_POINTS)
                 part = here[visit[surplus // 2 : len(visit) - (surplus + 1) // 2]]
                 yield near[part], sight[part], spot
-
-
-def _sight(cloud, trajectory, lever_arm):
-    """Scanner to point (n, 3) in m; the lever arm by the attitude of the nearest epoch, which is
-    exact enough for a direction and spares one interpolation of all attitudes for each chunk."""
-    time = trajectory.gps_time
-    after = np.clip(np.searchsorted(time, cloud.gps_time), 1, len(time) - 1)
-    epoch = after - (cloud.gps_time - time[after - 1] < time[after] - cloud.gps_time)
-    epochs, which = np.unique(epoch, return_inverse=True)
-    arm = trajectory.attitude[epochs].apply(lever_arm)[which]
-    position = [np.interp(cloud.gps_time, time, axis) for axis in trajectory.position.T]
-    return cloud.xyz - np.column_stack(position) - arm

@@ -65,24 +65,24 @@ class Spot:
     threshold: float
 
 
-def spot_seeds(pulses: Pulses, spot, origin, kind, size, rng):
+def spot_seeds(pulses: Pulses, spot, origin, kind, size):
     """Seeds in one bright blob (Spot) of a cloud about an origin (3,), as of bright_seeds."""
     apart = np.linalg.norm(pulses.xyz - (spot.centre - origin), axis=1)
     bright = pulses.intensity >= spot.threshold
     rows = np.flatnonzero((apart <= spot.reach) & bright)
     saturated = np.mean(pulses.intensity[rows] >= pulses.intensity.max()) > 0.5
     guess, bloomed = size or 1.4 * spot.reach, BLOOMED if saturated else 1.0
-    for seed in _flat_parts(pulses, rows, kind, size, guess, bloomed, rng):
+    for seed in _flat_parts(pulses, rows, kind, size, guess, bloomed):
         yield Seed(*seed[:2], spot.threshold, False, *seed[2:], saturated)
 
 
-def bright_seeds(pulses: Pulses, kind, size, rng):
+def bright_seeds(pulses: Pulses, kind, size):
     """Seeds at bright components of the extent of a shape; of any extent where size is None."""
     saturated = pulses.intensity.max()
     for guess in GUESSES if size is None else (size,):
         for level, rows in bright_components(pulses.xyz, pulses.intensity, guess):
             bloomed = BLOOMED if np.mean(pulses.intensity[rows] >= saturated) > 0.5 else 1.0
-            for seed in _flat_parts(pulses, rows, kind, size, guess, bloomed, rng):
+            for seed in _flat_parts(pulses, rows, kind, size, guess, bloomed):
                 yield Seed(*seed[:2], level, False, *seed[2:], bloomed > 1)
 
 
@@ -121,7 +121,7 @@ def flat_patches(pulses, size, rng):
         on_plane = np.abs(plane.coordinates(pulses.xyz[left])[:, 2]) <= pulses.tolerance
         if on_plane.sum() < fewest:
             return
-        plane = fit_plane(pulses.xyz[left[on_plane]], pulses.tolerance, rng)
+        plane = fit_plane(pulses.xyz[left[on_plane]], pulses.tolerance)
         height = np.abs(plane.coordinates(pulses.xyz)[:, 2])
         steep = np.abs(pulses.sight @ plane.axes[2]) > GRAZING * np.linalg.norm(
             pulses.sight, axis=1
@@ -146,13 +146,13 @@ def _most_common_plane(xyz, size, tolerance, rng):
     return plane_through(origin[best], normal[best])
 
 
-def _flat_parts(pulses, rows, kind, size, guess, bloomed, rng):
+def _flat_parts(pulses, rows, kind, size, guess, bloomed):
     """Flat parts of a component that have a shape's extent: itself, or what is left of it without
     a post or pole before or beside it."""
     for _ in range(3):
-        if len(rows) < FEWEST_POINTS:
+        if len(rows) < FEWEST_POINTS or _too_small(pulses, rows, size or guess):
             return
-        plane = fit_plane(pulses.xyz[rows], pulses.tolerance, rng)
+        plane = fit_plane(pulses.xyz[rows], pulses.tolerance)
         inside = plane.inliers
         whole = inside.mean() >= 0.7
         flat = rows[inside]
@@ -166,6 +166,12 @@ def _flat_parts(pulses, rows, kind, size, guess, bloomed, rng):
         if whole:
             return
         rows = rows[~inside]
+
+
+def _too_small(pulses, rows, size):
+    """Whether points are too close together for a shape of this size (m), on whatever plane."""
+    longest = np.linalg.norm(np.ptp(pulses.xyz[rows], axis=0))
+    return longest + 2 * pulses.tolerance < size / 2  # of a guess; of a known size, more is asked
 
 
 def _sized(pulses, rows, plane, kind, size, guess, bloomed):

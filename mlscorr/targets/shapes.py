@@ -4,10 +4,11 @@ A trial outline is a row of u, v (centre, m), turn (rad), size (m) and inner (sh
 that a ring's dark inner disc takes, 0 for none).
 """
 
-from math import erfc, log, sqrt
+from math import log
 
 import numpy as np
 from numba import njit
+from scipy.special import ndtr
 
 PASSED, DARK, BRIGHT = -1, 0, 1  # what a beam did at the plane: went by, met dark, met bright
 ROUND, SQUARE, CHECKERED = range(3)
@@ -21,8 +22,9 @@ FORMS = {
 PERIOD = {"square": np.pi / 2, "board": np.pi / 2, "checkerboard": np.pi}  # of turn; rad
 BY_EDGES = ("hole", "board")  # told by where beams pass, not by intensity
 WRONG_SIDE = 0.01  # share of beams that tell the wrong side whatever their distance (mixed returns)
-LOG_WRONG, LOG_RIGHT, SQRT2 = log(WRONG_SIDE), log(1 - WRONG_SIDE), sqrt(2)
+LOG_WRONG, LOG_RIGHT = log(WRONG_SIDE), log(1 - WRONG_SIDE)
 CERTAIN = 5.0  # sigmas from the outline, beyond which only WRONG_SIDE counts
+PER_SIGMA = 200  # entries of the tables, exact to 5e-6 between them
 
 
 def diameter(kind, size):
@@ -84,15 +86,34 @@ def distance_on_white(points, outline):
     return distance
 
 
+def _table():
+    """Probability that a beam tells inside, at every fraction of a sigma from the outline."""
+    z = np.arange(-CERTAIN * PER_SIGMA, CERTAIN * PER_SIGMA + 2) / PER_SIGMA
+    return WRONG_SIDE + (1 - 2 * WRONG_SIDE) * ndtr(z)
+
+
+SHARE = _table()
+LOG_SHARE = np.log(SHARE)
+
+
+@njit(cache=True)
+def _looked_up(table, z):
+    """Value of a table between its entries, z sigmas inside and not farther than CERTAIN."""
+    if np.isnan(z):  # of a beam along the plane
+        return z
+    place = (z + CERTAIN) * PER_SIGMA
+    entry = int(place)
+    return table[entry] + (place - entry) * (table[entry + 1] - table[entry])
+
+
 @njit(cache=True)
 def _share(distance, width):
     """Probability that a beam at this distance inside tells inside, blurred by width (m)."""
-    z = distance / width
-    if z > CERTAIN:
+    if distance > CERTAIN * width:
         return 1.0 - WRONG_SIDE
-    if z < -CERTAIN:
+    if distance < -CERTAIN * width:
         return WRONG_SIDE
-    return WRONG_SIDE + (0.5 - WRONG_SIDE) * erfc(-z / SQRT2)
+    return _looked_up(SHARE, distance / width)
 
 
 @njit(cache=True)
@@ -102,7 +123,7 @@ def _log_share(distance, width):
         return LOG_RIGHT
     if distance < -CERTAIN * width:
         return LOG_WRONG
-    return np.log(_share(distance, width))
+    return _looked_up(LOG_SHARE, distance / width)
 
 
 @njit(cache=True)
@@ -124,10 +145,10 @@ def log_likelihood(points, side, outlines, form, width):
             if form != 2:
                 total += _log_share(within * side[i], width)
                 continue
-            on_board = _share(within, width)
             if side[i] < 0:
-                total += np.log(1.0 - on_board)
+                total += _log_share(-within, width)
                 continue
+            on_board = _share(within, width)
             white = _on_white(x, y) * (1 if side[i] == 1 else -1)
             total += np.log(on_board * _share(white, width) + (1.0 - on_board) * 0.5)
         result[c] = total

@@ -51,13 +51,31 @@ def _farthest(path, first, last, forward):
     return first + int(np.argmax(path[first:last, :2] @ forward))
 
 
+def scanner_path(gps_time, trajectory, lever_arm):
+    """Where the scanner was (n, 3) at times (n,) within the trajectory; the lever arm (3,) by the
+    attitude of the nearest epoch, which is exact enough for a direction and spares slerps."""
+    time = trajectory.gps_time
+    after = np.clip(np.searchsorted(time, gps_time), 1, len(time) - 1)
+    epoch = after - (gps_time - time[after - 1] < time[after] - gps_time)
+    epochs, which = np.unique(epoch, return_inverse=True)
+    position = [np.interp(gps_time, time, axis) for axis in trajectory.position.T]
+    return np.column_stack(position) + trajectory.attitude[epochs].apply(lever_arm)[which]
+
+
 def motion_covariance(trajectory, gps_time, duration):
-    """Covariance (3, 3) of a centre as the POS error moves while the target is scanned. m^2.
+    """Covariance (n, 3, 3) of centres as the POS error moves while targets are scanned. m^2.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    gps_time, duration : (n,) array
+        Of each centre, and the standard deviation of its points' times. Units: s.
 
     Source: the rate of a smooth (Matern 3/2) process is sigma sqrt(3) / correlation time; the
     centre's time and the mean time of its points differ by at most their spread. The attitude's
     share is left out: an error of 0.1 mrad moves a target at 10 m by 1 mm in all.
     """
-    sigma = trajectory.at([gps_time]).position_sigma
-    sigma = np.full(3, Pos().position_sigma) if sigma is None else sigma[0]
-    return np.diag((sigma * np.sqrt(3) / Pos().correlation_time * duration) ** 2)
+    sigma = trajectory.at(gps_time).position_sigma
+    sigma = np.full((len(gps_time), 3), Pos().position_sigma) if sigma is None else sigma
+    moved = sigma * np.sqrt(3) / Pos().correlation_time * np.asarray(duration)[:, None]
+    return moved[:, :, None] ** 2 * np.eye(3)
