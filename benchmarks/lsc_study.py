@@ -208,6 +208,8 @@ def main():
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.seeds)
     if given.study == "windows":
+        if given.series is None:
+            parser.error("windows needs a file of real POS errors, as OB_GINS writes (.err)")
         windows(given.series)
     elif given.study == "adjacent":
         gross(seeds, adjacent=True)
