@@ -4,11 +4,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.baselines.geometry import Undetermined
+from mlscorr.collocation import LiteralSignal, Noise, collocate_literal
 from mlscorr.georeference import Correction, pose_partials
 from mlscorr.survey import Trajectory
 
 SAME_EPOCH = 1.0  # s; closer together, two targets say the same of the POS
 RATIO = 4.0  # correlation time over mean control interval: 3 to 5, section 3.1.4
+CHUNK = 1 << 16  # epochs predicted at once
 
 
 def fit_polynomial(trajectory, observations, control, order):
@@ -27,10 +29,8 @@ def fit_polynomial(trajectory, observations, control, order):
 
     Returns a Correction. Raises Undetermined unless more than order + 1 epochs see control.
     """
-    basis = _basis(observations.gps_time, order)
-    misclosure, noise = _misclosures(observations, control)
-    trend, _ = _solve_trend(basis, misclosure, noise)
-    return _correction(trajectory, _basis_at(trajectory, observations, order) @ trend)
+    solved = _solve(observations, control, order, [])
+    return _correction(trajectory, _predict(solved, trajectory, observations, order))
 
 
 def fit_literal(trajectory, observations, control, pos, order):
@@ -53,29 +53,47 @@ def fit_literal(trajectory, observations, control, pos, order):
     Undetermined unless more than order + 1 epochs see control.
     """
     gps_time = observations.gps_time
-    basis = _basis(gps_time, order)
-    misclosure, noise = _misclosures(observations, control)
+    _require(gps_time, order)
     c0 = _stated_variance(trajectory.at(gps_time), pos)
     partials = pose_partials(trajectory, observations.position, gps_time)  # B
-    total = (partials * c0) @ partials.swapaxes(1, 2) + noise
-    trend, weights = _solve_trend(basis, misclosure, total)
     correlation_time = RATIO * _interval(trajectory, gps_time)
-    sources = c0 * np.einsum("nij,ni->nj", partials, weights)  # C0 B^T V^-1 (l - A y)
-    signal = _decaying_sums(gps_time, sources, trajectory.gps_time, correlation_time)  # Eq. 15
-    signal[:, :3] += _basis_at(trajectory, observations, order) @ trend
+    signal = LiteralSignal(partials, c0, c0, correlation_time)
+    solved = _solve(observations, control, order, [signal])
     found = {"correlation_time": correlation_time, "c0": c0.tolist()}
-    return _correction(trajectory, signal[:, :3], signal[:, 3:]), found
+    return _correction(trajectory, _predict(solved, trajectory, observations, order)), found
 
 
-def _basis(gps_time, order):
-    """Legendre polynomials (n, order + 1) on the control span, where they are well conditioned."""
+def _solve(observations, control, order, signals):
+    """Literal collocation of the misclosures; without signals least squares."""
+    gps_time = observations.gps_time
+    _require(gps_time, order)
+    rows = [control.name.index(name) for name in observations.name]
+    noise = observations.covariance + control.sigma[rows][:, :, None] ** 2 * np.eye(3)  # Eq. 19
+    misclosure = control.position[rows] - observations.position
+    design = _design(gps_time, gps_time, order)
+    return collocate_literal(gps_time, misclosure, Noise(noise), design, signals)
+
+
+def _predict(solved, trajectory, observations, order):
+    """Pose error (n, 6) at every epoch: position in m, rotation about the map axes in rad."""
+    parts = []
+    for i in range(0, len(trajectory), CHUNK):
+        gps_time = trajectory.gps_time[i : i + CHUNK]
+        design = np.zeros((len(gps_time), 6, 3 * (order + 1)))
+        design[:, :3] = _design(gps_time, observations.gps_time, order)
+        partials = [np.broadcast_to(np.eye(6), (len(gps_time), 6, 6)) for _ in solved.signals]
+        parts.append(solved.predict(gps_time, design, partials)[0])
+    return np.concatenate(parts)
+
+
+def _require(gps_time, order):
+    """Refuse fewer control epochs than the polynomial needs."""
     epochs = len(_epochs(gps_time))
     if epochs <= order + 1:
         raise Undetermined(
             f"A polynomial of order {order} needs control points at {order + 2} epochs at least "
             f"(section 2.4.2 of the paper); here are {epochs}, {SAME_EPOCH:.0f} s or more apart."
         )
-    return _legendre(gps_time, gps_time, order)
 
 
 def _epochs(gps_time):
@@ -87,34 +105,12 @@ def _epochs(gps_time):
     return np.array(kept)
 
 
-def _basis_at(trajectory, observations, order):
-    return _legendre(trajectory.gps_time, observations.gps_time, order)
-
-
-def _legendre(gps_time, control_time, order):
+def _design(gps_time, control_time, order):
+    """Legendre trend per axis on the control span, (q, 3, 3 (order + 1))."""
     first, last = control_time.min(), control_time.max()
     argument = (gps_time - (first + last) / 2) / ((last - first) / 2)
-    return np.polynomial.legendre.legvander(argument, order)
-
-
-def _misclosures(observations, control):
-    """Misclosures (n, 3) in m and D_omega (n, 3, 3) in m^2  (Eq. 19)."""
-    rows = [control.name.index(name) for name in observations.name]
-    noise = observations.covariance + control.sigma[rows][:, :, None] ** 2 * np.eye(3)
-    return control.position[rows] - observations.position, noise
-
-
-def _solve_trend(basis, misclosure, covariance):
-    """Coefficients (order + 1, 3) by Eq. 13, and V^-1 (l - A y) (n, 3); V is block diagonal."""
-    terms = basis.shape[1]
-    design = np.einsum("ni,jk->njik", basis, np.eye(3)).reshape(-1, 3 * terms)
-    half = np.linalg.inv(np.linalg.cholesky(covariance))  # whitens each observation's three rows
-    whitened = np.einsum("nij,njk->nik", half, design.reshape(-1, 3, 3 * terms))
-    wanted = np.einsum("nij,nj->ni", half, misclosure)
-    flat = whitened.reshape(-1, 3 * terms)
-    trend = np.linalg.lstsq(flat, wanted.ravel(), rcond=None)[0].reshape(terms, 3)
-    residual = misclosure - basis @ trend
-    return trend, np.linalg.solve(covariance, residual[:, :, None])[:, :, 0]
+    basis = np.polynomial.legendre.legvander(argument, order)
+    return np.einsum("qi,jk->qjik", basis, np.eye(3)).reshape(len(basis), 3, -1)
 
 
 def _stated_variance(pose, pos):
@@ -138,33 +134,8 @@ def _interval(trajectory, gps_time):
     return float(epochs[-1] - epochs[0] - lost) / (len(epochs) - 1)
 
 
-def _decaying_sums(gps_time, sources, epochs, correlation_time):
-    """Sums (q, k) over sources (n, k) of source * exp(-|lag| / correlation time)  (Eq. 20).
-
-    The exponential forgets as it goes, so one sweep each way does what q times n terms would.
-    """
-    order = np.argsort(gps_time, kind="stable")
-    past = _sweep(gps_time[order], sources[order], epochs, correlation_time, "right")
-    back = order[::-1]
-    future = _sweep(-gps_time[back], sources[back], -epochs[::-1], correlation_time, "left")
-    return past + future[::-1]
-
-
-def _sweep(gps_time, sources, epochs, correlation_time, side):
-    """The part of the sources up to each epoch; side says whether one at it counts."""
-    sums = np.zeros((len(gps_time) + 1, sources.shape[1]))
-    fade = np.exp(-np.diff(gps_time, prepend=gps_time[0]) / correlation_time)
-    for i, source in enumerate(sources):
-        sums[i + 1] = sums[i] * fade[i] + source
-    last = np.searchsorted(gps_time, epochs, side=side)
-    age = epochs - gps_time[np.maximum(last - 1, 0)]
-    return sums[last] * np.exp(-np.maximum(age, 0.0) / correlation_time)[:, None]
-
-
-def _correction(trajectory, shift, turn=None):
-    """The corrected trajectory, as a Correction: shift (n, 3) in m, turn (n, 3) in rad."""
-    attitude = trajectory.attitude
-    if turn is not None:
-        attitude = Rotation.from_rotvec(turn) * attitude
-    corrected = Trajectory(trajectory.gps_time, trajectory.position + shift, attitude)
+def _correction(trajectory, pose):
+    """The trajectory corrected by pose errors (n, 6), as a Correction."""
+    attitude = Rotation.from_rotvec(pose[:, 3:]) * trajectory.attitude
+    corrected = Trajectory(trajectory.gps_time, trajectory.position + pose[:, :3], attitude)
     return Correction(trajectory, corrected)
