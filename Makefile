@@ -11,11 +11,14 @@ demo: $(VENV)/ready
 test: $(VENV)/ready
 	$(RUN)/ruff check .
 	$(RUN)/ruff format --check .
-	$(RUN)/python -m pytest
+	$(RUN)/python -m pytest -n 2 --dist loadfile
 
 bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench.py
 	$(RUN)/python benchmarks/bench_simulate.py
+	$(RUN)/python benchmarks/bench_collocation.py
+	$(RUN)/python benchmarks/bench_targets.py 2
+	$(RUN)/python benchmarks/bench_render.py
 
 examples: $(VENV)/ready
 	for script in examples/*.py; do $(RUN)/python $$script || exit 1; done

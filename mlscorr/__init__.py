@@ -2,8 +2,9 @@
 
 from importlib import import_module
 
-_HOMES = {"read_survey": "mlscorr.io.survey_file", "correct": "mlscorr.pipeline"}
-__all__ = ["correct", "read_survey", "simulate"]
+_PIPELINE = ("calibrate", "compare", "correct", "extract")
+_HOMES = {"read_survey": "mlscorr.io.survey_file"} | dict.fromkeys(_PIPELINE, "mlscorr.pipeline")
+__all__ = [*_PIPELINE, "read_survey", "simulate"]
 
 
 def __getattr__(name):

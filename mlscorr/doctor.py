@@ -17,10 +17,12 @@ PACKAGES = (
     "threadpoolctl",
     "numba",
     "pyproj",
+    "tomlkit",
     "typer",
     "rich",
     "pydantic",
     "matplotlib",
+    "pillow",
     "jinja2",
 )
 # shared library -> Debian package: what importing Open3D and drawing without a screen need

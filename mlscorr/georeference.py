@@ -58,6 +58,18 @@ def pose_partials(trajectory, position, gps_time):
     return np.concatenate([identity, -skew(arm)], axis=2)
 
 
+def mounting_partials(trajectory, mounting, position, gps_time):
+    """Partial derivatives (n, 3, 6) of map points by the mounting: R_P^G [I, -Phi(P)]  (Eq. 16-18).
+
+    The mounting is the lever arm (m) and a small rotation of the boresight about the body axes
+    (rad). P = R_L^P X_L (Eq. 17) is the point as seen from the scanner, in body axes.
+    """
+    pose = trajectory.at(gps_time)
+    rotation = pose.attitude.as_matrix()
+    beam = pose.attitude.inv().apply(position - pose.position) - mounting.lever_arm
+    return np.concatenate([rotation, -rotation @ skew(beam)], axis=2)
+
+
 @dataclass(frozen=True)
 class Correction:
     """The pair recorded -> corrected of trajectory and mounting, applied to points by their time.
@@ -69,6 +81,8 @@ class Correction:
         turn = R' C R^T - I,  shift = T' - T + R' (T_L^P' - C T_L^P)
 
     Both are small and smooth, so they, not the poses, are interpolated between epochs.
+    ``covariance`` (n, 6, 6), if known, is that of the corrected position (m) and of a small
+    rotation about the map axes (rad).
     Raises ValueError when the two trajectories have different epochs.
     """
 
@@ -76,6 +90,7 @@ class Correction:
     corrected: Trajectory
     recorded_mounting: Mounting | None = None
     corrected_mounting: Mounting | None = None
+    covariance: np.ndarray | None = None
 
     def __post_init__(self):
         if not np.array_equal(self.recorded.gps_time, self.corrected.gps_time):
@@ -110,7 +125,7 @@ class Correction:
             np.ascontiguousarray(xyz - self.origin),
             self.recorded.gps_time,
             self._step,
-            self._is_gap,
+            self.is_gap,
             self.table,
             increments,
             inside,
@@ -149,7 +164,7 @@ class Correction:
             float(time_constant),
             self.recorded.gps_time,
             self._step,
-            self._is_gap,
+            self.is_gap,
             self.table,
         )
         if overflow:
@@ -165,7 +180,7 @@ class Correction:
         return float(np.median(np.diff(self.recorded.gps_time)))
 
     @cached_property
-    def _is_gap(self):
+    def is_gap(self):
         """Whether the step after each epoch is a gap: (n,) bool."""
         gap = np.isin(self.recorded.gps_time, self.recorded.gaps[:, 0])
         gap[-1] = True
@@ -173,7 +188,7 @@ class Correction:
 
 
 @njit(cache=True, nogil=True)
-def _locate(gps_time, constant, epochs, step, is_gap):
+def locate(gps_time, constant, epochs, step, is_gap):
     """Index i with epochs[i] <= time <= epochs[i + 1] for each point (n,); -1 outside and in gaps.
 
     From the epoch before by one, then by leaps of the usual step, each from where the last one
@@ -218,7 +233,7 @@ def _increment(x, y, z, weight, a, b):
 
 @njit(cache=True, nogil=True)
 def _increments(gps_time, xyz, epochs, step, is_gap, table, increments, inside):
-    index = _locate(gps_time, 0.0, epochs, step, is_gap)
+    index = locate(gps_time, 0.0, epochs, step, is_gap)
     for p in range(gps_time.size):
         i = index[p]
         if i < 0:
@@ -232,7 +247,7 @@ def _increments(gps_time, xyz, epochs, step, is_gap, table, increments, inside):
 
 @njit(cache=True, nogil=True)
 def _shift_integers(xs, ys, zs, scale, offset, gps_time, constant, epochs, step, is_gap, table):
-    index = _locate(gps_time, constant, epochs, step, is_gap)
+    index = locate(gps_time, constant, epochs, step, is_gap)
     outside = 0
     overflow = 0
     limit = 2147483647.0

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 GAP_FACTOR = 10.0  # a step longer than ten median steps is a gap
-KINDS = ("circle", "square")
+KINDS = ("circle", "square", "hole", "checkerboard", "board")  # of targets, see ControlPoints
 
 
 def attitude_from_angles(roll, pitch, heading):
@@ -132,10 +132,15 @@ class _Epochs(Trajectory):
 
 @dataclass(frozen=True)
 class Mounting:
-    """Scanner frame to body frame: lever_arm (3,) in m and boresight R_L^P."""
+    """Scanner frame to body frame: lever_arm (3,) in m and boresight R_L^P.
+
+    covariance (6, 6), if known, is that of the lever arm (m) and of a small rotation of the
+    boresight about the body axes (rad).
+    """
 
     lever_arm: np.ndarray
     boresight: Rotation
+    covariance: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -184,7 +189,9 @@ class ControlPoints:
     sigma : (n, 3) array
         One sigma of E, N, H. Units: m.
     kind : tuple of n str
-        ``circle`` (size is the disc's diameter) or ``square`` (size is the edge).
+        ``circle`` (bright disc or ring; size is its diameter), ``square`` (bright plate; its edge),
+        ``hole`` (circular, in a board; its diameter), ``checkerboard`` (two white and two black
+        quadrants; the edge of all four) or ``board`` (plain plate, told by its edges; its edge).
     size : (n,) array
         Units: m.
     normal : (n, 3) array

@@ -148,9 +148,9 @@ BAD = [
     # survey.toml: exit code 2
     (
         "missing key",
-        edit("survey.toml", '[control]\nfile = "control.csv"', ""),
+        edit("survey.toml", '[trajectory]\nfile = "trajectory.csv"', ""),
         2,
-        ["control is missing"],
+        ["trajectory is missing"],
     ),
     (
         "unknown key",
@@ -365,6 +365,26 @@ def test_paths_may_be_relative_with_spaces_and_umlauts(commanded):
     assert [path.name for path in out.parent.iterdir()] == [out.name]
 
 
+def test_a_quality_gate_fails_with_everything_written_and_nothing_else_said(survey):
+    "Exit code 6 and one line for each gate that is met; the results are whole, stderr quiet"
+    out = survey.parent / "out"
+    gates = ["--fail-if", "check.rmse_h > 0.000001", "--fail-if", "check.max_3d > 5"]
+    process = mlscorr("correct", survey, "-o", out, *gates, "--quiet")
+    assert process.returncode == 6
+    (line,) = process.stderr.splitlines()
+    assert line.startswith("Quality gate failed: check.rmse_h: rmse of check points in height")
+    assert (out / "report.html").exists() and (out / "pass-1.laz").exists()
+
+
+def test_a_gate_that_cannot_be_read_stops_before_any_work(survey):
+    "Exit code 2 and the nearest name; no folder appears"
+    out = survey.parent / "out"
+    process = mlscorr("correct", survey, "-o", out, "--fail-if", "check.rms_h > 0.03")
+    assert process.returncode == 2
+    assert "'check.rmse_h'" in process.stderr
+    assert not out.exists()
+
+
 def test_points_without_a_pose_are_counted_and_the_rest_is_done(in_part):
     "Exit code 4; stderr says how many of how many, and which target was not used"
     process, out = in_part
@@ -431,7 +451,7 @@ def test_an_interruption_while_writing_leaves_nothing(number, survey):
     before = content(survey)
     code, stderr = interrupt(survey, number, writing_has_begun)
     assert code == 130
-    assert stderr == "Interrupted; nothing was written.\n"
+    assert stderr.splitlines()[-1] == "Interrupted; nothing was written."
     assert list(survey.parent.iterdir()) == [survey]
     assert content(survey) == before
 

@@ -11,11 +11,11 @@ import mlscorr
 
 PACKAGE = Path(mlscorr.__file__).parent
 FLOORS = (  # from the ground up; rooms on one floor do not know each other
-    ("survey", "covariance"),
+    ("survey", "covariance", "accuracy"),
     ("georeference", "collocation"),
-    ("effects", "matching", "io"),
+    ("effects", "matching", "io", "uncertainty"),
     ("targets", "correction", "calibration", "baselines"),
-    ("simulate", "evaluation"),
+    ("simulate", "evaluation", "quality"),
     ("gap", "report"),
     ("pipeline", "doctor"),
     ("cli",),

@@ -49,6 +49,7 @@ def observations(local, kind="circle", size=0.6, pass_number=1):
     )
 
 
+EAST = np.array([1.0, 0.0, 0.0])
 PLACES = np.array([[5.0, 100.0 * i + 50.0, 1.0] for i in range(10)])
 
 
@@ -107,19 +108,21 @@ def test_two_look_alikes_apart_are_told_apart():
     assert found.matched.name == ("T01", "T02")
 
 
-def test_ambiguous_look_alikes_are_both_refused():
-    "Observations halfway between two surveyed points could be either: neither is named"
+def test_an_observation_between_look_alikes_is_refused():
+    "An observation alone, halfway between two surveyed points, could be either: it stays unnamed"
     places = np.array([[5.0, 50.0, 1.0], [5.0, 51.0, 1.0]])
-    seen = places + np.array([0.0, 0.45, 0.0])
-    found = match(observations(seen), control_points(places), trajectory())
+    found = match(
+        observations(places[:1] + np.array([0.0, 0.45, 0.0])), control_points(places), trajectory()
+    )
     assert len(found.matched) == 0
-    assert len(found.unmatched) == 2
+    assert len(found.unmatched) == 1
     assert {refusal.name for refusal in found.refusals} == {"T01", "T02"}
     for refusal in found.refusals:
         assert refusal.pass_number == 1
-        assert "T01" in refusal.reason or "T02" in refusal.reason
+        assert "T01" in refusal.reason and "T02" in refusal.reason
         assert "claim" in refusal.reason
         assert "gate 1.00 m" in refusal.reason
+    assert found.reasons == (found.refusals[0].reason,)
 
 
 def test_the_sentence_of_an_ambiguity_gives_the_numbers():
@@ -138,7 +141,7 @@ def test_unseen_control_has_a_reason_with_the_nearest_find():
     found = match(observations(PLACES[:1]), control_points(PLACES[:2]), trajectory())
     (refusal,) = found.refusals
     assert (refusal.name, refusal.pass_number) == ("T02", None)
-    assert "nearest one found lies 100.00 m away" in refusal.reason
+    assert "the nearest one found, at 357705.0 s, lies 100.00 m away and is T01" in refusal.reason
 
 
 def test_nothing_observed_gives_every_control_a_reason():
@@ -158,12 +161,13 @@ def test_an_observation_without_control_is_left_over():
 
 
 def test_a_control_point_is_matched_once_in_a_pass():
-    "Of two finds near one surveyed point the clearly nearer one gets it"
-    seen = PLACES[[0, 0]] + [[0.0, 0.1, 0.0], [0.0, 0.8, 0.0]]
-    found = match(observations(seen), control_points(PLACES[:1]), trajectory())
-    assert found.matched.name == ("T01",)
+    "Of two finds near one surveyed point the one that agrees with the neighbours gets it"
+    seen = np.vstack([PLACES, PLACES[:1] + np.array([0.0, 0.7, 0.0])]) + np.array([0.0, 0.1, 0.0])
+    found = match(observations(seen), control_points(PLACES), trajectory())
+    assert found.matched.name == control_points(PLACES).name
     assert np.array_equal(found.matched.position[0], ORIGIN + seen[0])
     assert len(found.unmatched) == 1
+    assert "T01, another observation of this pass" in found.reasons[0]
 
 
 def test_two_finds_as_near_as_each_other_are_refused():
@@ -175,13 +179,30 @@ def test_two_finds_as_near_as_each_other_are_refused():
     assert "both claim T01" in found.refusals[0].reason
 
 
-def test_each_pass_is_matched_by_itself():
-    "Two passes of other misclosures each get the same ten names"
-    seen = np.vstack([PLACES + np.array([0.4, 0, 0]), PLACES - np.array([0.4, 0, 0])])
-    passes = np.repeat([1, 2], 10)
-    found = match(observations(seen, pass_number=passes), control_points(PLACES), trajectory())
+def test_each_pass_has_its_own_misclosure():
+    "Two passes 400 s apart, 0.8 m from each other, each get the same ten names"
+    one = trajectory(lambda t: np.full(len(t), 0.3))
+    seen = observations(PLACES + 0.4 * EAST), observations(PLACES - 0.4 * EAST, pass_number=2)
+    drive = Trajectory(
+        np.append(one.gps_time, one.gps_time + 400.0),
+        np.vstack([one.position, one.position]),
+        attitude_from_angles(0.0, 0.0, np.zeros(2 * len(one))),
+        np.vstack([one.position_sigma, one.position_sigma]),
+    )
+    both = TargetObservations(
+        (None,) * 20,
+        np.repeat([1, 2], 10),
+        np.append(seen[0].gps_time, seen[1].gps_time + 400.0),
+        np.vstack([part.position for part in seen]),
+        np.vstack([part.covariance for part in seen]),
+        np.vstack([part.normal for part in seen]),
+        seen[0].kind * 2,
+        np.append(seen[0].size, seen[1].size),
+        np.append(seen[0].points, seen[1].points),
+    )
+    found = match(both, control_points(PLACES), drive)
     assert found.matched.name == control_points(PLACES).name * 2
-    assert np.array_equal(found.matched.pass_number, passes)
+    assert np.array_equal(found.matched.pass_number, both.pass_number)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -199,12 +220,14 @@ def test_smooth_drift_of_two_metres_between_targets_ten_metres_apart(seed):
     assert found.refusals == ()
 
 
-def test_origin_does_not_matter():
-    "Only differences count: local coordinates give the same names"
-    control, seen = control_points(PLACES), observations(PLACES + 0.4)
+def test_origin_and_time_zero_do_not_matter():
+    "Only differences count: local coordinates and times give the same names and probabilities"
+    control, seen, drive = control_points(PLACES), observations(PLACES + 0.4), trajectory()
     near = match(
-        replace(seen, position=seen.position - ORIGIN),
+        replace(seen, position=seen.position - ORIGIN, gps_time=seen.gps_time - START),
         replace(control, position=control.position - ORIGIN),
-        trajectory(),
+        replace(drive, position=drive.position - ORIGIN, gps_time=drive.gps_time - START),
     )
-    assert near.matched.name == match(seen, control, trajectory()).matched.name
+    far = match(seen, control, drive)
+    assert near.matched.name == far.matched.name == control.name
+    assert near.probability == pytest.approx(far.probability, abs=1e-6)

@@ -175,7 +175,7 @@ def recorded(survey):
     }
 
 
-@pytest.mark.parametrize(("effect", "changes"), EFFECTS, ids=lambda value: str(value)[:30])
+@pytest.mark.parametrize(("effect", "changes"), EFFECTS, ids=[one["name"] for one, _ in EFFECTS])
 def test_an_effect_changes_what_its_stage_declares_and_nothing_else(short, effect, changes):
     "Every other recorded quantity stays bit for bit, and with magnitude zero all do"
     plain, changed = recorded(short), recorded(make(with_effects(SHORT, effect)))

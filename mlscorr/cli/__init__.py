@@ -5,13 +5,17 @@ import warnings
 
 import typer
 
+from mlscorr.cli.calibrate import calibrate
+from mlscorr.cli.compare import compare
 from mlscorr.cli.correct import correct
 from mlscorr.cli.demo import demo
 from mlscorr.cli.doctor import doctor
+from mlscorr.cli.extract import extract
+from mlscorr.cli.render import render
 from mlscorr.cli.simulate import simulate
-from mlscorr.cli.terminal import interrupt, say
+from mlscorr.cli.terminal import interrupt, warn
 
-COMMANDS = (correct, demo, simulate, doctor)
+COMMANDS = (correct, extract, calibrate, compare, render, demo, simulate, doctor)
 
 app = typer.Typer(
     help="Correct mobile laser scans with surveyed targets by least squares collocation.",
@@ -30,5 +34,5 @@ def main():
         signal.signal(number, interrupt)
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as it is under nohup
         signal.signal(signal.SIGHUP, interrupt)
-    warnings.showwarning = lambda message, *_, **__: say(f"Warning: {message}")
+    warnings.showwarning = lambda message, *_, **__: warn(f"Warning: {message}")
     app()

@@ -5,15 +5,17 @@ from typing import Annotated
 
 import typer
 
+from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.terminal import (
     Exit,
     Json,
     Out,
     Overwrite,
+    Quiet,
     SurveyFile,
     exit_code,
-    progress_bars,
     say,
+    warn,
 )
 
 
@@ -23,31 +25,48 @@ def correct(
     order: Annotated[
         int, typer.Option(min=0, max=9, help="Order of the polynomial trend of the position.")
     ] = 1,
+    sigma: Annotated[
+        bool, typer.Option("--sigma", help="Add to each point one sigma of its E, N and H.")
+    ] = False,
+    fail_if: Annotated[
+        list[str],
+        typer.Option(
+            help='A quality gate, as "check.rmse_3d > 0.05" (m); e, n, h stand for easting, '
+            "northing, height. Exit code 6 if one is met; all results are written."
+        ),
+    ] = (),
     overwrite: Overwrite = False,
     as_json: Json = False,
+    quiet: Quiet = False,
 ):
     """Correct the cloud of a survey with its control points, and report on it."""
     with exit_code(Exit.USAGE):
         from mlscorr.io.output import check_output
         from mlscorr.io.survey_file import input_files, read_survey
+        from mlscorr.quality import failures, read_gate
 
+        gates = [read_gate(text) for text in fail_if]
         check_output(out, input_files(survey), overwrite)
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         recorded = read_survey(survey)
         from mlscorr.pipeline import correct
 
         result = correct(recorded, order, progress=progress)
-        report = result.write(out, overwrite, progress)
+        report = result.write(out, overwrite, progress, sigma)
     tell(report, out, as_json)
     outside = report["coverage"]["points_outside_trajectory"]
     if outside:
         total = sum(file["points"] for file in report["files"])
-        say(
+        warn(
             f"{outside} of {total} points lie outside the trajectory or in its gaps "
             f"[{recorded.trajectory.gps_time[0]:.3f}, {recorded.trajectory.gps_time[-1]:.3f}] s "
             "and were left as they were."
         )
-        raise typer.Exit(Exit.IN_PART)
+    failed = failures(gates, report)
+    for sentence in failed:
+        warn(f"Quality gate failed: {sentence}")
+    if failed or outside:
+        raise typer.Exit(Exit.QUALITY_GATE if failed else Exit.IN_PART)
 
 
 def tell(report, out, as_json):

@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.correct import tell
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, exit_code, progress_bars, say
+from mlscorr.cli.progress import progress_bars
+from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, exit_code, say
 
 
 def demo(
@@ -14,6 +15,7 @@ def demo(
     seed: Annotated[int, typer.Option(help="Of the simulated survey.")] = 1,
     overwrite: Overwrite = False,
     as_json: Json = False,
+    quiet: Quiet = False,
 ):
     """Make a small simulated survey, correct it, and show the report."""
     with exit_code(Exit.USAGE):

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, exit_code, progress_bars, say
+from mlscorr.cli.progress import progress_bars
+from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, exit_code, say
 
 
 def simulate(
@@ -15,6 +16,7 @@ def simulate(
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 1,
     overwrite: Overwrite = False,
     as_json: Json = False,
+    quiet: Quiet = False,
 ):
     """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
     with exit_code(Exit.USAGE):

@@ -1,4 +1,4 @@
-"""What all commands share: options, exit codes, sentences and bars on stderr."""
+"""What all commands share: options, exit codes, and sentences on stderr."""
 
 import signal
 import sys
@@ -9,9 +9,26 @@ from typing import Annotated
 
 import typer
 
+_voice = {"quiet": False}  # of this process's stderr
+
+
+def be_quiet(quiet):
+    """Say nothing more than errors and warnings, if so."""
+    _voice["quiet"] = quiet
+    return quiet
+
+
+def is_quiet():
+    """Whether only errors and warnings are said."""
+    return _voice["quiet"]
+
+
 SurveyFile = Annotated[Path, typer.Argument(help="survey.toml, or the folder that holds it.")]
 Out = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
 Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in the folder.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Print errors and warnings only.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 
@@ -23,6 +40,7 @@ class Exit(IntEnum):
     BAD_DATA = 3
     IN_PART = 4
     READ_OR_WRITE = 5
+    QUALITY_GATE = 6
     LIBRARY_MISSING = 7
     INTERRUPTED = 130
 
@@ -53,30 +71,22 @@ def exit_code(code):
 
 
 def fail(message, code):
-    say(f"Error: {message}")
+    warn(f"Error: {message}")
     raise typer.Exit(code) from None
 
 
 def stop():
     signal.setitimer(signal.ITIMER_REAL, 0.0)
-    say("Interrupted; nothing was written.")
+    warn("Interrupted; nothing was written.")
     raise typer.Exit(Exit.INTERRUPTED) from None
 
 
 def say(text):
+    """A sentence on stderr, unless it should be quiet."""
+    if not is_quiet():
+        warn(text)
+
+
+def warn(text):
+    """A sentence on stderr in any case."""
     print(text, file=sys.stderr)
-
-
-@contextmanager
-def progress_bars():
-    """Bars on stderr, on a terminal: progress(title, total) gives a function of points done."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as bars:
-
-        def progress(title, total):
-            task = bars.add_task(title, total=total)
-            return lambda points: bars.advance(task, points)
-
-        yield progress

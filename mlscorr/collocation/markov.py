@@ -19,7 +19,7 @@ from mlscorr.collocation.states import Layout
 CHUNK = 1 << 16  # epochs predicted at once: copies of broadcast designs and mixings stay small
 
 
-def collocate_markov(gps_time, misclosure, noise, design, signals):
+def collocate(gps_time, misclosure, noise, design, signals):
     r"""Separate misclosures into trend, signal and noise.
 
     Solves l = A x + B s + n with one covariance function throughout (Mao et al. 2015,
@@ -45,12 +45,12 @@ def collocate_markov(gps_time, misclosure, noise, design, signals):
     Returns a Collocation. Raises ValueError when a number is not finite, the trend is not
     determined (rank of A) or the covariance of the observations is not positive definite.
 
-    >>> from mlscorr.collocation import Noise, Signal
+    >>> from mlscorr.collocation import Noise, Signal, collocate
     >>> from mlscorr.covariance import Covariance
     >>> time, one = np.array([0.0, 10.0, 20.0]) + 413200.0, np.ones((3, 1, 1))
     >>> signal = Signal(0.1 * one, Covariance("matern32", 30.0))
     >>> noise = Noise(1e-6 * one)
-    >>> solved = collocate_markov(time, np.full((3, 1), 0.5), noise, one, [signal])
+    >>> solved = collocate(time, np.full((3, 1), 0.5), noise, one, [signal])
     >>> solved.trend.round(6)
     array([0.5])
     >>> mean, covariance = solved.predict(time[:1] + 5.0, one[:1], [0.1 * one[:1]])

@@ -1,10 +1,11 @@
 """The observation equations of the POS error, and its signals at any epoch (Eq. 7-12)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from mlscorr.collocation import Signal, collocate
+from mlscorr.collocation import Noise, Signal, collocate
 from mlscorr.covariance import Covariance
 from mlscorr.georeference import pose_partials
 from mlscorr.survey import Pos, Trajectory
@@ -15,13 +16,19 @@ SAME_EPOCH = 1.0  # s; closer together, two targets say the same of the POS
 
 @dataclass(frozen=True)
 class Parameters:
-    """What is chosen by likelihood: factors on the stated sigmas, and correlation times in s."""
+    """What is chosen by likelihood: factors on the stated sigmas, and correlation times in s.
+
+    The attitude's correlation time is that of the drift.
+    """
 
     family: str
     drift_scale: float
     drift_time: float
     jitter_scale: float
     jitter_time: float
+    bias_scale: float
+    bias_time: float
+    attitude_scale: float
 
 
 @dataclass(frozen=True)
@@ -31,6 +38,10 @@ class Sigmas:
     drift: np.ndarray
     jitter: np.ndarray
     attitude: np.ndarray
+
+    def at(self, rows):
+        """Those of some epochs."""
+        return Sigmas(self.drift[rows], self.jitter[rows], self.attitude[rows])
 
 
 def stated_sigmas(trajectory, pos, reference):
@@ -67,7 +78,7 @@ class Model:
     names: np.ndarray
     gps_time: np.ndarray
     misclosure: np.ndarray  # (n, 3)
-    noise: np.ndarray  # (3n, 3n)
+    noise: Noise
     partials: np.ndarray  # (n, 3, 6)
     sigmas: Sigmas
     trajectory: Trajectory
@@ -82,7 +93,7 @@ class Model:
             names=np.array(observations.name),
             gps_time=observations.gps_time,
             misclosure=control.position[row] - observations.position,
-            noise=_noise(observations, control.sigma[row]),
+            noise=Noise(observations.covariance, np.array(row), control.sigma),  # Eq. 19
             partials=pose_partials(trajectory, observations.position, observations.gps_time),
             sigmas=stated_sigmas(at_targets, pos, trajectory),
             trajectory=trajectory,
@@ -92,18 +103,25 @@ class Model:
     def select(self, rows):
         """The observation equations of some targets: (n,) bool, or their numbers."""
         rows = np.flatnonzero(rows) if rows.dtype == bool else rows
-        wide = (3 * rows[:, None] + np.arange(3)).ravel()
-        parts = (self.sigmas.drift[rows], self.sigmas.jitter[rows], self.sigmas.attitude[rows])
         return Model(
             self.names[rows],
             self.gps_time[rows],
             self.misclosure[rows],
-            self.noise[np.ix_(wide, wide)],
+            self.noise.select(rows),
             self.partials[rows],
-            Sigmas(*parts),
+            self.sigmas.at(rows),
             self.trajectory,
             self.pos,
         )
+
+    def without(self, names):
+        """The observation equations of all targets but some."""
+        return self.select(~np.isin(self.names, list(names))) if names else self
+
+    @cached_property
+    def stated(self):
+        """Sigmas at every epoch of the trajectory."""
+        return stated_sigmas(self.trajectory, self.pos, self.trajectory)
 
     @property
     def span(self):
@@ -151,32 +169,24 @@ class Model:
     def solve(self, parameters, order):
         """Collocation of these targets under given parameters."""
         signals = pose_signals(self.sigmas, parameters, self.partials)
-        return collocate(
-            np.repeat(self.gps_time, 3),
-            self.misclosure.ravel(),
-            self.noise,
-            self.design(self.gps_time, order).reshape(self.misclosure.size, -1),
-            [Signal(s.mixing.reshape(self.misclosure.size, -1), s.covariance) for s in signals],
-        )
-
-
-def _noise(observations, survey_sigma):
-    """Survey + extraction covariance (Eq. 19); passes share the survey error of a target."""
-    n = len(observations)
-    names = np.array(observations.name)
-    same = names[:, None] == names
-    noise = np.einsum("ij,ik,kl->ikjl", same, survey_sigma**2, np.eye(3))
-    noise[np.arange(n), :, np.arange(n), :] += observations.covariance
-    return noise.reshape(3 * n, 3 * n)
+        design = self.design(self.gps_time, order)
+        return collocate(self.gps_time, self.misclosure, self.noise, design, signals)
 
 
 def pose_signals(sigmas, parameters, partials):
     """Signals as they enter three axes of n points; partials (n, 3, 6) by position and attitude."""
     position, rotation = partials[:, :, :3], partials[:, :, 3:]
     drift = Covariance(parameters.family, parameters.drift_time)
+    attitude = Signal(parameters.attitude_scale * rotation @ sigmas.attitude, drift)
+    moved = Signal(parameters.drift_scale * position @ sigmas.drift, drift)
+    if not np.any(sigmas.jitter):
+        return moved, attitude
     jitter = Covariance("exponential", parameters.jitter_time)
+    bias = Covariance(parameters.family, parameters.bias_time)
+    held = position @ sigmas.jitter
     return (
-        Signal(parameters.drift_scale * position @ sigmas.drift, drift),
-        Signal(parameters.jitter_scale * position @ sigmas.jitter, jitter),
-        Signal(rotation @ sigmas.attitude, drift),
+        moved,
+        Signal(parameters.jitter_scale * held, jitter),
+        Signal(parameters.bias_scale * held, bias),
+        attitude,
     )

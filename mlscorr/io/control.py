@@ -15,6 +15,8 @@ COLUMNS = ("name", *POSITION, "sigma_horizontal", "sigma_vertical", "kind", "siz
 NORMAL = ("normal_e", "normal_n", "normal_h")
 ROLES = ("control", "check")
 LARGEST_TARGET = 10.0  # m, the size beyond which it was certainly given in mm
+SMALLEST_TARGET = 0.02  # m: the scanners' beams are as wide
+USUAL = 0.05, 1.5  # m, of targets
 LARGEST_COORDINATE = 1e8  # m, twice the Earth's girth and more; map zones prefixed to E fit in
 COARSE_SIGMA = 0.5  # m, beyond which a surveyed point corrects nothing
 
@@ -43,6 +45,13 @@ def read_control(path):
     for row in rows:
         _check(path, row)
     return tuple(_points([row for row in rows if row["role"] == role]) for role in ROLES)
+
+
+def holds_points(path):
+    """Whether a file holds more than a header; an empty one stands for no control at all."""
+    with Path(path).open(encoding=ENCODING, errors="replace") as file:
+        lines = (line for line in file if line.strip(" \t\r\n,;"))
+        return sum(1 for _ in zip(lines, range(2), strict=False)) > 1
 
 
 def _rows(path, skip, header, columns):
@@ -89,13 +98,14 @@ def _check(path, row):
     for key, known in (("kind", KINDS), ("role", ROLES)):
         if row[key] not in known:
             raise ValueError(
-                f"{who} has the unknown {key} '{row[key]}'; known are {' and '.join(known)}. "
+                f"{who} has the unknown {key} '{row[key]}'; known are "
+                f"{', '.join(known[:-1])} and {known[-1]}. "
                 f"Is {nearest(row[key], known)} meant?"
             )
-    if not 0 < row["size"] <= LARGEST_TARGET:
-        cause = "millimetres?" if row["size"] > 0 else "a diameter or edge is positive."
+    if not SMALLEST_TARGET <= row["size"] <= LARGEST_TARGET:
         raise ValueError(
-            f"{who} has the size {row['size']:g} m, outside (0, {LARGEST_TARGET:g}] m: {cause}"
+            f"{who} has the size {row['size']:g} m, outside [{SMALLEST_TARGET:g}, "
+            f"{LARGEST_TARGET:g}] m: {_likely_unit(row['size'])}"
         )
     for key in POSITION:
         if abs(row[key]) > LARGEST_COORDINATE:
@@ -118,6 +128,16 @@ def _check(path, row):
         )
 
 
+def _likely_unit(size):
+    """What may be meant by a size that can't be metres."""
+    if size <= 0:
+        return "a diameter or edge is positive."
+    for unit, factor in (("centimetres", 0.01), ("millimetres", 0.001)):
+        if USUAL[0] <= factor * size <= USUAL[1]:
+            return f"{unit}? Then give {factor * size:g}."
+    return "sizes are in metres; is the decimal point misplaced, or another unit meant?"
+
+
 def _points(rows):
     """ControlPoints of rows; none of them gives an empty one."""
 
@@ -134,3 +154,6 @@ def _points(rows):
         size=numbers("size")[:, 0],
         normal=normal / np.linalg.norm(normal, axis=1, keepdims=True),
     )
+
+
+NO_POINTS = _points([])

@@ -9,17 +9,20 @@ import io
 import os
 import shutil
 import struct
+from functools import partial
 from pathlib import Path
 
 import lazrs
 import numpy as np
 
+from mlscorr.io.extra_bytes import add_sigma_fields, with_sigmas
 from mlscorr.io.las_layout import COMPRESSED, LASZIP, RECORD_LENGTHS, read_layout
 from mlscorr.survey import PointCloud
 
 PLACES = 65  # sampled over a file
 CHUNK_SIZE = 1_000_000  # points
 BLOCK = 1 << 20  # bytes
+INTEGER_LIMIT = 2**31 - 1  # of the coordinates in a file
 
 
 def sample_gps_times(path):
@@ -58,7 +61,7 @@ def read_chunks(cloud_file, chunk_size=CHUNK_SIZE):
         yield PointCloud(xyz, times, records["intensity"].copy())
 
 
-def write_corrected(cloud_file, target, correction, watch=None):
+def write_corrected(cloud_file, target, correction, watch=None, sigma=None):
     """Copy a CloudFile with corrected coordinates; all else stays as it was, byte for byte.
 
     What changes: X, Y, Z of each point, the bounds in the header, and where it must, the
@@ -71,9 +74,11 @@ def write_corrected(cloud_file, target, correction, watch=None):
     cloud_file : CloudFile
     target : path
         ``.las`` or ``.laz``, not the input.
-    correction : Correction
+    correction : Correction, or anything else with ``apply(cloud) -> cloud``
     watch : function, optional
         Called with the gps_time (n,) of each chunk that is done, in the trajectory's system.
+    sigma : PointSigma, optional
+        Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
 
     Returns the number of points outside the trajectory, which are unchanged. Raises ValueError
     for bad input, a target that is the input, coordinates that overflow, and LAZ files with
@@ -83,29 +88,53 @@ def write_corrected(cloud_file, target, correction, watch=None):
     layout, target = read_layout(cloud_file.path), Path(target)
     part = target.with_name(target.name + ".part")
     _check_target(layout.path, target, part)
+    shift = getattr(correction, "shift_integers", None) or partial(_shift_integers, correction)
     try:
         with _Output(part) as output, open(layout.path, "rb") as file:
-            head, encoder = _start(layout, output, target.suffix.lower() == ".laz")
+            written = layout if sigma is None else add_sigma_fields(layout)
+            head, encoder = _start(written, output, target.suffix.lower() == ".laz")
             outside, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
             for records in _chunks(layout, CHUNK_SIZE):
                 _check_channels(layout, target, records)
                 xyz = [records[name] for name in "XYZ"]
-                outside += correction.shift_integers(
+                outside += shift(
                     xyz, layout.scale, layout.offset, records["gps_time"], cloud_file.time_constant
                 )
                 low = np.minimum(low, [v.min() for v in xyz])
                 high = np.maximum(high, [v.max() for v in xyz])
-                output.encode(encoder.compress_many, records.view(np.uint8))
+                raw = records.view(np.uint8)
+                if sigma is not None:
+                    scaled = layout.scale, layout.offset, records["gps_time"]
+                    sigmas = sigma.of_integers(xyz, *scaled, cloud_file.time_constant)
+                    raw = with_sigmas(records, sigmas)
+                output.encode(encoder.compress_many, raw)
                 if watch is not None:
                     watch(records["gps_time"] + cloud_file.time_constant)
             output.encode(encoder.done)
-            _finish(layout, head, np.stack([high, low]), file, output)
+            _finish(written, head, np.stack([high, low]), file, output)
         _check_copy(layout, part)
         os.replace(part, target)
     except BaseException:
         part.unlink(missing_ok=True)
         raise
     return outside
+
+
+def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
+    """Correction.shift_integers for what has only ``apply``; no point lies outside of that."""
+    old = np.column_stack(xyz)
+    places = old * scale + offset
+    cloud = PointCloud(places, gps_time + time_constant, np.zeros(len(gps_time)))
+    new = old + np.rint((correction.apply(cloud).xyz - places) / scale)
+    overflow = int((np.abs(new) > INTEGER_LIMIT).any(axis=1).sum())
+    if overflow:
+        raise ValueError(
+            f"{overflow} corrected points do not fit the file's scale {scale} m and offset "
+            f"{offset} m: the correction or the file's header is wrong by kilometres."
+        )
+    for values, corrected in zip(xyz, new.T, strict=True):
+        values[:] = corrected
+    return 0
 
 
 def sha256(path):

@@ -151,3 +151,20 @@ def write_targets_csv(path, targets):
             time = "" if row["gps_time"] is None else f"{row['gps_time']:.6f}"
             first = [row["name"], row["pass"] or "", time, row["role"]]
             writer.writerow([*first, *numbers, str(row["used"]).lower(), row["reason"] or ""])
+
+
+def write_extracted_csv(path, targets):
+    """Write the targets of targets.json as a table; sigmas are those of each axis, in m."""
+    axes = ("easting", "northing", "height")
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        names = [*axes, *(f"sigma_{axis}" for axis in axes), "normal_e", "normal_n", "normal_h"]
+        first = ("name", "pass", "gps_time", "kind", "size", "size_sigma")
+        writer.writerow([*first, *names, "points", "score", "matched", "reason"])
+        for row in targets:
+            sigma = [math.sqrt(row["covariance"][axis][axis]) for axis in range(3)]
+            numbers = [f"{value:.4f}" for value in (*row["observed"], *sigma, *row["normal"])]
+            sizes = [f"{row[key]:.4f}" for key in ("size", "size_sigma")]
+            head = [row["name"] or "", row["pass"], f"{row['gps_time']:.6f}", row["kind"], *sizes]
+            last = [row["points"], f"{row['score']:.3f}", str(row["matched"]).lower()]
+            writer.writerow([*head, *numbers, *last, row["reason"] or ""])

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.spatial.transform import Rotation
 
-from mlscorr.io.control import read_control
+from mlscorr.io.control import NO_POINTS, holds_points, read_control
 from mlscorr.io.las import sample_gps_times
 from mlscorr.io.sbet import check_crs, describe_projection
 from mlscorr.io.settings import read_settings_file
@@ -18,6 +18,7 @@ from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
 from mlscorr.survey import CloudFile, Mounting, Pos, Scanner, Survey
 
 FILE_NAME = "survey.toml"
+ROUNDING = 1e-5  # of correlations written with six decimals
 NEAR = 1e3  # m, a survey's control lies within this distance of the trajectory
 FAR = 5e3  # m, beyond which control and trajectory can't belong together
 
@@ -25,6 +26,8 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
 Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
 Three = Field(min_length=3, max_length=3)
+Six = Field(min_length=6, max_length=6)
+Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
 
 
 class _Section(BaseModel):
@@ -44,12 +47,33 @@ class TrajectorySection(_Section):
 class MountingSection(_Section):
     lever_arm: Annotated[list[Meters], Three]  # m: right, forward, up
     boresight: Annotated[list[Degrees], Three]  # deg, about x, y, z
+    lever_arm_sigma: Annotated[list[Positive], Three] | None = None  # m
+    boresight_sigma: Annotated[list[Positive], Three] | None = None  # deg: right, forward, up
+    correlation: Annotated[list[Annotated[list[Share], Six]], Six] | None = None
+
+    @model_validator(mode="after")
+    def _has_both_sigmas(self):
+        known = [v is not None for v in (self.lever_arm_sigma, self.boresight_sigma)]
+        if any(known) != all(known) or (self.correlation is not None and not all(known)):
+            raise ValueError("lever_arm_sigma and boresight_sigma are needed both, or neither")
+        if self.correlation is not None:
+            matrix = np.array(self.correlation)
+            if not np.array_equal(matrix, matrix.T) or np.linalg.eigvalsh(matrix)[0] < -ROUNDING:
+                raise ValueError("correlation is no correlation matrix: lopsided, or impossible")
+        return self
 
     def mounting(self):
         """R_L^P = Rz(c) Ry(b) Rx(a) for the boresight [a, b, c]."""
         return Mounting(
-            np.array(self.lever_arm), Rotation.from_euler("xyz", self.boresight, degrees=True)
+            np.array(self.lever_arm),
+            Rotation.from_euler("xyz", self.boresight, degrees=True),
+            None if self.lever_arm_sigma is None else self._covariance(),
         )
+
+    def _covariance(self):
+        sigma = np.append(self.lever_arm_sigma, np.radians(self.boresight_sigma))
+        correlation = np.eye(6) if self.correlation is None else np.array(self.correlation)
+        return correlation * np.outer(sigma, sigma)
 
 
 class ControlSection(_Section):
@@ -87,7 +111,7 @@ class Settings(_Section):
     cloud: CloudSection
     trajectory: TrajectorySection
     mounting: MountingSection | None = None
-    control: ControlSection
+    control: ControlSection | None = None
     scanner: ScannerSection = ScannerSection()
     pos: PosSection = PosSection()
     scene: SceneSection = SceneSection()
@@ -96,6 +120,7 @@ class Settings(_Section):
 def read_survey(path):
     """Survey of a survey.toml, or of a folder that holds one.
 
+    Without a section [control], or with a file that holds no point, control and check are empty.
     Raises ValueError for anything wrong in survey.toml, in the files it names, or between them
     (times, coordinates); FileNotFoundError for files that aren't there.
     """
@@ -104,8 +129,10 @@ def read_survey(path):
     clouds, trajectory_file, accuracy, control_file, reference = _files(path, settings)
     crs = check_crs(settings.crs) if settings.crs else None
     trajectory = read_trajectory(trajectory_file, settings.crs, accuracy)
-    control, check = read_control(control_file)
-    _check_together(control_file, control + check, trajectory)
+    control = check = NO_POINTS
+    if control_file is not None and holds_points(control_file):
+        control, check = read_control(control_file)
+        _check_together(control_file, control + check, trajectory)
     notes = [f"Coordinates are in {settings.crs} ({crs.name})." if crs else "No CRS was given."]
     if trajectory_file.suffix.lower() in SBET_SUFFIXES:
         notes += describe_projection(settings.crs)
@@ -147,9 +174,19 @@ def input_files(path):
 
     Raises as read_settings does, and FileNotFoundError for files that aren't there.
     """
+    return [file for _, file in named_files(path)]
+
+
+def named_files(path):
+    """Pairs (what it is, path) of a survey.toml and of every file that it names.
+
+    Raises as input_files does.
+    """
     path = _survey_toml(path)
     clouds, *others = _files(path, read_settings(path))
-    return [path, *clouds, *(other for other in others if other is not None)]
+    files = [("survey", path), *(("cloud", cloud) for cloud in clouds)]
+    files += zip(("trajectory", "trajectory accuracy", "control", "reference"), others, strict=True)
+    return [(what, file) for what, file in files if file is not None]
 
 
 def _survey_toml(path):
@@ -188,7 +225,7 @@ def _files(path, settings):
         clouds,
         existing("trajectory.file", settings.trajectory.file),
         existing("trajectory.accuracy", settings.trajectory.accuracy),
-        existing("control.file", settings.control.file),
+        existing("control.file", settings.control and settings.control.file),
         existing("scene.reference", settings.scene.reference),
     )
 

@@ -1,7 +1,22 @@
 """The story from files to files, one module a command."""
 
+from mlscorr.pipeline.calibration import CalibratedSurvey, calibrate
+from mlscorr.pipeline.comparison import ComparedSurvey, compare
 from mlscorr.pipeline.correction import CorrectedSurvey, correct
+from mlscorr.pipeline.extraction import ExtractedSurvey, extract
 from mlscorr.pipeline.finding import find_targets
 from mlscorr.pipeline.simulation import demo, simulate_survey
 
-__all__ = ["CorrectedSurvey", "correct", "demo", "find_targets", "simulate_survey"]
+__all__ = [
+    "CalibratedSurvey",
+    "ComparedSurvey",
+    "CorrectedSurvey",
+    "ExtractedSurvey",
+    "calibrate",
+    "compare",
+    "correct",
+    "demo",
+    "extract",
+    "find_targets",
+    "simulate_survey",
+]

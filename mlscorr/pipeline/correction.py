@@ -8,6 +8,7 @@ import numpy as np
 from mlscorr.correction import ORDER, Estimate, estimate_correction
 from mlscorr.evaluation import (
     CHECK_REASON,
+    accuracy,
     before_and_after,
     model_section,
     statistics,
@@ -22,10 +23,12 @@ from mlscorr.io.output import (
     write_json,
     write_targets_csv,
 )
-from mlscorr.io.survey_file import input_files
+from mlscorr.io.survey_file import input_files, named_files
 from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.pipeline.finding import find_targets, silent
+from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
+from mlscorr.targets.fit import FittedTarget
+from mlscorr.uncertainty import PointSigma
 
 
 def correct(survey, order=ORDER, rng=None, progress=None):
@@ -57,19 +60,7 @@ def correct(survey, order=ORDER, rng=None, progress=None):
     >>> max(result.check["after"]["rmse"]) < 0.03
     True
     """
-    if len(survey.control) == 0:
-        raise ValueError(
-            f"{survey.path} names {len(survey.check)} check points and no control point: check "
-            "points never enter an estimate. Give some of them the role control."
-        )
-    matches, candidates = find_targets(survey, rng, progress)
-    is_control = np.array([name in survey.control.name for name in matches.matched.name])
-    control, check = matches.matched[is_control], matches.matched[~is_control]
-    if len(control) == 0:
-        raise ValueError(
-            f"None of the {len(survey.control)} control points was found in the cloud, only "
-            f"{len(check)} check points, which must not take part in the estimate."
-        )
+    control, check, finding = find_control(survey, rng, progress)
     estimate = estimate_correction(survey.trajectory, control, survey.control, survey.pos, order)
     for sentence in estimate.warnings:
         warnings.warn(sentence, stacklevel=2)
@@ -78,7 +69,8 @@ def correct(survey, order=ORDER, rng=None, progress=None):
         estimate=estimate,
         control_observations=control,
         check_observations=check,
-        unseen=unseen_rows(survey, matches.refusals, candidates),
+        unseen=unseen_rows(survey, finding.matches.refusals, finding.candidates),
+        fitted=finding.fitted,
     )
 
 
@@ -87,7 +79,8 @@ class CorrectedSurvey:
     """A corrected survey: the estimate, the targets, the statistics, and ``write``.
 
     ``control`` and ``check`` hold n and the misclosures' statistics before and after, in m;
-    ``unseen`` are the surveyed points without an observation, as rows of report.json.
+    ``unseen`` are the surveyed points without an observation, as rows of report.json; ``fitted``
+    the targets by (pass number, gps_time), for their figures.
     """
 
     survey: Survey
@@ -95,6 +88,7 @@ class CorrectedSurvey:
     control_observations: TargetObservations
     check_observations: TargetObservations
     unseen: list[dict] = field(default_factory=list)
+    fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
 
     @property
     def trajectory(self) -> Trajectory:
@@ -105,7 +99,7 @@ class CorrectedSurvey:
     def control(self):
         fit = self._statistics(self.control_observations, self.survey.control)
         left_out = self.estimate.left_out[np.isfinite(self.estimate.left_out).all(axis=1)]
-        return {**fit, "leave_one_out": {"rmse": statistics(left_out)["rmse"]}}
+        return {**fit, "leave_one_out": {"n": len(left_out), **statistics(left_out)}}
 
     @property
     def check(self):
@@ -124,37 +118,67 @@ class CorrectedSurvey:
             for name in self.control_observations.name
         ]
         rows = target_rows(
-            self.control_observations, self.survey.control, correction, "control", reasons
+            self.control_observations,
+            self.survey.control,
+            correction,
+            "control",
+            reasons,
+            self.estimate.left_out,
         )
         none = [CHECK_REASON] * len(self.check_observations)
         rows += target_rows(self.check_observations, self.survey.check, correction, "check", none)
         return rows + self.unseen
 
+    @property
+    def accuracy(self):
+        """Accuracy by ASPRS 2023, as report.json has it: mlscorr.accuracy."""
+        return accuracy(
+            self.check_observations,
+            self.survey.check,
+            self.control_observations,
+            self.survey.control,
+            self.estimate.correction,
+            self.estimate.left_out,
+        )
+
     def _statistics(self, observations, points: ControlPoints):
         return before_and_after(observations, points, self.estimate.correction)
 
-    def write(self, out, overwrite=False, progress=None):
+    def write(self, out, overwrite=False, progress=None, sigma=False):
         """Write corrected clouds, trajectory, targets and report into a folder.
+
+        With sigma, each point gets the fields sigma_easting, sigma_northing and sigma_height.
 
         The folder appears whole or not at all. Returns the document of report.json. Raises
         ValueError when the folder holds an input, or holds anything without overwrite; OSError
         when writing fails.
         """
-        from mlscorr.report import write_pictures, write_report
+        from mlscorr.report import view_cloud, write_pictures, write_report
 
         check_output(out, input_files(self.survey.path), overwrite)
+        correction = self.estimate.correction
         with output_folder(out) as folder:
-            files, outside = self._write_clouds(folder, progress or silent)
+            files, outside = self._write_clouds(folder, progress or silent, sigma)
             report = document("report", self._report(files, outside))
             write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
             write_targets_csv(folder / "targets.csv", report["targets"])
+            made = ("corrected trajectory", "trajectory.csv"), ("targets", "targets.csv")
+            report["outputs"] = [described(what, folder / name) for what, name in made]
             write_json(folder / "report.json", report)
-            write_report(folder / "report.html", self.survey, self.estimate.correction, report)
+            seen = view_cloud(self.survey, correction, report["targets"], progress or silent)
+            page = folder / "report.html"
+            write_report(page, self.survey, correction, report, seen, self.fitted)
             (folder / "pictures").mkdir()
-            write_pictures(folder / "pictures", self.survey, self.estimate.correction, report)
+            write_pictures(folder / "pictures", self.survey, correction, report)
         return report
 
-    def _write_clouds(self, folder, progress):
+    @property
+    def point_sigma(self):
+        """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m."""
+        correction = self.estimate.correction
+        return PointSigma.of(correction, self.survey.scanner, self.survey.mounting)
+
+    def _write_clouds(self, folder, progress, sigma):
         """The corrected clouds; rows of report.json, and points outside (trajectory, control)."""
         first, last = self.estimate.span
         files, outside_trajectory, outside_control = [], 0, 0
@@ -165,10 +189,10 @@ class CorrectedSurvey:
             outside_control += int(np.count_nonzero((times < first) | (times > last)))
             done(len(times))
 
+        correction, point_sigma = self.estimate.correction, self.point_sigma if sigma else None
         for file in self.survey.clouds:
             target = folder / file.path.name
-            correction = self.estimate.correction
-            outside_trajectory += write_corrected(file, target, correction, watch)
+            outside_trajectory += write_corrected(file, target, correction, watch, point_sigma)
             files.append({"name": file.path.name, "points": file.points, "sha256": sha256(target)})
         return files, (outside_trajectory, outside_control)
 
@@ -181,6 +205,7 @@ class CorrectedSurvey:
             "targets": self.targets,
             "control": self.control,
             "check": self.check,
+            "accuracy": self.accuracy,
             "model": model_section(self.estimate),
             "coverage": {
                 "control_span": list(self.estimate.span),
@@ -189,4 +214,10 @@ class CorrectedSurvey:
                 "points_outside_control": outside[1],
             },
             "files": files,
+            "inputs": [described(what, path) for what, path in named_files(self.survey.path)],
         }
+
+
+def described(what, path):
+    """A file as a row of report.json."""
+    return {"what": what, "name": path.name, "bytes": path.stat().st_size, "sha256": sha256(path)}

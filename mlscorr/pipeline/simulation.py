@@ -21,7 +21,7 @@ def demo(out, seed=1, overwrite=False, progress=None):
     with output_folder(out) as folder:
         simulated = Path(folder) / "survey"
         simulated.mkdir()
-        simulate(DEMO, np.random.default_rng(seed)).write(simulated)
+        simulate(DEMO, np.random.default_rng(seed)).write(simulated, progress=progress)
         result = correct(read_survey(simulated), progress=progress)
         return result.write(Path(folder) / "corrected", progress=progress)
 

@@ -1,4 +1,4 @@
-"""The page: one HTML file that holds its style and its figures, for reading without a network."""
+"""The page: one HTML file that holds its style, scripts and figures, for reading offline."""
 
 import base64
 from datetime import UTC, datetime
@@ -7,13 +7,34 @@ from pathlib import Path
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from mlscorr.report import tables
 from mlscorr.report.figures import drawings
+from mlscorr.report.shown import shown
+from mlscorr.report.target_figures import target_drawings
+from mlscorr.report.used import coverage, files, used
 
+PAGE = Path(__file__).parent / "page"  # each section is a file there
+SECTIONS = {  # in their order; one without anything to show is left out
+    "statistics": "How far off",
+    "accuracy": "Accuracy",
+    "pictures": "Before and after",
+    "turn": "3D view",
+    "correction": "Over time",
+    "map": "Map",
+    "residuals": "Every target",
+    "targets": "As found",
+    "model": "Model",
+    "used": "What was used",
+    "conventions": "Conventions",
+}
 LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib")
-SHOWN_ELSEWHERE = ("outliers", "alternatives", "warnings")
+SHOWN_ELSEWHERE = ("outliers", "warnings")
 WORDS = {
+    "alternatives": "models that were compared",
+    "orders": "orders of the trend, side by side",
+    "tests": "what the other control points say of each",
     "estimated_by": "estimated by",
     "order": "order of the polynomial trend",
     "sigma0": "sigma0 (1 when the stated sigmas are right)",
@@ -21,7 +42,7 @@ WORDS = {
 }
 
 
-def write_report(path, survey, correction, document):
+def write_report(path, survey, correction, document, seen=None, fitted=None):
     """Write the self-contained page of a correction.
 
     Parameters
@@ -33,24 +54,44 @@ def write_report(path, survey, correction, document):
         Its corrected trajectory may hold the sigmas after the estimate.
     document : dict
         The content of report.json; a value that was not determined is None.
+    seen : CloudViews, optional
+        Pictures of the cloud and the scene of the 3D view; without them both are left out.
+    fitted : dict, optional
+        FittedTarget by (pass number, gps_time), each of which gets a figure.
     """
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
+        loader=FileSystemLoader(PAGE),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.filters |= {"number": tables.number, "show": show, "norm": tables.norm}
-    environment.globals |= {"group": tables.group, "AXES": tables.AXES}
-    page = environment.get_template("report.html").render(content(survey, correction, document))
+    environment.globals |= {"group": tables.group, "AXES": tables.AXES, "raw": raw}
+    missing = {name for name in ("pictures", "turn") if seen is None}
+    missing |= {name for name in ("targets",) if not fitted}
+    environment.globals["sections"] = {
+        name: title for name, title in SECTIONS.items() if name not in missing
+    }
+    found = content(survey, correction, document)
+    found |= shown(seen, document) if seen is not None else {}
+    figures = target_drawings(document["targets"], fitted or {})
+    found["target_figures"] = [(title, data_uri(picture, "png")) for title, picture in figures]
+    page = environment.get_template("report.html").render(found)
     Path(path).write_text(page, encoding="utf-8")
 
 
+def raw(name):
+    """A file of the page as it is: style and scripts, which are our own."""
+    return Markup((PAGE / name).read_text(encoding="utf-8"))
+
+
 def content(survey, correction, document):
-    """Everything that the template shows."""
+    """Everything that the template shows, except of the cloud."""
     sentences, worse = tables.verdict(document)
     figures = drawings(survey, correction, document).items()
+    model = {k: v for k, v in document["model"].items() if k not in SHOWN_ELSEWHERE}
+    lists = {key: value for key, value in model.items() if is_table(value)}
     return {
         "survey": survey,
         "document": document,
@@ -59,23 +100,38 @@ def content(survey, correction, document):
         "facts": key_figures(correction, document),
         "warnings": warnings(document),
         "rmse_rows": tables.rmse_rows(document),
+        "statistics": tables.statistics_rows(document),
+        "accuracy": document.get("accuracy"),
         "figures": {name: data_uri(picture) for name, picture in figures},
         "groups": [(name, tables.ordered(document["targets"], name)) for name in tables.GROUPS],
-        "model": flat({k: v for k, v in document["model"].items() if k not in SHOWN_ELSEWHERE}),
+        "has_left_out": any(row.get("left_out") for row in document["targets"]),
+        "model": flat({k: v for k, v in model.items() if k not in lists}),
         "outliers": document["model"].get("outliers") or [],
-        "alternatives": document["model"].get("alternatives") or [],
+        "model_tables": [(title(key), rows) for key, rows in lists.items()],
         "coverage": coverage(correction, document),
+        "used": used(survey),
+        "files": files(document),
         "zero_time": f"{np.floor(correction.recorded.gps_time[0]):.0f}",
-        "gaps": len(correction.recorded.gaps),
         "has_sigma": correction.corrected.position_sigma is not None,
         "versions": versions(),
         "written": document.get("created") or f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC",
     }
 
 
-def data_uri(picture):
-    """An SVG (bytes) as the address of an image that lies in the page itself."""
-    return "data:image/svg+xml;base64," + base64.b64encode(picture).decode()
+def is_table(value):
+    """Whether a value of the model is rows of a table."""
+    return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
+
+
+def title(key):
+    """A key of the model in words."""
+    words = WORDS.get(key, key.replace("_", " "))
+    return words[:1].upper() + words[1:]
+
+
+def data_uri(picture, kind="svg+xml"):
+    """A picture (bytes) as the address of an image that lies in the page itself."""
+    return f"data:image/{kind};base64," + base64.b64encode(picture).decode()
 
 
 def show(value):
@@ -103,9 +159,8 @@ def flat(model):
     for key, value in model.items():
         inner = value.items() if isinstance(value, dict) and value else [(None, value)]
         for below, item in inner:
-            name = WORDS.get(below or key, (below or key).replace("_", " "))
-            name = f"{key}: {name}" if below else name
-            pairs.append((name[:1].upper() + name[1:], item))
+            name = f"{title(key)}: {title(below)}" if below else title(key)
+            pairs.append((name, item))
     return pairs
 
 
@@ -124,6 +179,7 @@ def key_figures(correction, document):
         facts.append((f"{pair[0]} → {pair[1]} m", title))
     for role, what in (("control", "made the correction"), ("check", "tested it")):
         points, n = tables.seen(document, role)
+        what = what if points else "were there to test it"
         often = "" if n == points else f", seen {n} times"
         facts.append((str(points), f"{role} point{'s' * (points != 1)} {what}{often}"))
     facts.append((f"{tables.number(float(change.max()))} m", "largest correction of the position"))
@@ -132,39 +188,13 @@ def key_figures(correction, document):
         typical = float(np.median(np.linalg.norm(sigma, axis=1)))
         facts.append((f"{tables.number(typical)} m", "3D sigma of the corrected position, median"))
     points = sum(file["points"] or 0 for file in document["files"])
-    return [*facts, (f"{points:,}".replace(",", " "), "points in the cloud files")]
+    return [*facts, (tables.thousands(points), "points in the cloud files")]
 
 
 def warnings(document):
     """Warnings of the document and of its model, each once."""
     found = [*(document.get("warnings") or []), *(document["model"].get("warnings") or [])]
     return list(dict.fromkeys(found))
-
-
-def coverage(correction, document):
-    """Pairs (what, value) on what the control points and the trajectory cover."""
-    given, time = document["coverage"], correction.recorded.gps_time
-    span = given.get("control_span")
-    pairs = [("Trajectory", f"{time[0]:.3f} to {time[-1]:.3f} s ({time[-1] - time[0]:.1f} s)")]
-    if span:
-        text = f"{span[0]:.3f} to {span[1]:.3f} s ({span[1] - span[0]:.1f} s)"
-        pairs.append(("Control span (first to last control epoch)", text))
-    else:
-        pairs.append(("Control span (first to last control epoch)", "not determined"))
-    longest = given.get("longest_gap_s")
-    pairs.append(
-        ("Longest gap", "not determined" if longest is None else f"{tables.number(longest)} s")
-    )
-    total = sum(file["points"] or 0 for file in document["files"])
-    for key, words in (
-        ("points_outside_trajectory", "Points outside the trajectory (left as they were)"),
-        ("points_outside_control", "Points outside the control span (correction extrapolated)"),
-    ):
-        n = given.get(key)
-        share = f" ({100 * n / total:.2f} %)" if n and total else ""
-        text = "not determined" if n is None else f"{n:,}".replace(",", " ") + share
-        pairs.append((words, text))
-    return pairs
 
 
 def versions():

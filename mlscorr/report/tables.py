@@ -4,6 +4,7 @@ import numpy as np
 
 AXES = ("E", "N", "H")
 GROUPS = ("control", "check", "unused")
+QUANTITIES = ("Easting", "Northing", "Height (vertical)", "Horizontal distance", "3D distance")
 WORSE = 0.002  # m; less is below what surveying a target can tell
 
 
@@ -58,46 +59,78 @@ def number(value, decimals=3):
     return text.lstrip("-") if float(text) == 0 else text
 
 
+def thousands(value):
+    """A whole number with narrow spaces between thousands.
+
+    >>> thousands(1847911)
+    '1 847 911'
+    """
+    return f"{value:,}".replace(",", " ")
+
+
 def statistic(document, role, when, what="rmse"):
     """One of rmse, mean, min, max of control or check, before or after; None where not known."""
     return ((document.get(role) or {}).get(when) or {}).get(what)
 
 
-def largest(document, role, when):
-    """The residual of largest size on each axis, with its sign; None where not known."""
-    extremes = [statistic(document, role, when, what) for what in ("min", "max")]
-    if None in extremes or any(value is None for pair in extremes for value in pair):
-        return None
-    return [max(pair, key=abs) for pair in zip(*extremes, strict=True)]
-
-
 def rmse_rows(document):
-    """Rows of the RMSE table: label, n, rmse, horizontal, 3D, mean, largest."""
+    """Rows of the RMSE table: label, n, rmse, horizontal and 3D, the independent ones first."""
     kinds = [
-        ("control", "before", "Control, before"),
-        ("control", "after", "Control, after (fit)"),
-        ("control", "leave_one_out", "Control, left out in turn"),
-        ("check", "before", "Check, before"),
-        ("check", "after", "Check, after"),
+        ("check", "before", "Check points, before"),
+        ("check", "after", "Check points, after"),
+        ("control", "before", "Control points, before"),
+        ("control", "leave_one_out", "Control points, left out in turn"),
+        ("control", "after", "Control points, after (fit)"),
     ]
     rows = []
     for role, when, label in kinds:
         rmse = statistic(document, role, when)
-        if when == "leave_one_out" and rmse is None:
+        n = (document.get(role) or {}).get("n", 0)
+        if rmse is None and (role == "check" or when == "leave_one_out"):
             continue
         rows.append(
             {
                 "label": label,
-                "when": when,
-                "n": (document.get(role) or {}).get("n", 0),
+                "strong": (role, when) in (("check", "after"), ("control", "leave_one_out")),
+                "n": statistic(document, role, when, "n") or n,
                 "rmse": rmse or [None] * 3,
                 "horizontal": norm(rmse, 2),
                 "spatial": norm(rmse, 3),
-                "mean": statistic(document, role, when, "mean") or [None] * 3,
-                "largest": largest(document, role, when) or [None] * 3,
             }
         )
     return rows
+
+
+def statistics_rows(document):
+    """Blocks (title, n, rows) of all statistics, a row (name, before, after) for each quantity.
+
+    before and after are mean, std, RMSE, min, max, None where it is not determined.
+    """
+    kinds = [
+        ("check", "after", "Check points"),
+        ("control", "leave_one_out", "Control points, after: left out in turn"),
+        ("control", "after", "Control points, after: fit"),
+    ]
+    blocks = []
+    for role, when, title in kinds:
+        if statistic(document, role, when) is None:
+            continue
+        n = statistic(document, role, when, "n") or document[role]["n"]
+        columns = zip(
+            (*QUANTITIES,),
+            _columns(document[role]["before"]),
+            _columns(document[role][when]),
+            strict=True,
+        )
+        blocks.append((title, n, list(columns)))
+    return blocks
+
+
+def _columns(found):
+    """Mean, std, RMSE, min, max of E, N, H, horizontal and 3D."""
+    names = ("mean", "std", "rmse", "min", "max")
+    axes = [[(found.get(name) or [None] * 3)[k] for name in names] for k in range(3)]
+    return axes + [[found.get(f"{name}_{end}") for name in names] for end in ("horizontal", "3d")]
 
 
 def seen(document, role):
@@ -132,10 +165,38 @@ def verdict(document):
         return ["No target was found that could tell how good the correction is."], True
     rise = {a: new - old for a, old, new in zip(AXES, before, after, strict=True)}
     worse = [f"{axis} by {number(by)} m" for axis, by in rise.items() if by > WORSE]
-    sentences = [_result(document, before, after, kind)]
+    sentences = [_plainly(norm(before), norm(after), kind), _result(document, before, after, kind)]
     if worse:
         sentences.append(f"After the correction it is worse than before: {', '.join(worse)}.")
     return sentences, bool(worse)
+
+
+def _plainly(before, after, kind):
+    """What the correction did, in plain words; lengths are 3D RMSE in m."""
+    by = {
+        "check": "as independent check points tell",
+        "leave-one-out": "as control points tell that were left out in turn",
+        "fit": "but only at the points that it was made from: nothing independent can judge it",
+    }[kind]
+    pair = f"from {_length(before)} to {_length(after)} off the surveyed places"
+    if kind != "fit" and abs(before - after) <= WORSE:
+        return f"The correction changed next to nothing, {by}: {pair}."
+    if after > before:
+        return f"The correction made the cloud worse, {by}: {pair}. Don't use it."
+    closer = before / max(after, 1e-4)
+    times = f" ({closer:.0f} times closer)" if closer >= 1.5 and kind != "fit" else ""
+    return f"The correction brought the cloud {pair}{times}, {by}."
+
+
+def _length(value):
+    """A length in words: '7 mm', '4.6 cm', '1.23 m'.
+
+    >>> _length(0.0071), _length(0.046), _length(1.234)
+    ('7 mm', '4.6 cm', '1.23 m')
+    """
+    if value < 0.0095:
+        return f"{1000 * value:.0f} mm"
+    return f"{100 * value:.1f} cm" if value < 0.995 else f"{value:.2f} m"
 
 
 def _result(document, before, after, kind):

@@ -1,103 +1,155 @@
-"""Centre of a circle or square of known size from points marked inside or outside of it.
+"""Shapes of targets: which side of its outline a beam that crossed its plane should tell.
 
-The centre is the mean of its posterior under a uniform prior: each point says on which side of
-the outline it lies, blurred by footprint and angle noise. The mean of the bright points would be
-drawn to where they are denser. The spread of the posterior is the covariance.
+A trial outline is a row of u, v (centre, m), turn (rad), size (m) and inner (share of the size
+that a ring's dark inner disc takes, 0 for none).
 """
 
-from dataclasses import dataclass
+from math import log
 
 import numpy as np
-from scipy.special import expit
+from numba import njit
+from scipy.special import ndtr
 
-WRONG_SIDE = 0.01  # share of points marked wrong whatever their distance (mixed returns)
-AT_ONCE = 500  # points, which bounds the memory on dense targets
-STEPS = 13  # of the grid, along each axis
-ANGLES = 9  # of the grid of a square's turn
-STAGES = 12
-ROUGH_STAGES = 3  # the first of them
-ROUGH_POINTS = 150  # of either side, enough to place the outline roughly
+PASSED, DARK, BRIGHT = -1, 0, 1  # what a beam did at the plane: went by, met dark, met bright
+ROUND, SQUARE, CHECKERED = range(3)
+FORMS = {
+    "circle": ROUND,
+    "hole": ROUND,
+    "square": SQUARE,
+    "board": SQUARE,
+    "checkerboard": CHECKERED,
+}
+PERIOD = {"square": np.pi / 2, "board": np.pi / 2, "checkerboard": np.pi}  # of turn; rad
+BY_EDGES = ("hole", "board")  # told by where beams pass, not by intensity
+WRONG_SIDE = 0.01  # share of beams that tell the wrong side whatever their distance (mixed returns)
+LOG_WRONG, LOG_RIGHT = log(WRONG_SIDE), log(1 - WRONG_SIDE)
+CERTAIN = 5.0  # sigmas from the outline, beyond which only WRONG_SIDE counts
+PER_SIGMA = 200  # entries of the tables, exact to 5e-6 between them
 
 
-@dataclass(frozen=True)
-class Outline:
-    """A fitted outline: centre (2,) and its covariance (2, 2) in the plane, turn (rad), overlap.
+def diameter(kind, size):
+    """Longest extent (m) of a shape of this size (m)."""
+    return size * (1.0 if FORMS[kind] == ROUND else np.sqrt(2))
 
-    overlap is the share of points inside among those inside or marked bright: 1 is a perfect fit.
+
+def sides(state, kind, by_edges):
+    """Side (n,) that each beam tells: 1 inside, -1 outside; a checkerboard's state stays as is."""
+    if kind == "checkerboard" and not by_edges:
+        return state.astype(np.int8)
+    if kind == "hole":
+        inside = state == PASSED
+    elif by_edges:
+        inside = state != PASSED
+    else:
+        inside = state == BRIGHT
+    return np.where(inside, 1, -1).astype(np.int8)
+
+
+def form_of(kind, by_edges):
+    """Form that the likelihood uses: by its edges, a checkerboard is a square like others."""
+    return SQUARE if kind == "checkerboard" and by_edges else FORMS[kind]
+
+
+@njit(cache=True)
+def _within(x, y, half, inner, form):
+    """Distance (m) inside the outline of a place in the shape's own axes, negative outside."""
+    if form != 0:
+        return half - max(abs(x), abs(y))
+    radius = np.sqrt(x * x + y * y)
+    return min(half - radius, radius - inner * half) if inner > 0 else half - radius
+
+
+@njit(cache=True)
+def _on_white(x, y):
+    """Distance (m) from a checkerboard's crossing lines, positive on white."""
+    return min(abs(x), abs(y)) if x * y > 0 else -min(abs(x), abs(y))
+
+
+@njit(cache=True)
+def distance_inside(points, outline, form):
+    """Distance (n,) in m of points (n, 2) inside an outline (5,), negative outside."""
+    cos, sin, distance = np.cos(outline[2]), np.sin(outline[2]), np.empty(len(points))
+    for i in range(len(points)):
+        du, dv = points[i, 0] - outline[0], points[i, 1] - outline[1]
+        x, y = cos * du + sin * dv, cos * dv - sin * du
+        distance[i] = _within(x, y, outline[3] / 2, outline[4], form)
+    return distance
+
+
+@njit(cache=True)
+def distance_on_white(points, outline):
+    """Distance (n,) in m of points (n, 2) from a checkerboard's crossing, positive on white."""
+    cos, sin, distance = np.cos(outline[2]), np.sin(outline[2]), np.empty(len(points))
+    for i in range(len(points)):
+        du, dv = points[i, 0] - outline[0], points[i, 1] - outline[1]
+        distance[i] = _on_white(cos * du + sin * dv, cos * dv - sin * du)
+    return distance
+
+
+def _table():
+    """Probability that a beam tells inside, at every fraction of a sigma from the outline."""
+    z = np.arange(-CERTAIN * PER_SIGMA, CERTAIN * PER_SIGMA + 2) / PER_SIGMA
+    return WRONG_SIDE + (1 - 2 * WRONG_SIDE) * ndtr(z)
+
+
+SHARE = _table()
+LOG_SHARE = np.log(SHARE)
+
+
+@njit(cache=True)
+def _looked_up(table, z):
+    """Value of a table between its entries, z sigmas inside and not farther than CERTAIN."""
+    if np.isnan(z):  # of a beam along the plane
+        return z
+    place = (z + CERTAIN) * PER_SIGMA
+    entry = int(place)
+    return table[entry] + (place - entry) * (table[entry + 1] - table[entry])
+
+
+@njit(cache=True)
+def _share(distance, width):
+    """Probability that a beam at this distance inside tells inside, blurred by width (m)."""
+    if distance > CERTAIN * width:
+        return 1.0 - WRONG_SIDE
+    if distance < -CERTAIN * width:
+        return WRONG_SIDE
+    return _looked_up(SHARE, distance / width)
+
+
+@njit(cache=True)
+def _log_share(distance, width):
+    """Logarithm of _share: quick where it is constant, which is nearly everywhere."""
+    if distance > CERTAIN * width:
+        return LOG_RIGHT
+    if distance < -CERTAIN * width:
+        return LOG_WRONG
+    return _looked_up(LOG_SHARE, distance / width)
+
+
+@njit(cache=True)
+def log_likelihood(points, side, outlines, form, width):
+    """Log likelihood (c,) of trial outlines (c, 5), given points (n, 2) and their sides (n,).
+
+    Source: Bernoulli, each point inside or outside with a probability that falls across the
+    outline as a normal distribution of this width (m). A checkerboard's sides are states: beside
+    the board bright and dark are equally likely, on it no beam passes.
     """
-
-    centre: np.ndarray
-    covariance: np.ndarray
-    turn: float
-    overlap: float
-
-
-def distance_inside(points, outlines, kind, size):
-    """Distance (c, n) in m of points (n, 2) to outlines (c, 3: u, v, turn), positive inside."""
-    u = points[:, 0] - outlines[:, :1]
-    v = points[:, 1] - outlines[:, 1:2]
-    if kind == "circle":
-        return size / 2 - np.sqrt(u * u + v * v)
-    cos, sin = np.cos(outlines[:, 2:]), np.sin(outlines[:, 2:])
-    along, across = np.abs(cos * u + sin * v), np.abs(cos * v - sin * u)
-    return size / 2 - np.maximum(along, across)
-
-
-def fit_outline(points, bright, kind, size, blur, stages=STAGES):
-    """Fit an outline of known kind and size (m) to points (n, 2) marked bright or not (n,).
-
-    blur is the one-sigma position error of a point across the outline. Units: m. The grid starts
-    wide, blurred and with few points. Each stage halves the blur, so that the posterior's mode is
-    not lost, until the grid resolves the posterior; three stages tell roughly whether it is one.
-    """
-    mean = np.array([*points[bright].mean(axis=0), np.pi / 4])
-    half = np.array([0.35 * size, 0.35 * size, np.pi / 4])
-    for stage in range(stages):
-        width = max(blur, size / 8 / 2**stage)
-        telling = _telling(points, bright, mean, half, kind, size, width)
-        if stage < ROUGH_STAGES:
-            telling = _thinned(telling, bright)
-        grid = _grid(mean, half, kind)
-        weight = _posterior(points[telling], bright[telling], grid, kind, size, width)
-        mean = weight @ grid
-        deviation = grid - mean
-        covariance = (weight[:, None] * deviation).T @ deviation
-        closer = np.maximum(4 * np.sqrt(np.diag(covariance)), 3 * half / (STEPS - 1))
-        resolved = (closer > half / 2)[: 3 if kind == "square" else 2].all()
-        half = closer
-        if width == blur and resolved:
-            break
-    inside = distance_inside(points, mean[None], kind, size)[0] > 0
-    overlap = (inside & bright).sum() / max((inside | bright).sum(), 1)
-    return Outline(mean[:2], covariance[:2, :2], float(mean[2]), float(overlap))
-
-
-def _telling(points, bright, mean, half, kind, size, width):
-    """Rows of the points that can lie near the outline: all others say the same of every trial."""
-    play = np.hypot(half[0], half[1]) + size * half[2] * (kind == "square") + 8 * width
-    return np.flatnonzero(np.abs(distance_inside(points, mean[None], kind, size)[0]) < play)
-
-
-def _thinned(rows, bright):
-    """At most ROUGH_POINTS of the rows on either side, evenly among them."""
-    sides = rows[bright[rows]], rows[~bright[rows]]
-    return np.concatenate([side[:: len(side) // ROUGH_POINTS + 1] for side in sides])
-
-
-def _grid(mean, half, kind):
-    """Trial outlines about the present one: (c, 3) of u, v and turn."""
-    steps = np.linspace(-1, 1, STEPS)
-    turns = np.linspace(-1, 1, ANGLES) if kind == "square" else np.zeros(1)
-    mesh = np.stack(np.meshgrid(steps, steps, turns, indexing="ij"), axis=-1).reshape(-1, 3)
-    return mean + mesh * half
-
-
-def _posterior(points, bright, grid, kind, size, width):
-    """Probability of each trial outline (c,)."""
-    likelihood = np.zeros(len(grid))
-    for part in (slice(i, i + AT_ONCE) for i in range(0, len(points), AT_ONCE)):
-        distance = distance_inside(points[part], grid, kind, size)
-        side = np.where(bright[part], distance, -distance) * (np.pi / np.sqrt(3) / width)
-        likelihood += np.log(WRONG_SIDE + (1 - 2 * WRONG_SIDE) * expit(side)).sum(axis=1)
-    weight = np.exp(likelihood - likelihood.max())
-    return weight / weight.sum()
+    result = np.zeros(len(outlines))
+    for c in range(len(outlines)):
+        u, v, turn, size, inner = outlines[c]
+        cos, sin, total = np.cos(turn), np.sin(turn), 0.0
+        for i in range(len(points)):
+            du, dv = points[i, 0] - u, points[i, 1] - v
+            x, y = cos * du + sin * dv, cos * dv - sin * du
+            within = _within(x, y, size / 2, inner, form)
+            if form != 2:
+                total += _log_share(within * side[i], width)
+                continue
+            if side[i] < 0:
+                total += _log_share(-within, width)
+                continue
+            on_board = _share(within, width)
+            white = _on_white(x, y) * (1 if side[i] == 1 else -1)
+            total += np.log(on_board * _share(white, width) + (1.0 - on_board) * 0.5)
+        result[c] = total
+    return result

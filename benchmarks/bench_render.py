@@ -1,0 +1,122 @@
+"""What drawing costs: 2 M points at 1920 x 1080 by both engines, and the memory of 50 M points.
+
+    python benchmarks/bench_render.py
+
+Times alone mean little on a busy machine; the goals are those of two idle cores.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mlscorr.io.las import CHUNK_SIZE
+from mlscorr.report.render.camera import Camera
+from mlscorr.report.render.drawing import draw
+from mlscorr.report.render.sheet import Sheet
+from mlscorr.report.render.views import Look, View
+from mlscorr.survey import ControlPoints, PointCloud, Survey, Trajectory
+from mlscorr.survey import attitude_from_angles as attitude
+
+CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # UTM
+START = 357_900.0  # s of week
+LENGTH = 200.0  # m, of the street
+MOVE = np.array([0.3, 0.2, -0.1])  # m
+SIZE = (1920, 1080)
+PANEL = (936, 847)  # of a page of that size
+
+
+class Moved:
+    """A correction by a constant."""
+
+    def apply(self, cloud):
+        return PointCloud(cloud.xyz + MOVE, cloud.gps_time, cloud.intensity)
+
+
+def street(points, seed=1):
+    """Chunks of a street with two walls, in no order."""
+    rng = np.random.default_rng(seed)
+    for first in range(0, points, CHUNK_SIZE):
+        n = min(CHUNK_SIZE, points - first)
+        across, along = rng.uniform(-14, 14, n), rng.uniform(0, LENGTH, n)
+        up = np.maximum(np.abs(across) - 8, 0) * 2
+        xyz = CORNER + np.column_stack([np.clip(across, -8, 8), along, up])
+        time = START + (first + np.arange(n)) / points * 20.0
+        yield PointCloud(xyz, time, 1000 * up + 5000)
+
+
+def survey():
+    """A survey of that street without targets."""
+    time = START + np.arange(0.0, 20.1, 0.1)
+    position = CORNER + np.outer(time - START, [0.0, LENGTH / 20, 0.0])
+    none = ControlPoints((), np.empty((0, 3)), np.empty((0, 3)), (), np.empty(0), np.empty((0, 3)))
+    trajectory = Trajectory(time, position, attitude(*np.zeros((3, len(time)))))
+    return Survey("street", Path(), None, (), trajectory, None, none, none)
+
+
+def one_picture(points, by_open3d):
+    """Seconds for one picture of 1920 x 1080: half of those for a pair, before and after."""
+    clouds = list(street(points))
+    focus = CORNER + np.array([0.0, LENGTH / 2, 0.0])
+    camera = Camera.towards(focus, -60.0, 35.0, 9.5, SIZE)
+    start = perf_counter()
+    sheet = Sheet.blank(View("overview", "", "", camera, "height"))
+    for cloud in clouds:
+        sheet.add(Both(cloud), (cloud.xyz[:, 2], cloud.xyz[:, 2]))
+    for data in sheet.finished(by_open3d).panels(decorated=True):
+        assert data.startswith(b"\x89PNG")
+    return (perf_counter() - start) / 2
+
+
+class Both:
+    """A chunk that is the same before and after."""
+
+    def __init__(self, cloud):
+        self.before = self.after = cloud
+
+
+def peak_memory():
+    """Of this process alone. Units: MB."""
+    return int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) // 1024
+
+
+def pictures(points):
+    """Draw the overview and a cross-section of streamed points."""
+    list(draw(survey(), Moved(), [], Look(PANEL), chunks=lambda: street(points)))
+
+
+def memory(millions):
+    """Seconds, and peak memory in MB over that after the imports, of a child that draws."""
+    command = [sys.executable, __file__, str(millions)]
+    start = perf_counter()
+    peak = int(subprocess.run(command, check=True, capture_output=True).stdout)
+    return perf_counter() - start, peak
+
+
+def main():
+    table = Table("measured in this run", "", "goal")
+    one_picture(1000, False)  # compiles
+    for by_open3d, name, goal in ((False, "z-buffer", "<= 3 s"), (True, "Open3D", "<= 6 s")):
+        seconds = one_picture(2_000_000, by_open3d)
+        table.add_row(f"2 M points, 1920 x 1080, half of a pair: {name}", f"{seconds:.2f} s", goal)
+    peaks = []
+    for millions in (5, 50):
+        seconds, peak = memory(millions)
+        peaks.append(peak)
+        text = f"{peak} MB, {seconds:.0f} s (both pictures, two passes, points made anew)"
+        table.add_row(f"{millions} M points streamed: peak memory over imports", text, "")
+    table.add_row("peak memory, 50 M / 5 M points", f"{peaks[1] / peaks[0]:.2f}", "about 1")
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) == 2:  # the child whose memory is measured
+        before = peak_memory()
+        pictures(int(sys.argv[1]) * 1_000_000)
+        print(peak_memory() - before)
+    else:
+        main()

@@ -1,0 +1,171 @@
+"""Speed and memory of the search for targets, and clustering beside Open3D and scikit-learn.
+
+    python benchmarks/bench_targets.py [millions of points ...]
+
+By default 2 and 20 million points: a simulated street, repeated file after file for more than 20.
+Times alone mean nothing on a busy machine: each extraction runs between two bare decodings by
+laspy in processes of their own, and the ratio counts; that of processor time is steadier.
+"""
+
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter, process_time
+
+import laspy
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from sklearn.cluster import DBSCAN
+from sklearn.metrics import adjusted_rand_score
+
+import mlscorr
+from mlscorr.io.control import NO_POINTS
+from mlscorr.io.las import read_chunks
+from mlscorr.simulate import Scenario, simulate
+from mlscorr.targets.candidates import collect
+from mlscorr.targets.clusters import connected
+
+CHUNK = 1_000_000  # points
+LINK = 0.12  # m, as for targets of 0.6 m
+RUNS = "decode", "extract", "decode", "extract without control", "decode"
+
+
+def make_street(folder, points):
+    """A drive of a third of a million points a second with a target every 25 m."""
+    seconds = points / 333_000
+    scenario = Scenario(
+        drive={"duration": seconds},
+        targets={"control": max(1, round(seconds * 16 / 60)), "check": round(seconds * 8 / 60)},
+        scanner=[{"lines_per_second": 200, "points_per_line": 1667}],
+    )
+    simulate(scenario, np.random.default_rng(1)).write(folder)
+
+
+def decode(folder):
+    """What laspy takes to decode the clouds alone: number of points."""
+    points = 0
+    for path in sorted(Path(folder).glob("*.laz")):
+        with laspy.open(path) as reader:
+            points += sum(len(chunk) for chunk in reader.chunk_iterator(CHUNK))
+    return points
+
+
+def extract(folder, with_control):
+    """Extraction without writing: number of surveyed points found, and of other objects."""
+    survey = mlscorr.read_survey(folder)
+    surveyed = survey.control + survey.check
+    if not with_control:
+        survey = replace(survey, control=NO_POINTS, check=NO_POINTS)
+    rows = mlscorr.extract(survey).targets
+    place = np.array([row["observed"] for row in rows]).reshape(-1, 3)
+    apart = np.linalg.norm(place[None] - surveyed.position[:, None], axis=2)
+    near = apart < 0.3
+    return near.any(axis=1).sum(), len(surveyed), (~near.any(axis=0)).sum()
+
+
+def measure(task, folder):
+    """Run one task in this process: wall and processor seconds, megabytes over the imports, and
+    what it gave."""
+    imported = memory("VmRSS")
+    if task != "decode":
+        extract(WARM_UP, task == "extract")  # compiled kernels are loaded once
+    start, used = perf_counter(), process_time()
+    result = decode(folder) if task == "decode" else extract(folder, task == "extract")
+    seconds = perf_counter() - start, process_time() - used
+    return *seconds, memory("VmHWM") - imported, result
+
+
+def memory(name):
+    """Memory of this process: VmRSS now, VmHWM at most. Units: MB."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith(name))
+
+
+def in_own_process(task, folder, warm_up):
+    command = [sys.executable, "-W", "ignore", __file__, "--task", task, str(folder), str(warm_up)]
+    out = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    return [float(word) for word in out]
+
+
+def speed_table(millions, folder):
+    """Rates and peak memory for several sizes."""
+    table = Table("points", "task", "s", "processor s", "of decoding: wall", "processor",
+                  "MB over imports", "surveyed found, others",
+                  title="Extraction, beside laspy's decoding in the same run")  # fmt: skip
+    warm_up = folder / "warm up"
+    make_street(warm_up, 1_500_000)
+    for million in millions:
+        survey = folder / f"{million:g}"
+        make_street(survey, min(million, 20) * 1e6)
+        if million > 20:
+            repeat(survey, round(million / 20))
+        points = decode(survey)
+        results = [in_own_process(task, survey, warm_up) for task in RUNS]
+        decoding = np.median([r[:2] for r, task in zip(results, RUNS, strict=True)
+                              if task == "decode"], axis=0)  # fmt: skip
+        for task, (wall, used, peak, *rest) in zip(RUNS, results, strict=True):
+            found = f"{rest[0]:.0f} of {rest[1]:.0f}, {rest[2]:.0f}" if rest[1:] else ""
+            table.add_row(f"{points:,}", task, f"{wall:.1f}", f"{used:.1f}",
+                          f"{decoding[0] / wall:.2f}", f"{decoding[1] / used:.2f}",
+                          f"{peak:.0f}", found)  # fmt: skip
+    return table
+
+
+def repeat(folder, times):
+    """Name the clouds several times, as other files."""
+    settings = (folder / "survey.toml").read_text()
+    names = [f"again-{i}.laz" for i in range(times)]
+    for name in names:
+        (folder / name).symlink_to(folder / "pass-1.laz")
+    quoted = ", ".join(f'"{name}"' for name in names)
+    (folder / "survey.toml").write_text(settings.replace('"pass-1.laz"', quoted))
+
+
+def cluster_table(folder):
+    """Clustering of the same candidates: the bright tenth of the points near control."""
+    import open3d
+
+    survey = mlscorr.read_survey(folder)
+    near = collect(survey.clouds, survey.trajectory, survey.control, read_chunks).cloud
+    bright = near.xyz[near.intensity >= np.percentile(near.intensity, 90)]
+    bright -= bright.mean(axis=0)
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(bright))
+    tools = {
+        "mlscorr": lambda: connected(bright, LINK),
+        "scikit-learn DBSCAN": lambda: DBSCAN(eps=LINK, min_samples=1).fit_predict(bright),
+        "Open3D DBSCAN": lambda: np.asarray(cloud.cluster_dbscan(LINK, 1)),
+    }
+    table = Table("tool", "ms", "times mlscorr", "clusters", "adjusted Rand index",
+                  title=f"Clusters of {len(bright):,} bright points, link {LINK} m")  # fmt: skip
+    taken, labels = {}, {}
+    for name, run in tools.items():
+        times = []
+        for _ in range(4):
+            start = perf_counter()
+            labels[name] = run()
+            times.append(perf_counter() - start)
+        taken[name] = np.median(times[1:])
+    for name in tools:
+        agreement = adjusted_rand_score(labels["scikit-learn DBSCAN"], labels[name])
+        table.add_row(name, f"{1e3 * taken[name]:.0f}", f"{taken[name] / taken['mlscorr']:.1f}",
+                      f"{len(np.unique(labels[name]))}", f"{agreement:.4f}")  # fmt: skip
+    return table
+
+
+def main(millions):
+    console = Console(width=110)
+    with tempfile.TemporaryDirectory() as folder:
+        console.print(speed_table(millions, Path(folder)))
+        console.print(cluster_table(Path(folder) / f"{millions[0]:g}"))
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--task"]:
+        task, survey, WARM_UP = sys.argv[2:]
+        *numbers, result = measure(task, survey)
+        print(*numbers, *np.atleast_1d(result))
+    else:
+        main([float(word) for word in sys.argv[1:]] or [2.0, 20.0])

@@ -1,0 +1,176 @@
+"""How good a calibration is over many simulated surveys, against their truth.
+
+    python benchmarks/calibration_study.py [--seeds 24] [--scenario FILE.toml] [--whole]
+
+Each survey is the scenario's with another seed: another street, drive, POS error and survey of
+the targets. Targets are observed where the scan plane passes their centres, with the noise of
+extraction, and nothing hides them; with --whole the cloud is simulated and the targets found in it
+(a minute each). The POS error is made by its causes, not by the estimator's covariance.
+
+Prints for both methods the RMS error of each component, its stated sigma, and the RMS of error
+over sigma (one if the sigma is honest), then the RMSE at the check points.
+"""
+
+import argparse
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import mlscorr
+from mlscorr.calibration import COMPONENTS, estimate_mounting
+from mlscorr.evaluation import misclosures
+from mlscorr.georeference import georeference, to_scanner
+from mlscorr.simulate import simulate
+from mlscorr.simulate.scenario_file import read_scenario
+from mlscorr.survey import ControlPoints, TargetObservations
+
+SCENARIO = Path(__file__).parents[1] / "examples" / "scenarios" / "calibration.toml"
+EXTRACTION = 0.003  # m, one sigma: what target extraction states for targets of 0.6 m at 10 m
+REACH = 25.0  # m, beyond which the street's houses hide targets
+GRAZING = 0.2  # least cosine of the incidence at which a target is found
+UNITS = np.repeat([1e3, 180 / np.pi], 3)  # mm, deg
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=24)
+    parser.add_argument("--scenario", type=Path, default=SCENARIO)
+    parser.add_argument("--whole", action="store_true", help="simulate and read the whole cloud")
+    arguments = parser.parse_args()
+    scenario = read_scenario(arguments.scenario)
+    study = whole_survey if arguments.whole else features
+    results = []
+    for seed in range(arguments.seeds):
+        results.append(study(scenario, seed))
+        print(f"seed {seed:3d}", *(f"{v:8.3f}" for v in results[-1]["lsc"][0]), flush=True)
+    tell(results)
+
+
+def tell(results):
+    """The table over all seeds."""
+    print("\nRMS over the surveys; mm and deg")
+    for method in ("lsc", "ls"):
+        error, sigma = np.moveaxis([result[method] for result in results], 1, 0)
+        for title, values in (
+            ("error", error),
+            ("stated sigma", sigma),
+            ("error over sigma", error / sigma),
+        ):
+            rms = np.sqrt(np.mean(values**2, axis=0))
+            print(f"{method:4s}{title:18s}", *(f"{value:8.3f}" for value in rms))
+    told = np.mean([result["determined"] for result in results], axis=0)
+    print(f"{'determined':22s}", *(f"{share:8.0%}" for share in told))
+    print("components:", ", ".join(COMPONENTS))
+    print("\nRMSE at check points, E/N/H in m: median and worst")
+    for title in ("raw", "ls", "lsc", "lsc with drift"):
+        rmse = np.array([result["check"][title] for result in results])
+        numbers = [*np.median(rmse, axis=0), *rmse.max(axis=0)]
+        print(f"{title:16s}", *(f"{value:8.4f}" for value in numbers))
+
+
+def features(scenario, seed):
+    """A survey whose targets are observed without a cloud."""
+    simulated = simulate(scenario, np.random.default_rng(seed))
+    observations, is_check = observe(simulated, np.random.default_rng([seed, 1]))
+    control, check = (
+        select(simulated.targets, of) for of in (~simulated.is_check, simulated.is_check)
+    )
+    calibration = estimate_mounting(
+        simulated.trajectory, simulated.mounting, observations[~is_check], control
+    )
+    return score(calibration, simulated, observations[is_check], check)
+
+
+def whole_survey(scenario, seed):
+    """A survey from its files."""
+    simulated = simulate(scenario, np.random.default_rng(seed))
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        simulated.write(Path(folder))
+        result = mlscorr.calibrate(mlscorr.read_survey(folder))
+    return score(result.calibration, simulated, result.check_observations, result.survey.check)
+
+
+def score(calibration, simulated, observations, check):
+    """Errors and sigmas (2, 6) of both methods, and the check points' RMSE."""
+    true, recorded = simulated.true_mountings[0], simulated.mounting
+    turn = (true.boresight * recorded.boresight.inv()).as_rotvec()
+    lacks = np.append(true.lever_arm - recorded.lever_arm, turn)
+    corrections = {
+        "raw": None,
+        "ls": calibration.correction("ls"),
+        "lsc": calibration.correction(),
+        "lsc with drift": calibration.correction_with_drift(),
+    }
+    result = {
+        method: UNITS * [estimate.correction - lacks, estimate.sigma]
+        for method, estimate in (("lsc", calibration.lsc), ("ls", calibration.ls))
+    }
+    result["determined"] = calibration.determined
+    result["check"] = {
+        title: np.sqrt(np.mean(misclosures(observations, check, correction) ** 2, axis=0))
+        for title, correction in corrections.items()
+    }
+    return result
+
+
+def observe(simulated, rng):
+    """TargetObservations of all targets that face the scanner, and which are check points."""
+    mounting, centres = simulated.true_mountings[0], simulated.true_centre
+    found = []
+    for number, true in enumerate(simulated.true_passes):
+        eye = true.position + true.attitude.apply(mounting.lever_arm)
+        across = true.attitude.apply(mounting.boresight.apply([0.0, 0.0, 1.0]))
+        out_of_plane = np.einsum("qi,tqi->tq", across, centres[:, None] - eye)
+        for target, k in zip(*np.nonzero(np.diff(np.sign(out_of_plane), axis=1) != 0), strict=True):
+            sight = eye[k] - centres[target]
+            distance = np.linalg.norm(sight)
+            if (
+                sight @ simulated.scene.targets.normal[target] < GRAZING * distance
+                or distance > REACH
+            ):
+                continue
+            a, b = out_of_plane[target, k : k + 2]
+            time = true.gps_time[k] + (true.gps_time[k + 1] - true.gps_time[k]) * a / (a - b)
+            found.append((number, target, time))
+    number, target, time = (np.array(column) for column in zip(*found, strict=True))
+    position = np.empty((len(time), 3))
+    for one, (true, recorded) in enumerate(
+        zip(simulated.true_passes, simulated.passes, strict=True)
+    ):
+        rows = number == one
+        seen = to_scanner(true, mounting, centres[target[rows]], time[rows])
+        seen += EXTRACTION * rng.standard_normal(seen.shape)
+        position[rows] = georeference(recorded, simulated.mounting, seen, time[rows])
+    surveyed, n = simulated.targets, len(time)
+    observations = TargetObservations(
+        name=tuple(surveyed.name[i] for i in target),
+        pass_number=number + 1,
+        gps_time=time,
+        position=position,
+        covariance=np.tile(EXTRACTION**2 * np.eye(3), (n, 1, 1)),
+        normal=simulated.scene.targets.normal[target],
+        kind=tuple(surveyed.kind[i] for i in target),
+        size=surveyed.size[target],
+        points=np.full(n, 300),
+    )
+    return observations, simulated.is_check[target]
+
+
+def select(points, of):
+    """ControlPoints of some rows: (n,) bool."""
+    rows = np.flatnonzero(of)
+    return ControlPoints(
+        tuple(points.name[i] for i in rows),
+        points.position[rows],
+        points.sigma[rows],
+        tuple(points.kind[i] for i in rows),
+        points.size[rows],
+        points.normal[rows],
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,328 @@
+"""How many targets are matched right, refused and matched wrong, over many random surveys.
+
+    python benchmarks/matching_study.py [surveys]
+
+Each survey has 20 to 60 targets of two kinds and two sizes along one to three passes, 30 % of them
+in look-alike pairs 1.5 m apart. The POS drifts up to 3 m, by one of four causes in turn: velocity
+errors that wander in outages, sums of sinusoids, an integrated MEMS, and the real error series
+of a MEMS GNSS/INS where it is at hand (MLSCORR_SHARED). Its stated sigmas are 0.5 to 2 times the
+drift's size. Of the control 10 % are mis-numbered (exchanged in pairs), 10 % moved by 0.3 to 3 m,
+10 % stand hidden; of the observations 20 % are look-alikes without control, half of them near
+a target. Nothing is drawn from the covariance functions of the estimate.
+"""
+
+import os
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.pos_error_series import read_pos_error_series
+from mlscorr.matching import match
+from mlscorr.simulate.pos_error import given_error, pos_error
+from mlscorr.simulate.scenario import PosScenario
+from mlscorr.survey import ControlPoints, TargetObservations, Trajectory, attitude_from_angles
+
+ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
+START = 357_700.0  # s of the GPS week
+SPEED = 8.0  # m/s
+PAIR = 1.5  # m between look-alikes
+WEAK = 3.0  # sigmas of the POS's relative motion below which a moved point can't be seen
+SERIES = Path(os.environ.get("MLSCORR_SHARED", "../shared")) / "data/real_pos_error/OB_GINS_TXT.err"
+CAUSES = ("outages", "sinusoids", "mems", "real")
+
+
+@dataclass(frozen=True)
+class Made:
+    """A made survey: what match gets, and the truth of each observation and control point.
+
+    truth (n,) is the row of the target seen, -1 for a look-alike; whole (k,) tells the control
+    points whose position and appearance are those of their target, moved (k,) how far others were
+    moved (m), 0 for mis-numbered ones.
+    """
+
+    observations: TargetObservations
+    control: ControlPoints
+    trajectory: Trajectory
+    error: np.ndarray
+    truth: np.ndarray
+    whole: np.ndarray
+    moved: np.ndarray
+    cause: str
+
+
+def main():
+    surveys = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    counts = {}
+    started = time.perf_counter()
+    for seed in range(surveys):
+        made = make(seed, CAUSES[seed % len(CAUSES)])
+        one = score(made)
+        counts.setdefault(made.cause, []).append(one)
+        if "-v" in sys.argv:
+            print(seed, made.cause, one)
+    seconds = time.perf_counter() - started
+    print(f"{'cause':10s}" + "".join(f"{title:>10s}" for title in TITLES) + f"{'share':>9s}")
+    everything = [one for several in counts.values() for one in several]
+    for cause, several in (*counts.items(), ("all", everything)):
+        total = np.sum(several, axis=0)
+        share = total[0] / max(total[:3].sum(), 1)
+        print(f"{cause:10s}" + "".join(f"{n:10d}" for n in total) + f"{share:9.2%}")
+    print(f"{seconds / surveys:.2f} s a survey")
+
+
+TITLES = ("right", "refused", "wrong", "moved used", "moved", "else used", "else", "no reason")
+
+
+def score(made):
+    """Counts (8,) as in TITLES: matchable observations right, refused and matched wrong; those of
+    moved or mis-numbered points used and all; look-alikes used and all; without a reason."""
+    found = match(made.observations, made.control, made.trajectory)
+    rows = {t: i for i, t in enumerate(made.observations.gps_time)}
+    column = np.full(len(made.truth), -1)
+    for name, t in zip(found.matched.name, found.matched.gps_time, strict=True):
+        column[rows[t]] = made.control.name.index(name)
+    seen = made.truth >= 0
+    good = seen & made.whole[made.truth]
+    bad = seen & ~good
+    used = column >= 0
+    told = {refusal.name for refusal in found.refusals} | set(found.matched.name)
+    silent = sum(name not in told for name in made.control.name)
+    silent += sum(not reason for reason in found.reasons)
+    return np.array([
+        np.sum(good & (column == made.truth)),
+        np.sum(good & ~used),
+        np.sum(good & used & (column != made.truth)),
+        np.sum(bad & used),
+        np.sum(bad),
+        np.sum(~seen & used),
+        np.sum(~seen),
+        silent,
+    ])  # fmt: skip
+
+
+def make(seed, cause):
+    """A Made survey."""
+    rng = np.random.default_rng(seed)
+    if cause == "real" and not SERIES.exists():
+        cause = "outages"
+    local = _places(rng)
+    n = len(local)
+    kinds, sizes = _appearances(rng, local)
+    length = local[:, 0].max() + 40.0
+    drives = [_drive(length, number, rng) for number in range(rng.integers(1, 4))]
+    recorded, errors = zip(*(_record(drive, cause, rng) for drive in drives), strict=True)
+    seen = [_see(local, drive, rng) for drive in drives]
+    hidden = rng.random(n) < 0.1
+    control, whole, moved = _survey(local, kinds, sizes, rng)
+    parts = [
+        _observe(number, local, kinds, sizes, hidden, drive, one, error, rng)
+        for number, (drive, one, error) in enumerate(zip(drives, seen, errors, strict=True), 1)
+    ]
+    truth = np.concatenate([part[1] for part in parts])
+    order = rng.permutation(len(truth))
+    return Made(
+        _stack([part[0] for part in parts])[order],
+        control,
+        _join(recorded),
+        np.vstack([part[2] for part in parts])[order],
+        truth[order],
+        whole,
+        moved,
+        cause,
+    )
+
+
+def _places(rng):
+    """Targets (n, 3) along a way: metres ahead, to the right, up; 30 % of them in pairs."""
+    n = int(rng.integers(20, 61))
+    ahead = 40.0 + np.cumsum(rng.uniform(5.0, 60.0, n))
+    places = np.column_stack([ahead, rng.choice([-1, 1], n) * rng.uniform(4, 15, n)])
+    places = np.column_stack([places, rng.uniform(0.0, 4.0, n)])
+    for i in range(0, n - 1, 7):
+        along = rng.normal(size=3) * [1, 1, 0.3]
+        places[i + 1] = places[i] + PAIR * along / np.linalg.norm(along)
+    return places
+
+
+def _appearances(rng, local):
+    n = len(local)
+    kinds = rng.choice(["circle", "square"], n)
+    sizes = rng.choice([0.3, 0.6], n)
+    for i in range(0, n - 1, 7):
+        kinds[i + 1], sizes[i + 1] = kinds[i], sizes[i]
+    return kinds, sizes
+
+
+def _way(ahead):
+    """The winding street: position (n, 3) in the map and heading (n,) at metres along it."""
+    heading = 0.8 * np.sin(ahead / 150.0)
+    steps = np.linspace(0.0, max(float(np.max(ahead)), 1.0) + 1.0, 20_000)
+    turn = 0.8 * np.sin(steps / 150.0)
+    d = steps[1] - steps[0]
+    east, north = np.cumsum(np.sin(turn)) * d, np.cumsum(np.cos(turn)) * d
+    place = [np.interp(ahead, steps, east), np.interp(ahead, steps, north), 0.01 * ahead]
+    return ORIGIN + np.column_stack(place), heading
+
+
+def _to_map(local):
+    place, heading = _way(local[:, 0])
+    right = np.column_stack([np.cos(heading), -np.sin(heading), np.zeros(len(heading))])
+    return place + local[:, 1:2] * right + local[:, 2:] * [0, 0, 1]
+
+
+def _drive(length, number, rng):
+    """The true trajectory of a pass; odd ones go back. It stops once for a while."""
+    pause = number * (length / SPEED + 120.0)
+    elapsed = np.arange(0.0, length / SPEED + 30.0, 0.1)
+    stop, slow = rng.uniform(0, length / SPEED), rng.uniform(5, 25)
+    driven = SPEED * np.where(elapsed < stop, elapsed, np.maximum(elapsed - slow, stop))
+    driven = np.clip(driven, 0.0, length)
+    ahead = length - driven if number % 2 else driven
+    place, heading = _way(ahead)
+    attitude = attitude_from_angles(0.0, 0.0, heading + np.pi * (number % 2))
+    return Trajectory(START + pause + elapsed, place, attitude)
+
+
+def _see(local, drive, rng):
+    """When each target is seen: gps_time (n,) of the nearest epoch, a little later or earlier."""
+    place, _ = _way(local[:, 0])
+    distance = np.linalg.norm(drive.position[None, ::5] - place[:, None], axis=2)
+    time = drive.gps_time[::5][np.argmin(distance, axis=1)]
+    time = time + rng.uniform(-0.2, 0.2, len(time))
+    return np.clip(time, drive.gps_time[0], drive.gps_time[-1])
+
+
+def _record(drive, cause, rng):
+    """What the POS records: the trajectory with sigmas, and its position error (n, 3)."""
+    n = len(drive)
+    if cause in ("mems", "real"):
+        if cause == "real":
+            made = given_error(drive, read_pos_error_series(SERIES), rng)
+        else:
+            span = drive.gps_time[-1] - drive.gps_time[0]
+            outages = [(t, 60.0) for t in np.arange(20.0, span - 70.0, 130.0)]
+            scenario = PosScenario(grade="mems", processing="filtered", outages=tuple(outages))
+            made = pos_error(drive, scenario, rng)
+        smaller = min(1.0, 3.0 / np.linalg.norm(made.position, axis=1).max())
+        error = smaller * made.position
+        sigma = smaller * made.position_sigma * 2.0 ** rng.uniform(-1, 1)
+        angles = made.attitude_sigma
+    else:
+        make_error = _outages if cause == "outages" else _sinusoids
+        error, size = make_error(drive.gps_time, rng)
+        sigma = np.hypot(0.02, size * 2.0 ** rng.uniform(-1, 1))
+        angles = np.full((n, 3), 2e-4)
+    error = error + rng.normal(0.0, 0.1, 3)
+    recorded = Trajectory(drive.gps_time, drive.position + error, drive.attitude, sigma, angles)
+    return recorded, error
+
+
+def _outages(gps_time, rng):
+    """Wandering velocity errors in outages of 20 to 60 s, bridged back; up to 3 m."""
+    error, size = np.zeros((len(gps_time), 3)), np.zeros((len(gps_time), 3))
+    start = gps_time[0] + rng.uniform(0, 40)
+    while start < gps_time[-1]:
+        rows = np.flatnonzero((gps_time >= start) & (gps_time < start + rng.uniform(20, 60)))
+        if len(rows) > 2:
+            share = np.linspace(0, 1, len(rows))
+            walk = np.cumsum(np.cumsum(rng.standard_normal((len(rows), 3)), axis=0), axis=0)
+            walk -= share[:, None] * walk[-1]
+            largest = rng.uniform(0.3, 3.0)
+            error[rows] = walk * largest / np.linalg.norm(walk, axis=1).max()
+            size[rows] = largest / 2 * np.sin(np.pi * share)[:, None]
+        start += rng.uniform(60, 150)
+    return error + 0.02 * np.sin(gps_time / 7)[:, None], size
+
+
+def _sinusoids(gps_time, rng):
+    """Sums of sinusoids of 30 to 300 s in each axis; up to 3 m."""
+    periods, phases = rng.uniform(30, 300, (5, 3)), rng.uniform(0, 2 * np.pi, (5, 3))
+    argument = 2 * np.pi * gps_time[:, None, None] / periods + phases
+    error = (rng.uniform(0.2, 1, (5, 3)) * np.sin(argument)).sum(axis=1)
+    error *= rng.uniform(0.5, 3.0) / np.linalg.norm(error, axis=1).max()
+    return error, np.full(error.shape, np.sqrt(np.mean(error**2)))
+
+
+def _survey(local, kinds, sizes, rng):
+    """ControlPoints, which of them are whole, and how far the others were moved."""
+    n = len(local)
+    position = _to_map(local)
+    order = rng.permutation(n)
+    pairs = order[: 2 * round(0.05 * n)].reshape(-1, 2)
+    moved_rows = order[2 * len(pairs) :][: round(0.1 * n)]
+    whole, moved = np.ones(n, bool), np.zeros(n)
+    surveyed = position + rng.normal(0, 0.003, (n, 3))
+    # The two points' names are exchanged, with the appearance that belongs to the name: where
+    # that is the same, nothing of it is left to see, nor does it matter.
+    kinds, sizes = kinds.copy(), sizes.copy()
+    for a, b in pairs:
+        whole[[a, b]] = kinds[a] == kinds[b] and sizes[a] == sizes[b]
+        kinds[[a, b]], sizes[[a, b]] = kinds[[b, a]], sizes[[b, a]]
+    away = rng.standard_normal((len(moved_rows), 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    moved[moved_rows] = rng.uniform(0.3, 3.0, len(moved_rows))
+    surveyed[moved_rows] += away * moved[moved_rows, None]
+    whole[moved_rows] = False
+    names = tuple(f"T{i + 1:02d}" for i in range(n))
+    nowhere = np.full((n, 3), np.nan)
+    control = ControlPoints(names, surveyed, np.full((n, 3), 0.003), tuple(kinds), sizes, nowhere)
+    return control, whole, moved
+
+
+def _observe(number, local, kinds, sizes, hidden, drive, seen, error, rng):
+    """TargetObservations of a pass with look-alikes among them, their truth and POS errors."""
+    rows = np.flatnonzero(~hidden & (rng.random(len(local)) > 0.03))
+    extra = round(0.2 * len(rows))
+    near = rng.random(extra) < 0.5
+    beside = local[rng.choice(len(local), extra)] + rng.normal(0, 1.5, (extra, 3)) * [1, 1, 0.5]
+    anywhere = np.column_stack([
+        rng.uniform(0, local[:, 0].max(), extra),
+        rng.choice([-1, 1], extra) * rng.uniform(4, 15, extra),
+        rng.uniform(0, 4, extra),
+    ])  # fmt: skip
+    other = np.where(near[:, None], beside, anywhere)
+    like = rng.integers(0, len(local), extra)
+    times = np.concatenate([seen[rows], _see(other, drive, rng)])
+    at = np.column_stack([np.interp(times, drive.gps_time, e) for e in error.T])
+    n = len(times)
+    sigma = rng.uniform(0.002, 0.01, n)
+    place = _to_map(np.vstack([local[rows], other])) + at + rng.normal(size=(n, 3)) * sigma[:, None]
+    return (
+        TargetObservations(
+            (None,) * n,
+            np.full(n, number),
+            times,
+            place,
+            np.eye(3) * (sigma**2)[:, None, None],
+            np.tile([1.0, 0.0, 0.0], (n, 1)),
+            tuple(kinds[np.append(rows, like)]),
+            sizes[np.append(rows, like)],
+            np.full(n, 100),
+        ),
+        np.append(rows, np.full(extra, -1)),
+        at,
+    )
+
+
+def _stack(parts):
+    first = parts[0]
+    values = {}
+    for name in first.__dataclass_fields__:
+        several = [getattr(part, name) for part in parts]
+        tuples = isinstance(several[0], tuple)
+        values[name] = sum(several, ()) if tuples else np.concatenate(several)
+    return replace(first, **values)
+
+
+def _join(drives):
+    rotation = drives[0].attitude.concatenate([drive.attitude for drive in drives])
+    columns = ("gps_time", "position", "position_sigma", "attitude_sigma")
+    joined = {name: np.concatenate([getattr(drive, name) for drive in drives]) for name in columns}
+    return Trajectory(attitude=rotation, **joined)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,110 @@
+"""The collocation on real drift: ideal targets in windows of a real series of POS errors."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from mlscorr.correction import estimate_correction
+from mlscorr.correction.estimate import _predict_at
+from mlscorr.correction.model import Model, Parameters
+from mlscorr.io.pos_error_series import read_pos_error_series
+from mlscorr.survey import ControlPoints, Pos, TargetObservations, Trajectory, attitude_from_angles
+
+WINDOW, USED = 248.0, 357_881.0  # s: the windows' length; where a shared survey took its own
+FROM, EVERY, LOST = 357_900.0, 150.0, 60.0  # s: GNSS was withheld 60 s in every 150 s
+
+
+def interval(values, statistic=np.median):
+    """Statistic of values (n,) over surveys with its 95 % bootstrap interval, as text."""
+    values = np.asarray(values, dtype=float)
+    drawn = np.random.default_rng(0).integers(len(values), size=(1000, len(values)))
+    low, high = np.percentile([statistic(values[rows]) for rows in drawn], [2.5, 97.5])
+    return f"{statistic(values):.3f} [{low:.3f}, {high:.3f}]"
+
+
+def windows(path):
+    """Real drift; the windows that share more than half with the shared survey's are left out."""
+    series, rows, within = read_pos_error_series(path), [], []
+    lost = (series.gps_time - FROM) % EVERY
+    lost = np.where((series.gps_time >= FROM) & (lost < LOST), lost, 0.0)
+    sigma = np.outer(lost**2, [3.33e-4, 3.33e-4, 1.92e-4]) + np.array([0.015, 0.015, 0.03])
+    starts = np.arange(series.gps_time[0], series.gps_time[-1] - WINDOW, WINDOW / 4)
+    for seed, first in enumerate(starts):
+        part = (series.gps_time >= first) & (series.gps_time <= first + WINDOW)
+        if abs(first - USED) < WINDOW / 2:
+            continue
+        case = _window(series.gps_time[part], -series.position[part], sigma[part], seed)
+        trajectory, observations, control, error = case
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = estimate_correction(trajectory, observations, control)
+        corrected = found.correction.corrected
+        remaining = error - (corrected.position - trajectory.position)
+        within.append(
+            [np.mean(np.abs(remaining / corrected.position_sigma) < k) for k in (1, 1.96)]
+        )
+        misclosure = control.position - observations.position
+        fits = [np.polynomial.Legendre.fit(observations.gps_time, m, 5) for m in misclosure.T]
+        fitted = error - np.column_stack([fit(trajectory.gps_time) for fit in fits])
+        stationary = error - _stationary(trajectory, observations, control)
+        rows.append(
+            [np.sqrt(np.mean(v**2, axis=0)) for v in (error, fitted, stationary, remaining)]
+        )
+    rows = np.array(rows)
+    total = np.linalg.norm(rows, axis=2)
+    print(f"{len(rows)} windows of {WINDOW:.0f} s. Medians   E      N      H      3-D")
+    for i, name in enumerate(("raw", "LS, order 5", "stationary exponential", "mlscorr")):
+        medians = [*np.median(rows[:, i], axis=0), np.median(total[:, i])]
+        print(f"{name:24s}", *(f"{value:6.3f}" for value in medians))
+    for i, name in ((1, "LS, order 5"), (2, "stationary exponential")):
+        medians = np.median(total[:, i]) / np.median(total[:, 3])
+        print(f"{name}: {medians:.2f} times by medians, window by window "
+              f"{interval(total[:, i] / total[:, 3])} times mlscorr's error")  # fmt: skip
+    shares = np.mean(within, axis=0)
+    print(f"truth within 1 sigma {shares[0]:.1%}, within 1.96 sigma {shares[1]:.1%}")
+
+
+def _window(gps_time, error, sigma, seed):
+    """A drive of 10 m/s with a POS error (true - recorded) and 16 even targets beside it."""
+    rng, n = np.random.default_rng(seed), 16
+    zero = np.zeros(len(gps_time))
+    way = np.array([532_000.0, 3_374_000.0, 40.0]) + np.outer(gps_time - gps_time[0], [6.0, 8.0, 0])
+    attitude = attitude_from_angles(zero, zero, np.arctan2(0.6, 0.8))
+    true = Trajectory(gps_time, way, attitude)
+    recorded = Trajectory(gps_time, way - error, attitude, sigma)
+    times = np.linspace(gps_time[0] + 2, gps_time[-1] - 2, n)
+    arm = np.column_stack([np.resize([-6.0, 9.0, 14.0, -11.0], n), np.zeros(n), -np.ones(n)])
+    name, kind = tuple(f"T{i:02d}" for i in range(n)), ("circle",) * n
+    up, size = np.tile([0.0, 0.0, 1.0], (n, 1)), np.full(n, 0.6)
+    centre, seen = (
+        t.at(times).position + t.at(times).attitude.apply(arm) for t in (true, recorded)
+    )
+    surveyed = centre + 0.003 * rng.normal(size=(n, 3))
+    control = ControlPoints(name, surveyed, np.full((n, 3), 0.003), kind, size, up)
+    noise = np.tile(0.005**2 * np.eye(3), (n, 1, 1))
+    seen = seen + 0.005 * rng.normal(size=(n, 3))
+    passes, points = np.ones(n, int), np.full(n, 300)
+    return (
+        recorded,
+        TargetObservations(name, passes, times, seen, noise, up, kind, size, points),
+        control,
+        error,
+    )
+
+
+def _stationary(trajectory, observations, control):
+    """Position error (n, 3) by one exponential covariance of constant sigma, as in the paper, with
+    scale and correlation time by restricted likelihood."""
+    constant = replace(trajectory, position_sigma=np.full((len(trajectory), 3), 0.3))
+    model = Model.build(constant, observations, control, Pos())
+
+    def parameters(x):
+        return Parameters("exponential", *np.exp(x), 1.0, 1.0, 1.0, 1.0, 1.0)
+
+    def negative(x):
+        return -model.solve(parameters(x), 1).log_likelihood
+
+    best = minimize(negative, [0.0, np.log(60.0)], method="Nelder-Mead").x
+    return _predict_at(model, parameters(best), 1, np.arange(len(trajectory)))[0][:, :3]

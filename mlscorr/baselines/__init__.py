@@ -1,0 +1,29 @@
+"""What a correction by collocation is measured against: anything with apply(cloud) will do.
+
+The first kind moves the cloud as one body and knows nothing of time: shift, transformation, rigid,
+affine and, in ``mlscorr.baselines.registration``, ICP. The second kind follows time: a polynomial
+per axis, and the collocation as Mao et al. 2015 printed it.
+"""
+
+from mlscorr.baselines.geometry import Undetermined
+from mlscorr.baselines.polynomial import fit_literal, fit_polynomial
+from mlscorr.baselines.transformation import (
+    RAW,
+    Transformation,
+    fit_affine,
+    fit_horizontal_and_height,
+    fit_rigid,
+    fit_shift,
+)
+
+__all__ = [
+    "RAW",
+    "Transformation",
+    "Undetermined",
+    "fit_affine",
+    "fit_horizontal_and_height",
+    "fit_literal",
+    "fit_polynomial",
+    "fit_rigid",
+    "fit_shift",
+]

@@ -1,0 +1,113 @@
+"""Corrections that move the whole cloud as one: shift, transformation, rigid, affine.
+
+All are fitted by weighted least squares to the misclosures of control points, about a local
+origin. Passes and times are not told apart, which is what these methods lack.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.baselines.geometry import Pairs, Undetermined
+
+
+@dataclass(frozen=True)
+class Transformation:
+    """x' = x + shift + change (x - origin): 12 parameters at most.
+
+    Parameters
+    ----------
+    origin : (3,) array
+        Units: m.
+    shift : (3,) array
+        At the origin. Units: m.
+    change : (3, 3) array
+        Matrix of the transformation less the identity, which keeps its small digits.
+
+    >>> from mlscorr.survey import PointCloud
+    >>> cloud = PointCloud(np.array([[523000.0, 3378000.0, 20.0]]), np.zeros(1), np.zeros(1))
+    >>> up = Transformation(cloud.xyz[0], np.array([0.0, 0.0, 0.25]), np.zeros((3, 3)))
+    >>> float(up.apply(cloud).xyz[0, 2])
+    20.25
+    """
+
+    origin: np.ndarray
+    shift: np.ndarray
+    change: np.ndarray
+
+    def apply(self, cloud):
+        """The PointCloud, transformed."""
+        increments = self.shift + (cloud.xyz - self.origin) @ self.change.T
+        return replace(cloud, xyz=cloud.xyz + increments)
+
+
+RAW = Transformation(np.zeros(3), np.zeros(3), np.zeros((3, 3)))  # the cloud as it was recorded
+
+
+def fit_shift(observations, control):
+    """Transformation by the weighted mean misclosure: 3 parameters.
+
+    Parameters
+    ----------
+    observations : TargetObservations
+        Each with the name of a control point.
+    control : ControlPoints
+    """
+    pairs = Pairs.of(observations, control)
+    return Transformation(pairs.origin, pairs.mean, np.zeros((3, 3)))
+
+
+def fit_horizontal_and_height(observations, control):
+    """Transformation with plan and height solved apart (Mao et al. 2015, section 3.1.5).
+
+    The paper tells only that the two are solved individually. Here, as is usual, the plan has the
+    4 parameters of a similarity (shift, turn, scale), and the height 3 of an inclined plane, or a
+    mean shift alone where fewer than 4 targets, or targets on a line, would have to incline it.
+
+    Raises Undetermined where the targets do not lie apart in plan.
+    """
+    pairs = Pairs.of(observations, control)
+    pairs.require(1, 2, "The 4 parameters in plan", axes=2)
+    root = np.sqrt(pairs.weight)
+    change = np.zeros((3, 3))
+    east, north, _ = (root * pairs.observed).T
+    wanted = root * (pairs.misclosure - pairs.mean)
+    # scale - 1 = a and turn b: dE = a E - b N, dN = b E + a N
+    design = np.vstack([np.column_stack([east, -north]), np.column_stack([north, east])])
+    a, b = np.linalg.lstsq(design, wanted[:, :2].T.ravel(), rcond=None)[0]
+    change[:2, :2] = [[a, -b], [b, a]]
+    try:
+        pairs.require(2, 4, "The inclination of the height", axes=2)
+    except Undetermined:
+        return Transformation(pairs.origin, pairs.mean, change)
+    plan = root * pairs.observed[:, :2]
+    change[2, :2] = np.linalg.lstsq(plan, wanted[:, 2], rcond=None)[0]
+    return Transformation(pairs.origin, pairs.mean, change)
+
+
+def fit_rigid(observations, control):
+    """Rigid motion: 6 parameters (Helmert without scale), by the singular value decomposition.
+
+    Source: Arun, Huang and Blostein 1987, IEEE Trans. PAMI 9, 698-700, with Kabsch's sign.
+    Raises Undetermined for fewer than 3 targets, or targets on one line.
+    """
+    pairs = Pairs.of(observations, control)
+    pairs.require(2, 3, "The 6 parameters of a rigid motion")
+    surveyed = pairs.observed + pairs.misclosure - pairs.mean
+    left, _, right = np.linalg.svd((pairs.weight * pairs.observed).T @ surveyed)
+    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    rotation = right.T @ sign @ left.T
+    return Transformation(pairs.origin, pairs.mean, rotation - np.eye(3))
+
+
+def fit_affine(observations, control):
+    """Affine transformation: 12 parameters.
+
+    Raises Undetermined for fewer than 4 targets, or targets on one plane.
+    """
+    pairs = Pairs.of(observations, control)
+    pairs.require(3, 4, "The 12 parameters of an affine transformation")
+    root = np.sqrt(pairs.weight)
+    wanted = root * (pairs.misclosure - pairs.mean)
+    change = np.linalg.lstsq(root * pairs.observed, wanted, rcond=None)[0].T
+    return Transformation(pairs.origin, pairs.mean, change)

@@ -1,0 +1,54 @@
+"""Bars or lines on stderr, for work that takes longer than a person likes to wait unsure."""
+
+import sys
+from contextlib import contextmanager
+from time import monotonic
+
+from mlscorr.cli.terminal import is_quiet, say
+
+PATIENCE = 2.0  # s; quicker work shows nothing
+INTERVAL = 10.0  # s between the lines where stderr is no terminal
+
+
+@contextmanager
+def progress_bars():
+    """Gives progress(title, total), which gives a function of the number of points just done.
+
+    Bars on a terminal, lines elsewhere, nothing for quick work or when asked to be quiet.
+    """
+    if is_quiet():
+        yield lambda title, total: lambda points: None
+    elif sys.stderr.isatty():
+        with _bars() as progress:
+            yield progress
+    else:
+        yield _lines
+
+
+@contextmanager
+def _bars():
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True)) as bars:
+
+        def progress(title, total):
+            task, start = bars.add_task(title, total=total, visible=False), monotonic()
+            return lambda points: bars.update(
+                task, advance=points, visible=monotonic() - start > PATIENCE
+            )
+
+        yield progress
+
+
+def _lines(title, total):
+    done, due = 0, monotonic() + PATIENCE
+
+    def advance(points):
+        nonlocal done, due
+        done += points
+        if monotonic() > due:
+            due = monotonic() + INTERVAL
+            say(f"{title}: {100 * done / max(total, 1):.0f} %")
+
+    return advance

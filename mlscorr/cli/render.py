@@ -1,0 +1,82 @@
+"""The command that draws pictures of a survey before and after its correction."""
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mlscorr.cli.progress import progress_bars
+from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyFile, exit_code, say
+
+View = StrEnum("View", ("overview", "targets", "section"))
+Colour = StrEnum("Colour", ("intensity", "height", "correction", "sigma"))
+Engine = StrEnum("Engine", ("zbuffer", "open3d"))
+
+
+def render(
+    survey: SurveyFile,
+    out: Out,
+    corrected: Annotated[
+        Path | None,
+        typer.Option(help="Results of mlscorr correct; without them it is estimated anew."),
+    ] = None,
+    view: Annotated[list[View], typer.Option(help="May be repeated.")] = tuple(View),
+    colour: Annotated[
+        Colour | None, typer.Option(help="Of the points; by default what tells most.")
+    ] = None,
+    size: Annotated[str, typer.Option(help="Width x height of each PNG in pixels.")] = "1920x1080",
+    azimuth: Annotated[
+        float | None, typer.Option(help="Where to look, in degrees clockwise from north.")
+    ] = None,
+    elevation: Annotated[
+        float | None,
+        typer.Option(min=-90, max=90, help="From where, in degrees above the horizon."),
+    ] = None,
+    view_angle: Annotated[
+        float, typer.Option(min=0, max=120, help="Width of the view; 0: parallel rays.")
+    ] = 0.0,
+    engine: Annotated[
+        Engine, typer.Option(help="open3d adds the reference surface to the overview, slowly.")
+    ] = Engine.zbuffer,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+):
+    """Draw a survey before and after its correction; neither a display nor a GPU is needed."""
+    with exit_code(Exit.USAGE):
+        from mlscorr.io.output import check_output
+        from mlscorr.io.survey_file import input_files, read_survey
+
+        pixels = read_size(size)
+        check_output(out, input_files(survey), overwrite)
+    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
+        from mlscorr.pipeline.render import render
+
+        drawn = render(
+            read_survey(survey),
+            out,
+            corrected,
+            pixels,
+            overwrite,
+            progress,
+            views=tuple(view),
+            engine=str(engine),
+            colour=colour and str(colour),
+            azimuth=azimuth,
+            elevation=elevation,
+            view_angle=view_angle,
+        )
+    if as_json:
+        print(json.dumps(drawn))
+    for picture in drawn["pictures"]:
+        say(f"{out / picture['file']}: {picture['title']}")
+
+
+def read_size(text):
+    """Width and height of a text such as 1920x1080. Raises ValueError for another."""
+    width, times, height = text.lower().partition("x")
+    if not (times and width.strip().isdecimal() and height.strip().isdecimal()):
+        raise ValueError(f"The size '{text}' is not width x height in pixels, as 1920x1080.")
+    return int(width), int(height)

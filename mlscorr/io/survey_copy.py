@@ -1,0 +1,87 @@
+"""A survey.toml written anew in another folder, with some values changed."""
+
+import glob
+import os
+from pathlib import Path, PurePath
+
+import numpy as np
+import tomlkit
+
+from mlscorr.io.tables import ENCODING
+
+PATHS = (("trajectory", "file"), ("trajectory", "accuracy"), ("control", "file"),
+         ("scene", "reference"))  # fmt: skip
+
+
+def write_survey_copy(source, target, folder, mounting=None, clouds=None, trajectory=None):
+    """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
+
+    Parameters
+    ----------
+    source : path
+        survey.toml as it was.
+    target : path
+        The file to write.
+    folder : path
+        Where the file will stand in the end: paths are written relative to it.
+    mounting : Mounting, optional
+        To 0.01 mm and 1e-6 deg.
+    clouds : list of str, optional
+        New cloud.files, in the folder.
+    trajectory : str, optional
+        New trajectory.file, in the folder.
+    """
+    source = Path(source)
+    document = tomlkit.parse(source.read_text(encoding=ENCODING))
+    there = _way(source.absolute().parent, Path(folder).absolute())
+    for section, key in PATHS:
+        if key in document.get(section, {}):
+            document[section][key] = _moved(there, document[section][key])
+    files = document["cloud"]["files"]
+    for number, name in enumerate(files):  # one by one, which keeps comments between them
+        files[number] = _moved(there, name, source.parent)
+    if clouds is not None:
+        document["cloud"]["files"] = clouds
+    if trajectory is not None:
+        document["trajectory"]["file"] = trajectory
+        document["trajectory"].pop("accuracy", None)  # its sigmas are its own
+    if mounting is not None:
+        lever_arm, boresight = mounting_values(mounting)
+        document["mounting"]["lever_arm"] = lever_arm
+        document["mounting"]["boresight"] = boresight
+        if mounting.covariance is not None:
+            _set_covariance(document["mounting"], mounting.covariance)
+    Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _set_covariance(section, covariance):
+    """Sigmas to 0.01 mm and 1e-6 deg, and correlations to 1e-6."""
+    sigma = np.sqrt(np.diag(covariance))
+    section["lever_arm_sigma"] = np.maximum(np.round(sigma[:3], 5), 1e-5).tolist()
+    section["boresight_sigma"] = np.maximum(np.round(np.degrees(sigma[3:]), 6), 1e-6).tolist()
+    rows = tomlkit.array()
+    for row in (covariance / np.outer(sigma, sigma)).round(6).clip(-1, 1).tolist():
+        rows.add_line(row)
+    section["correlation"] = rows.multiline(True)
+
+
+def mounting_values(mounting):
+    """Lever arm (m) and boresight (deg) as survey.toml has them: two lists of three numbers."""
+    boresight = mounting.boresight.as_euler("xyz", degrees=True)
+    rounded = (np.round(mounting.lever_arm, 5), np.round(boresight, 6))
+    return tuple((values + 0.0).tolist() for values in rounded)
+
+
+def _way(old, new):
+    """The way from the new folder to the old one, links resolved; absolute if there is none."""
+    try:
+        return PurePath(os.path.relpath(old.resolve(), new.resolve()))
+    except ValueError:  # another drive
+        return old
+
+
+def _moved(there, name, folder=None):
+    """A path, or a pattern if it is one in its old folder, as it is seen from the new folder."""
+    if folder is not None and glob.has_magic(name) and not (folder / name).exists():
+        there = PurePath(glob.escape(str(there)))
+    return (there / name).as_posix()

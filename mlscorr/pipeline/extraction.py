@@ -1,0 +1,212 @@
+"""``extract``: from a survey to the list of all target-like objects in its cloud."""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.io.las import read_chunks
+from mlscorr.io.output import (
+    check_output,
+    document,
+    output_folder,
+    write_extracted_csv,
+    write_json,
+)
+from mlscorr.io.survey_file import input_files
+from mlscorr.matching import Matches
+from mlscorr.pipeline.finding import SEED, Finding, fit_while_reading, matched, silent
+from mlscorr.survey import Survey
+from mlscorr.targets.extract import as_observations
+from mlscorr.targets.intensity import why_useless
+from mlscorr.targets.search import are_same, distinct, search_targets
+from mlscorr.targets.shapes import BY_EDGES
+
+UNKNOWN = ("circle", "square", "checkerboard")  # kinds that stand out without a surveyed place
+NO_CONTROL = "No control point is known: every object was taken as it looks."
+
+
+def extract(survey, rng=None, progress=None):
+    """List all target-like objects in the cloud of a survey, with and without control.
+
+    Objects of the control points' kinds and sizes are found everywhere, near control points
+    also those that intensity does not tell; without control, circles, squares and checkerboards
+    of 0.1 to 1.5 m, with their sizes estimated.
+
+    Parameters
+    ----------
+    survey : Survey
+        Its control may be empty.
+    rng : numpy.random.Generator, optional
+        For the plane fit's random samples; the same seed each time by default.
+    progress : function, optional
+        ``progress(title, total)`` returns a function of the number of points just done.
+
+    Returns an ExtractedSurvey. Warns when the intensity tells nothing, or no object was found.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> found = mlscorr.extract(mlscorr.read_survey(folder))
+    >>> sum(row["matched"] for row in found.targets)
+    5
+    """
+    rng = np.random.default_rng(SEED) if rng is None else rng
+    surveyed = survey.control + survey.check
+    kinds = dict.fromkeys(zip(surveyed.kind, surveyed.size.tolist(), strict=True))
+    shapes = [shape for shape in kinds if shape[0] not in BY_EDGES]
+    if len(surveyed) == 0:
+        shapes = [(kind, None) for kind in UNKNOWN]
+    done = (progress or silent)("Searching the cloud", sum(file.points for file in survey.clouds))
+    seen, found = np.zeros(1 << 16, bool), {}
+
+    def searched(file):
+        """The chunks of a file, each searched as it passes."""
+        objects = found.setdefault(len(found), [])
+        chunks = read_chunks(file)
+        for chunk, some in search_targets(
+            chunks, survey.trajectory, shapes, survey.scanner, rng, _lever_arm(survey)
+        ):
+            seen[chunk.intensity] = True
+            objects += some
+            yield chunk
+
+    near, candidates, _ = fit_while_reading(survey, searched, rng, done)
+    everywhere = []
+    for file, objects in found.items():
+        for target in distinct(objects):
+            segment = int(survey.trajectory.segment(target.gps_time))
+            everywhere.append((candidates.passes[file, segment], target))
+    result = _without_doubles(near, everywhere)
+    sentences = _sentences(survey, np.flatnonzero(seen), result)
+    for sentence in sentences:
+        warnings.warn(sentence, stacklevel=2)
+    return ExtractedSurvey(survey, _finding(result, candidates, survey), sentences)
+
+
+def _lever_arm(survey):
+    return np.zeros(3) if survey.mounting is None else survey.mounting.lever_arm
+
+
+def _without_doubles(near, everywhere):
+    """Both lists as one, in order of pass and time; near control, the surveyed size is known."""
+    others = [
+        (number, target)
+        for number, target in everywhere
+        if not any(number == n and are_same(target, other) for n, other in near)
+    ]
+    return sorted(near + others, key=lambda pair: (pair[0], pair[1].gps_time))
+
+
+def _finding(found, candidates, survey):
+    """The Finding, which has no match where nothing was surveyed or found."""
+    if found and len(survey.control) + len(survey.check):
+        return matched(found, candidates, survey)
+    observations = as_observations(found)
+    none = np.zeros(len(found), bool)
+    reasons = (NO_CONTROL,) * len(found)
+    matches = Matches(observations[none], observations, (), np.empty(0), reasons)
+    return Finding(matches, candidates, {(n, t.gps_time): t for n, t in found})
+
+
+def _sentences(survey, intensities, found):
+    """What a reader of the list must know."""
+    sentences = []
+    useless = why_useless(intensities)
+    if useless is not None:
+        values = ", ".join(f"{value}" for value in intensities)
+        sentences.append(
+            f"The cloud has no useful intensity (values: {values}), so that only plates that "
+            "stand free, told by their edges, were looked for. Export the cloud with intensity."
+        )
+    if len(found) == 0:
+        points = sum(file.points for file in survey.clouds)
+        sentences.append(
+            f"No target-like object was found among {points} points. Flat circles, squares and "
+            "checkerboards, brighter than what surrounds them and with 25 points or more, are "
+            "found: check intensity and density of the cloud, and that targets were set up."
+        )
+    return tuple(sentences)
+
+
+@dataclass(frozen=True)
+class ExtractedSurvey:
+    """What was found in a survey's cloud, and ``write``."""
+
+    survey: Survey
+    finding: Finding
+    warnings: tuple[str, ...]
+
+    @property
+    def targets(self):
+        """Rows of every object and pass, as targets.json has them, in order of pass and time."""
+        matches = self.finding.matches
+        rows = self._rows(matches.matched, [None] * len(matches.matched))
+        rows += self._rows(matches.unmatched, matches.reasons)
+        return sorted(rows, key=lambda row: (row["pass"], row["gps_time"]))
+
+    @property
+    def unseen(self):
+        """Surveyed points without an observation, with the pass and the reason."""
+        return [
+            {"name": refusal.name, "pass": refusal.pass_number, "reason": refusal.reason}
+            for refusal in self.finding.matches.refusals
+        ]
+
+    def _rows(self, observations, reasons):
+        rows = []
+        for i, reason in enumerate(reasons):
+            number, time = int(observations.pass_number[i]), float(observations.gps_time[i])
+            fitted = self.finding.fitted[number, time]
+            rows.append(
+                {
+                    "name": observations.name[i],
+                    "pass": number,
+                    "gps_time": time,
+                    "kind": observations.kind[i],
+                    "size": float(observations.size[i]),
+                    "size_sigma": float(fitted.size_sigma),
+                    "observed": observations.position[i].tolist(),
+                    "covariance": observations.covariance[i].tolist(),
+                    "normal": observations.normal[i].tolist(),
+                    "points": int(observations.points[i]),
+                    "score": float(fitted.score),
+                    "matched": observations.name[i] is not None,
+                    "reason": reason,
+                }
+            )
+        return rows
+
+    def write(self, out, overwrite=False):
+        """Write targets.csv, targets.json and the contact sheet targets.png into a folder.
+
+        The folder appears whole or not at all. Returns the document of targets.json. Raises
+        ValueError when the folder holds an input, or holds anything without overwrite; OSError
+        when writing fails.
+        """
+        from mlscorr.report import write_contact_sheet
+
+        check_output(out, input_files(self.survey.path), overwrite)
+        rows = self.targets
+        content = document(
+            "targets",
+            {
+                "name": self.survey.name,
+                "crs": self.survey.crs,
+                "surveyed": len(self.survey.control) + len(self.survey.check),
+                "targets": rows,
+                "unseen": self.unseen,
+                "warnings": list(self.warnings),
+            },
+        )
+        with output_folder(out) as folder:
+            write_extracted_csv(folder / "targets.csv", rows)
+            write_json(folder / "targets.json", content)
+            write_contact_sheet(folder / "targets.png", rows, self.finding.fitted)
+        return content

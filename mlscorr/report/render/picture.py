@@ -1,0 +1,207 @@
+"""Pictures: what the cloud looks like before and after, and how each is laid out on paper."""
+
+import io
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from mlscorr.report.look import STYLE, label
+from mlscorr.report.render.symbols import (
+    FOOT,
+    GAP,
+    HALO,
+    HEAD,
+    INCH,
+    MARK,
+    SYMBOLS,
+    compass,
+    free_corner,
+    legend,
+    letter,
+    scale_bar,
+)
+from mlscorr.report.render.views import View
+
+BETWEEN = 0.045  # of the page: between panels that stand one above the other
+PALETTE = 256  # colours of a PNG: a third of the bytes, and no difference to the eye
+SHORTEST = 14.0  # pixels, a shorter arrow has no head
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One view before and after: RGB (h, w, 3) uint8, by the same camera and colour scale.
+
+    ``limits`` are the ends of the colour scale.
+    """
+
+    view: View
+    before: np.ndarray
+    after: np.ndarray
+    limits: tuple[float, float]
+
+    @property
+    def name(self):
+        """A name for a file, without suffix."""
+        return "".join(c if c.isalnum() or c in "-_." else "_" for c in self.view.name)
+
+    def panels(self, decorated=True):
+        """The bytes of two PNGs, before and after, for one to be laid over the other.
+
+        Undecorated they are the points alone, pixel by pixel.
+        """
+        pair = [self.before, self.after]
+        if decorated:
+            corner = free_corner(*pair)
+            height, width = self.before.shape[:2]
+            for k in (0, 1):
+                figure = _blank(width, height)
+                axes = _panel(figure, self.view, k, pair[k], (0, 0))
+                scale_bar(axes, self.view.camera)
+                compass(axes, self.view.camera, corner)
+                pair[k] = _drawn(figure)
+        both = _few_colours(np.concatenate(pair))  # the same colours in both
+        width, half = both.width, both.height // 2
+        return tuple(png(both.crop((0, k * half, width, (k + 1) * half))) for k in (0, 1))
+
+    def page(self, size):
+        """The bytes of a PNG: before and after side by side under a title, with a legend.
+
+        size are its width and height in pixels.
+        """
+        figure, corner = _blank(*size), free_corner(self.before, self.after)
+        corners = panel_corners(self.view.camera.size, size)
+        for k, words in enumerate(("Before the correction", "After the correction")):
+            axes = _panel(figure, self.view, k, (self.before, self.after)[k], corners[k])
+            axes.set_title(words, fontsize=letter(axes, 1.0), color="#333333", loc="left")
+            scale_bar(axes, self.view.camera)
+            compass(axes, self.view.camera, corner)
+        _words(figure, self.view, corners[0][0] / size[0])
+        legend(figure, self)
+        return png(_few_colours(_drawn(figure)))
+
+
+def panel_size(page, stacked=False):
+    """Width and height in pixels of each of the two panels on a page of this size."""
+    width, height = page
+    gap, high = round(GAP * width), height - round((HEAD + FOOT) * height)
+    if stacked:
+        return width - 2 * gap, (high - round(BETWEEN * height)) // 2
+    return (width - 3 * gap) // 2, high
+
+
+def panel_corners(panel, page):
+    """Column and row of the upper left corner of both panels on their page.
+
+    They stand one above the other where there is no room side by side.
+    """
+    top = round(HEAD * page[1])
+    if 2 * panel[0] > page[0]:
+        left = (page[0] - panel[0]) // 2
+        return (left, top), (left, top + panel[1] + round(BETWEEN * page[1]))
+    gap = (page[0] - 2 * panel[0]) // 3
+    return (gap, top), (2 * gap + panel[0], top)
+
+
+def png(image):
+    """The bytes of a PNG of a PIL image."""
+    stream = io.BytesIO()
+    image.save(stream, "png", compress_level=6)
+    return stream.getvalue()
+
+
+def _few_colours(pixels):
+    return Image.fromarray(pixels).quantize(PALETTE, dither=Image.Dither.NONE)
+
+
+def _blank(width, height):
+    figure = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _drawn(figure):
+    with matplotlib.rc_context(STYLE):
+        figure.canvas.draw()
+    return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()
+
+
+def _panel(figure, view, k, pixels, corner):
+    """The points of one side, pixel by pixel, its marks over them; returns its axes in pixels."""
+    height, width = pixels.shape[:2]
+    wide, high = figure.get_size_inches() * INCH
+    bottom = high - corner[1] - height
+    figure.figimage(pixels, corner[0], bottom, origin="upper", zorder=-1)
+    axes = figure.add_axes((corner[0] / wide, bottom / high, width / wide, height / high))
+    axes.set(xlim=(0, width), ylim=(height, 0), xticks=[], yticks=[], facecolor="none")
+    axes.spines[:].set(visible=True, color="#bbbbbb", linewidth=0.8)
+    for mark in view.marks[k]:
+        _mark(axes, mark, view.camera)
+    _names(axes, view.marks[k], view.camera)
+    return axes
+
+
+def _mark(axes, mark, camera):
+    pixel = camera.project(mark.points)[0]
+    if mark.kind == "surveyed":
+        axes.plot(*pixel.T, color=MARK, linewidth=2.2, path_effects=HALO)
+        middle = pixel.mean(axis=0) if len(pixel) > 5 else pixel[:4].mean(axis=0)
+        axes.plot(*middle, marker="+", markersize=15, markeredgewidth=2, color=MARK)
+    elif mark.kind == "offset":
+        _arrow(axes, pixel, 2.4)
+    elif mark.kind == "residual":
+        _arrow(axes, pixel, 2.0)
+    else:
+        axes.plot(*pixel.T, markersize=6, markeredgewidth=1.3, **SYMBOLS[mark.kind])
+
+
+def _arrow(axes, pixel, width):
+    if np.hypot(*(pixel[1] - pixel[0])) < SHORTEST:  # the head would be longer
+        axes.plot(*pixel.T, color=MARK, linewidth=width, path_effects=HALO)
+        return
+    axes.annotate(
+        "",
+        xy=pixel[1],
+        xytext=pixel[0],
+        arrowprops={
+            "arrowstyle": "-|>,head_width=0.28,head_length=0.55",
+            "color": MARK,
+            "linewidth": width,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "path_effects": HALO,
+        },
+    )
+
+
+def _names(axes, marks, camera):
+    """Names beside their symbols, left out where one would cover another."""
+    size, taken = letter(axes, 0.62), []
+    for mark in marks:
+        if mark.kind not in SYMBOLS:
+            continue
+        text = label(mark.text)
+        x, y = camera.project(mark.points)[0][0]
+        box = np.array([x + 7, y - size, x + 7 + size * len(text), y + size])
+        if any((box[:2] < b[2:]).all() and (b[:2] < box[2:]).all() for b in taken):
+            continue
+        taken.append(box)
+        axes.text(x + 7, y, text, fontsize=size, va="center", parse_math=False, path_effects=HALO)
+
+
+def _words(figure, view, left):
+    """The title, and the note in the foot."""
+    figure.text(left, 0.982, view.title, va="top", fontsize=letter(figure, 1.55), parse_math=False)
+    figure.text(
+        1 - left,
+        0.018,
+        view.note,
+        ha="right",
+        va="bottom",
+        fontsize=letter(figure, 0.85),
+        color="#444444",
+        parse_math=False,
+    )

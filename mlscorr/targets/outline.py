@@ -1,0 +1,219 @@
+"""Centre of an outline from beams that each tell on which side of it they fell.
+
+The centre is the mean of its posterior under a uniform prior: each beam tells the side of the
+outline it fell on, blurred by footprint and angle noise. The mean of the bright points would be
+drawn to where they are denser. The spread of the posterior is the covariance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+
+from mlscorr.targets.shapes import (
+    CHECKERED,
+    PERIOD,
+    ROUND,
+    distance_inside,
+    distance_on_white,
+    form_of,
+    log_likelihood,
+    sides,
+)
+
+TRIALS = 600  # outlines in each round; half of them in a rough fit
+ROUNDS = 24
+ROUGH_ROUNDS = 5  # of them, enough to tell whether there is an outline; a crossing needs twice
+FEW_POINTS = 120  # of each side, enough while the blur is wide
+ENOUGH = 0.3  # effective share of the trials, at which their mean and spread are the posterior's
+FEWEST = 0.1  # effective share, below which the likelihood is flattened until it has as many
+WIDER = 1.35  # times the posterior's spread: the next trials
+PLAY = 0.45  # of the size, from where the fit begins to the centre: half of it may be hidden
+FIRST_BLUR = 8.0  # the size over the blur at first, so that the best outline is never lost
+GOLDEN = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101, 0.46140288)
+
+
+@dataclass(frozen=True)
+class Size:
+    """What is known of a size before the fit: mean and sigma within [low, high]. Units: m."""
+
+    mean: float
+    sigma: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A fitted outline in its plane.
+
+    Parameters
+    ----------
+    centre : (2,) array
+        Units: m.
+    covariance : (2, 2) array
+        Of the centre. Units: m^2.
+    turn, size, inner : float
+        As in ``shapes``: rad, m, share.
+    size_sigma : float
+        Units: m.
+    overlap : float
+        Share of the beams inside by the outline or by what they tell that are so by both.
+    """
+
+    centre: np.ndarray
+    covariance: np.ndarray
+    turn: float
+    size: float
+    inner: float
+    size_sigma: float
+    overlap: float
+
+    @property
+    def row(self):
+        """The outline as a row of trial outlines."""
+        return np.array([*self.centre, self.turn, self.size, self.inner])
+
+
+def fit_outline(
+    points, state, kind, size, blur, start=None, by_edges=False, ring=False, rough=False
+):
+    """Fit an outline to beams that crossed its plane.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        Where they crossed it. Units: m.
+    state : (n,) int array
+        What each did there: BRIGHT, DARK or PASSED.
+    kind : str
+    size : Size
+    blur : float
+        One sigma of a beam's place across the outline. Units: m.
+    start : (2,) array, optional
+        Where to begin; else the middle of the beams inside. Units: m.
+    by_edges : bool
+        Whether intensity tells nothing.
+    ring : bool
+        Whether a circle has a dark inner disc.
+    rough : bool
+        Whether to stop early.
+
+    Returns an Outline. Source: population Monte Carlo (Cappe et al. 2004) on quasi-random trials;
+    the blur starts wide and halves, so that the posterior's mode is not lost.
+    """
+    form, side = form_of(kind, by_edges), sides(state, kind, by_edges)
+    period = PERIOD.get(kind, 0.0)
+    if start is None:
+        start = (points[side == 1].min(axis=0) + points[side == 1].max(axis=0)) / 2
+    count = TRIALS // (1 + rough)
+    trials, free = _first_trials(start, size, period, ring, count)
+    spent = np.zeros(len(trials))  # minus log of the density they were drawn from
+    width, mean, spread = size.mean / FIRST_BLUR, trials.mean(axis=0), np.ptp(trials, axis=0) / 2
+    rounds = ROUGH_ROUNDS * (1 + (form == CHECKERED)) if rough else ROUNDS
+    for number in range(1, rounds + 1):
+        near = _telling(points, mean, spread, form, max(width, blur))
+        if width > blur:
+            near = _thinned(near, side, FEW_POINTS // (1 + rough))
+        value = log_likelihood(points[near], side[near], trials, form, max(width, blur))
+        value += spent + _log_prior(trials, size, start, ring)
+        weight, effective = _weights(value)
+        mean, covariance = _moments(trials, weight, period)
+        spread = 4 * np.sqrt(np.diag(covariance))
+        if width <= blur and effective > ENOUGH * count:
+            break
+        if effective > FEWEST * count:
+            width /= 2
+        drawn = WIDER**2 * covariance[np.ix_(free, free)]
+        trials, spent = _next_trials(mean, drawn, free, number, count)
+    distance = distance_inside(points, mean, form)
+    if form == CHECKERED:
+        told, inside = side == 1, (distance > 0) & (distance_on_white(points, mean) > 0)
+        told &= distance > 0
+    else:
+        told, inside = side == 1, distance > 0
+    return Outline(
+        mean[:2],
+        covariance[:2, :2],
+        float(mean[2]),
+        float(mean[3]),
+        float(mean[4]),
+        float(np.sqrt(covariance[3, 3])),
+        float((inside & told).sum() / max((inside | told).sum(), 1)),
+    )
+
+
+def _sequence(n, dimensions, shift=0):
+    """Quasi-random numbers (n, d) in (0, 1). Source: Roberts 2018, the R sequence."""
+    steps = np.arange(1, n + 1)[:, None] + 1009 * shift
+    return (0.5 + steps * np.array(GOLDEN[:dimensions])) % 1.0
+
+
+def _first_trials(middle, size, period, ring, count):
+    """Outlines (c, 5) all about the middle, and which of their columns are free."""
+    reach = PLAY * size.mean
+    low = np.array([*(middle - reach), 0.0, size.low, 0.15 if ring else 0.0])
+    high = np.array([*(middle + reach), period, size.high, 0.9 if ring else 0.0])
+    return low + (high - low) * _sequence(count, 5), np.flatnonzero(high > low)
+
+
+def _next_trials(mean, covariance, free, number, count):
+    """Outlines drawn from a normal distribution, and minus the log of its density."""
+    scale = np.sqrt(np.diag(covariance)) + 1e-9
+    correlation = covariance / np.outer(scale, scale) + 1e-6 * np.eye(len(free))
+    root = np.linalg.cholesky(correlation) * scale[:, None]
+    normal = ndtri(_sequence(count, len(free), number))
+    trials = np.tile(mean, (count, 1))
+    trials[:, free] += normal @ root.T
+    return trials, 0.5 * np.sum(normal**2, axis=1)
+
+
+def _log_prior(trials, size, middle, ring):
+    """Log prior (c,) of trial outlines: uniform about the middle but for the size."""
+    within = (np.abs(trials[:, :2] - middle) <= PLAY * size.mean).all(axis=1)
+    within &= (trials[:, 3] >= size.low) & (trials[:, 3] <= size.high)
+    if ring:
+        within &= (trials[:, 4] >= 0.1) & (trials[:, 4] <= 0.95)
+    return np.where(within, -0.5 * ((trials[:, 3] - size.mean) / size.sigma) ** 2, -1e9)
+
+
+def _weights(value):
+    """Weight (c,) of trials by the log of their posterior, and how many they effectively are.
+
+    Where too few carry all the weight, the posterior is raised to a power below one.
+    """
+    power = 1.0
+    while True:
+        weight = np.exp(power * (value - value.max()))
+        weight /= weight.sum()
+        effective = 1 / (weight @ weight)
+        if effective >= FEWEST * len(value) or power < 1e-6:
+            return weight, effective if power == 1.0 else 0.0
+        power *= 0.7
+
+
+def _moments(trials, weight, period):
+    """Weighted mean (5,) and covariance (5, 5) of outlines; turns are alike by their period."""
+    trials = trials.copy()
+    if period:
+        angle = np.angle(weight @ np.exp(2j * np.pi / period * trials[:, 2])) * period / 2 / np.pi
+        trials[:, 2] = angle + (trials[:, 2] - angle + period / 2) % period - period / 2
+    mean = weight @ trials
+    deviation = trials - mean
+    return mean, (weight[:, None] * deviation).T @ deviation
+
+
+def _telling(points, mean, spread, form, width):
+    """Rows of the points that can lie near the outline: all others say the same of every trial."""
+    turned = mean[3] * spread[2] * (form != ROUND)
+    play = np.hypot(spread[0], spread[1]) + turned + spread[3] / 2 + spread[4] + 6 * width
+    distance = np.abs(distance_inside(points, mean, form))
+    if form == CHECKERED:
+        distance = np.minimum(distance, np.abs(distance_on_white(points, mean)))
+    return np.flatnonzero(distance < play)
+
+
+def _thinned(rows, side, few):
+    """At most so few of the rows on each side, evenly among them."""
+    parts = [rows[side[rows] == value] for value in (-1, 0, 1)]
+    return np.concatenate([part[:: len(part) // few + 1] for part in parts])

@@ -1,0 +1,76 @@
+"""Occupied cubes of a chunk of cloud in a hash table, so that millions of points cost little."""
+
+import numpy as np
+from numba import njit
+
+EMPTY = -1
+
+
+@njit(cache=True)
+def key_of(x, y, z, edge):
+    return (np.int64(x / edge) << 42) | (np.int64(y / edge) << 21) | np.int64(z / edge)
+
+
+@njit(cache=True)
+def _slot(keys, key):
+    """Where a key stands, or would stand, in an open hash table of a power of two."""
+    mask = len(keys) - 1
+    slot = ((key ^ (key >> 23)) * np.int64(-7046029254386353131)) >> 20 & mask
+    while keys[slot] != EMPTY and keys[slot] != key:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@njit(cache=True)
+def number_voxels(xyz, low, edge):
+    """Number (n,) of the occupied cube of each point, and the key of each cube."""
+    size = 1024
+    keys = np.full(size, EMPTY)
+    number = np.empty(size, np.int64)
+    of_point = np.empty(len(xyz), np.int32)
+    found = np.empty(len(xyz), np.int64)
+    count, last_key, last = 0, np.int64(EMPTY), 0
+    for i in range(len(xyz)):
+        key = key_of(xyz[i, 0] - low[0], xyz[i, 1] - low[1], xyz[i, 2] - low[2], edge)
+        if key != last_key:
+            slot = _slot(keys, key)
+            if keys[slot] == EMPTY:
+                keys[slot], number[slot], found[count] = key, count, key
+                count += 1
+                if 2 * count > size:
+                    size *= 4
+                    keys, number = np.full(size, EMPTY), np.empty(size, np.int64)
+                    for k in range(count):
+                        slot = _slot(keys, found[k])
+                        keys[slot], number[slot] = found[k], k
+                    slot = _slot(keys, key)
+            last_key, last = key, number[slot]
+        of_point[i] = last
+    return of_point, found[:count].copy(), keys, number
+
+
+@njit(cache=True)
+def sort_by_voxel(cell, count):
+    """Rows (n,) sorted by cell, and where each cell starts among them (c + 1,)."""
+    starts = np.zeros(count + 1, np.int64)
+    for i in range(len(cell)):
+        starts[cell[i] + 1] += 1
+    starts = np.cumsum(starts)
+    free, order = starts[:-1].copy(), np.empty(len(cell), np.int64)
+    for i in range(len(cell)):
+        order[free[cell[i]]] = i
+        free[cell[i]] += 1
+    return order, starts
+
+
+@njit(cache=True)
+def neighbours(key, keys, number):
+    """Numbers of the occupied cubes among the 27 about a key."""
+    for dx in range(-1, 2):
+        for dy in range(-1, 2):
+            for dz in range(-1, 2):
+                beside = key + (dx << 42) + (dy << 21) + dz
+                if beside >= 0:
+                    slot = _slot(keys, beside)
+                    if keys[slot] == beside:
+                        yield number[slot]
