@@ -1,0 +1,226 @@
+"""Where observed and simulated differ by more than the simulator itself predicts.
+
+With u the innovations of the residuals in the order of time and sigma_i their predicted sigmas,
+
+    G^2 = mean of sigma_i^2 (u_i^2 - 1)
+
+is what the simulator doesn't account for: zero on average when it is right, negative as often as
+positive. Each row has one term, so G^2 adds up over any split of the rows. Lengths are printed
+as sign(G^2) |G^2|^(1/2), in mm.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mlscorr.gap.background import BELIEVED, epochs
+from mlscorr.gap.whitening import whitener
+
+SPLITS = (
+    *("time", "location", "range", "incidence", "scan_angle", "intensity"),
+    *("speed", "turn_rate", "pass", "axis", "channel"),
+)
+NAMES = {  # what a number of a split is called, and its unit
+    "time": ("time", "s"),
+    "location": ("location", "m"),
+    "range": ("range", "m"),
+    "incidence": ("incidence angle", "deg"),
+    "scan_angle": ("scan angle", "deg"),
+    "intensity": ("log intensity", "decades"),
+    "speed": ("speed", "m/s"),
+    "turn_rate": ("turn rate", "deg/s"),
+}
+DEGREES = ("incidence", "scan_angle", "turn_rate")
+AXES = ("E", "N", "H")
+BINS = 8  # of a continuous split, with as many rows each
+BAND = (2.5, 97.5)  # percent
+PLAIN = 1.3  # times its share of the rows, from which on a bin's share of the gap is told
+
+
+@dataclass(frozen=True)
+class Split:
+    """The gap by one covariate.
+
+    Parameters
+    ----------
+    by : str
+        One of SPLITS.
+    edges : (b + 1,) array or None
+        Of continuous ones; angles in degrees.
+    bins : tuple of str
+        Otherwise.
+    count : (b,) int array
+        Rows in each.
+    before, after : (b,) array
+        Signed gap of the rows of each bin. Units: mm.
+    share : (b,) array
+        Of the squared gap of all rows; sums to one.
+    band : (b, 2) array
+        95 % of what each bin's gap is when nothing is wrong. Units: mm.
+    """
+
+    by: str
+    edges: np.ndarray | None
+    bins: tuple[str, ...]
+    count: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    share: np.ndarray
+    band: np.ndarray
+
+
+@dataclass(frozen=True)
+class Where:
+    """The gap and its splits.
+
+    Parameters
+    ----------
+    before, after : float
+        Signed; after is with the cause taken off. Units: mm.
+    null_band : (float, float)
+        95 % of what it is when nothing is wrong. Units: mm.
+    splits : tuple of Split
+    row : (n,) int array
+        Which row each innovation is of.
+    gps_time : (n,) array
+        Units: s.
+    innovation : (n, 2) array
+        u before and after.
+    sigma : (n,) array
+        Of the innovations. Units: m.
+    headline : str
+    """
+
+    before: float
+    after: float
+    null_band: tuple[float, float]
+    splits: tuple[Split, ...]
+    row: np.ndarray
+    gps_time: np.ndarray
+    innovation: np.ndarray
+    sigma: np.ndarray
+    headline: str
+
+
+def signed_mm(square):
+    """sign(g) |g|^(1/2) of squares in m^2, in mm."""
+    return 1e3 * np.sign(square) * np.sqrt(np.abs(square))
+
+
+def locate(rows, background, shift, rng, chance, setting=BELIEVED, extra=None):
+    """Where the gap lies, before and after a cause is taken off: Where.
+
+    Parameters
+    ----------
+    rows : Rows
+    background : Background
+    shift : (m,) array
+        What the cause makes of the residuals; zero for none.
+    rng : numpy.random.Generator
+    chance : sequence of Setting
+        Of each replica for the null band: a survey in which nothing acts, whose POS errs, and whose
+        noise has tails, as this one's do once the cause is taken off.
+    setting : Setting
+        Of V after: another one than believed when the cause is in the noise of the POS.
+    extra : (m,) array, optional
+        Variance that a noise of the rows' own adds, after.
+    """
+    observed = epochs(rows, background)
+    columns = observed.columns(np.column_stack([rows.residual, rows.residual - shift]))
+    believed = whitener(observed, BELIEVED)
+    tails = whitener(observed, max(chance, key=chance.count)).innovations(columns[:, 1:])[0][:, 0]
+    drawn = [whitener(observed, s).draw(rng, chance.count(s), tails) for s in dict.fromkeys(chance)]
+    u, sigma = believed.innovations(np.hstack([columns, *drawn]))
+    terms = sigma[:, None] ** 2 * (u**2 - 1)
+    if setting != BELIEVED or extra is not None:
+        more = 0.0 if extra is None else extra[observed.row] * observed.half
+        again, wider = whitener(observed, setting, more).innovations(columns[:, 1:])
+        u[:, 1] = again[:, 0]
+        terms[:, 1] = wider**2 * (again[:, 0] ** 2 - 1)
+    kept = observed.second
+    terms, row = terms[kept], observed.row[kept]
+    mean = terms.mean(axis=0)
+    band = tuple(float(v) for v in np.percentile(signed_mm(mean[2:]), BAND))
+    splits = tuple(
+        one for by in SPLITS if (one := _split(rows, row, by, terms, mean[0])) is not None
+    )
+    before, after = (float(v) for v in signed_mm(mean[:2]))
+    return Where(
+        before, after, band, splits, row, observed.gps_time[kept], u[kept, :2], sigma[kept],
+        _headline(before, band, splits, len(row)),
+    )  # fmt: skip
+
+
+def _split(rows, row, by, terms, total):
+    """The gap by one covariate, or None where it is not known or the same for all rows."""
+    edges, bins, number = _bins(rows, row, by)
+    if number is None:
+        return None
+    count = np.bincount(number, minlength=len(bins))
+    sums = np.array([np.bincount(number, column, len(bins)) for column in terms.T]).T
+    mean = signed_mm(sums / np.maximum(count, 1)[:, None])
+    return Split(
+        by, edges, bins, count, mean[:, 0], mean[:, 1],
+        sums[:, 0] / (total * len(row)) if total else np.zeros(len(bins)),
+        np.percentile(mean[:, 2:], BAND, axis=1).T,
+    )  # fmt: skip
+
+
+def _bins(rows, row, by):
+    """Edges or None, names, and the bin of each row."""
+    if by == "channel":
+        names, number = np.unique(rows.channel[row], return_inverse=True)
+        return None, tuple(str(name) for name in names), number
+    values = rows.covariates[by][row]
+    if not np.isfinite(values).all():
+        return None, (), None
+    if by in ("pass", "axis"):
+        known, number = np.unique(values.astype(int), return_inverse=True)
+        names = [AXES[k] if by == "axis" and k >= 0 else str(k) for k in known]
+        return None, tuple(names), number
+    values = np.degrees(values) if by in DEGREES else values
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    if len(edges) < 2:
+        return None, (), None
+    number = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    return (
+        edges,
+        tuple(f"{a:.4g} to {b:.4g}" for a, b in pairwise(edges)),
+        number,
+    )
+
+
+def _headline(before, band, splits, number):
+    """One sentence: how large, and where most of it is."""
+    low, high = band
+    if before <= high:
+        return (
+            f"The gap of {before:.1f} mm is not measurable: when nothing is wrong, it lies between "
+            f"{low:.1f} and {high:.1f} mm."
+        )
+    said = (
+        f"Observed and simulated differ by {before:.1f} mm more than the simulator predicts "
+        f"({low:.1f} to {high:.1f} mm when nothing is wrong)"
+    )
+    best, most = None, 0.0
+    for split in splits:
+        fraction = split.count / number
+        for i in range(len(split.bins)):
+            plain = split.share[i] > PLAIN * fraction[i]
+            if plain and split.share[i] - fraction[i] > most:
+                best, most = (split, i), split.share[i] - fraction[i]
+    if best is None:
+        return said + ", everywhere alike."
+    split, i = best
+    return (
+        f"{said}; {100 * min(split.share[i], 1.0):.0f} % of it is {_place(split, i)}, where "
+        f"{100 * split.count[i] / number:.0f} % of the rows are."
+    )
+
+
+def _place(split, i):
+    if split.edges is None:
+        return f"in the {split.by} {split.bins[i]}"
+    name, unit = NAMES[split.by]
+    return f"at a {name} of {split.bins[i]} {unit}"
