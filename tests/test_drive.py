@@ -295,7 +295,7 @@ def test_an_sbet_is_followed_in_its_own_zone():
 
 
 def own_csv(path, gap=0.0, speed=8.0):
-    "A drive with a stop, as interface.md's CSV; with a gap it has two passes"
+    "A drive with a stop, as our own CSV; with a gap it has two passes"
     elapsed = np.arange(0.0, 40.0, 0.05)
     distance = speed * np.where(elapsed < 15, elapsed, np.maximum(15.0, elapsed - 5.0))
     place = np.column_stack([60 * np.sin(distance / 60), 60 - 60 * np.cos(distance / 60)])

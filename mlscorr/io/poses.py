@@ -1,7 +1,7 @@
 """Paths that a simulated vehicle follows, from files of several kinds.
 
 A path is moved to where the simulation wants it, so only its shape, its attitude and its timing
-matter. An attitude is taken only from files whose convention is known (interface.md's CSV, SBET);
+matter. An attitude is taken only from files whose convention is known (our own CSV, SBET);
 for all others it is left to the course over ground.
 """
 
