@@ -168,7 +168,8 @@ def pairs(rows, signatures, found):
     cause that leaves it impersonates another.
     """
     score = {name: float(value[0]) for name, value in found.score.items()}
-    total = np.logaddexp.reduce(list(score.values()))
+    # unknown is left out of the sum: its blocks can hold two effects that are a pair
+    total = np.logaddexp.reduce([value for name, value in score.items() if name != "unknown"])
     order = sorted(score, key=score.get, reverse=True)
     firsts = [n for n in order if n not in ("none", "unknown")]
     firsts = [n for n in firsts if score[n] - total > np.log(TRIED)][:FIRSTS]
