@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import mlscorr
 from mlscorr.doctor import _rendering
 from mlscorr.georeference import Correction
-from mlscorr.pipeline.render import read_correction, render
+from mlscorr.pipeline.rendering import read_correction, render
 from mlscorr.report.render import Look, draw, open3d_engine
 from mlscorr.report.render.camera import Camera
 from mlscorr.report.render.quantities import PointSigma

@@ -52,7 +52,7 @@ def render(
         pixels = read_size(size)
         check_output(out, input_files(survey), overwrite)
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
-        from mlscorr.pipeline.render import render
+        from mlscorr.pipeline.rendering import render
 
         drawn = render(
             read_survey(survey),
