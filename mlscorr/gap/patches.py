@@ -137,9 +137,7 @@ def _patches_of(survey, chunk, inside, share):
     """Patches of one chunk and pass, or None."""
     block = _chance(*np.floor(chunk.xyz[:, :2] / (BLOCK * CELL)).T.astype(np.int64))
     rows = np.flatnonzero(inside & (block < share))
-    cell = np.floor(chunk.xyz[rows] / CELL).astype(np.int64)
-    moment = np.floor(chunk.gps_time[rows] / MOMENT).astype(np.int64)
-    key = _mix(*cell.T, moment)
+    key = place_key(chunk.xyz[rows], chunk.gps_time[rows])
     order = np.argsort(key, kind="stable")
     rows, key = rows[order], key[order]
     first = np.flatnonzero(np.append(True, key[1:] != key[:-1])) if len(rows) else np.empty(0, int)
@@ -150,6 +148,12 @@ def _patches_of(survey, chunk, inside, share):
     rows = rows[np.repeat(keep, count)]
     count = count[keep]
     return _fit(survey, chunk, rows, count, block)
+
+
+def place_key(xyz, gps_time):
+    """A number (n,) for the cell and moment of points: those of one patch have the same."""
+    cell = np.floor(xyz / CELL).astype(np.int64)
+    return _mix(*cell.T, np.floor(gps_time / MOMENT).astype(np.int64))
 
 
 def _mix(*numbers):
@@ -174,12 +178,12 @@ def _fit(survey, chunk, rows, count, block):
     local = chunk.xyz[rows] - chunk.xyz[rows[first]][group]
     weight = np.ones(len(rows))
     for trim in TRIMS:
-        mean, values, axes = _moments(local, weight, first, group)
+        mean, values, axes = moments(local, weight, first, group)
         away = np.abs(np.einsum("ni,ni->n", local - mean[group], axes[group, :, 0]))
         held = np.add.reduceat(weight, first)
         sigma = np.sqrt(values[:, 0] * held / np.maximum(held - 3, 1))
         weight = (away <= trim * np.maximum(sigma, 1e-4)[group]).astype(float)
-    mean, values, axes = _moments(local, weight, first, group)
+    mean, values, axes = moments(local, weight, first, group)
     held = np.add.reduceat(weight, first)
     variance = values[:, 0] * held / np.maximum(held - 3, 1)
     good = (held >= np.maximum(FEWEST, LEAST_SHARE * count)) & (variance <= ROUGHEST**2)
@@ -213,7 +217,7 @@ def _fit(survey, chunk, rows, count, block):
     return patches[np.abs(slant) >= GRAZING]
 
 
-def _moments(local, weight, first, group):
+def moments(local, weight, first, group):
     """Mean (g, 3), eigenvalues (g, 3) from the least and axes (g, 3, 3) of groups of points."""
     total = np.maximum(np.add.reduceat(weight, first), 1.0)
     mean = np.add.reduceat(weight[:, None] * local, first) / total[:, None]
