@@ -1,15 +1,12 @@
 """The page of a comparison: which method corrects how well, in a sentence, a table, a figure."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from mlscorr.report import tables
-from mlscorr.report.html import data_uri, versions
 from mlscorr.report.look import (
     BLUE,
     GREEN,
@@ -20,6 +17,7 @@ from mlscorr.report.look import (
     styled,
     svg,
 )
+from mlscorr.report.skeleton import data_uri, environment, now, versions
 
 ALIKE = 0.002  # m; less is below what surveying a target can tell
 FLOOR = 1e-4  # m, the left end of the figure at least
@@ -47,15 +45,8 @@ def write_comparison(path, document):
     document : dict
         The content of compare.json.
     """
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = tables.number
-    page = environment.get_template("compare.html").render(content(document))
+    template = environment(Path(__file__).parent).get_template("compare.html")
+    page = template.render(content(document))
     Path(path).write_text(page, encoding="utf-8")
 
 
@@ -75,7 +66,7 @@ def content(document):
         "kinds": {name: words for name, (_, _, words) in KINDS.items()},
         "figure": data_uri(svg(comparison_figure(document))) if ranked else None,
         "versions": versions(),
-        "written": f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC",
+        "written": now(),
     }
 
 

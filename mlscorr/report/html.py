@@ -1,21 +1,16 @@
 """The page: one HTML file that holds its style, scripts and figures, for reading offline."""
 
-import base64
-from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 
 from mlscorr.report import tables
 from mlscorr.report.figures import drawings
 from mlscorr.report.shown import shown
+from mlscorr.report.skeleton import data_uri, environment, now, versions
 from mlscorr.report.target_figures import target_drawings
 from mlscorr.report.used import coverage, files, used
 
-PAGE = Path(__file__).parent / "page"  # each section is a file there
 SECTIONS = {  # in their order; one without anything to show is left out
     "statistics": "How far off",
     "accuracy": "Accuracy",
@@ -29,7 +24,6 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "used": "What was used",
     "conventions": "Conventions",
 }
-LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib")
 SHOWN_ELSEWHERE = ("outliers", "warnings")
 WORDS = {
     "alternatives": "models that were compared",
@@ -59,31 +53,20 @@ def write_report(path, survey, correction, document, seen=None, fitted=None):
     fitted : dict, optional
         FittedTarget by (pass number, gps_time), each of which gets a figure.
     """
-    environment = Environment(
-        loader=FileSystemLoader(PAGE),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": tables.number, "show": show, "norm": tables.norm}
-    environment.globals |= {"group": tables.group, "AXES": tables.AXES, "raw": raw}
+    templates = environment()
+    templates.filters["norm"] = tables.norm
+    templates.globals |= {"group": tables.group, "AXES": tables.AXES}
     missing = {name for name in ("pictures", "turn") if seen is None}
     missing |= {name for name in ("targets",) if not fitted}
-    environment.globals["sections"] = {
+    templates.globals["sections"] = {
         name: title for name, title in SECTIONS.items() if name not in missing
     }
     found = content(survey, correction, document)
     found |= shown(seen, document) if seen is not None else {}
     figures = target_drawings(document["targets"], fitted or {})
     found["target_figures"] = [(title, data_uri(picture, "png")) for title, picture in figures]
-    page = environment.get_template("report.html").render(found)
+    page = templates.get_template("report.html").render(found)
     Path(path).write_text(page, encoding="utf-8")
-
-
-def raw(name):
-    """A file of the page as it is: style and scripts, which are our own."""
-    return Markup((PAGE / name).read_text(encoding="utf-8"))
 
 
 def content(survey, correction, document):
@@ -114,7 +97,7 @@ def content(survey, correction, document):
         "zero_time": f"{np.floor(correction.recorded.gps_time[0]):.0f}",
         "has_sigma": correction.corrected.position_sigma is not None,
         "versions": versions(),
-        "written": document.get("created") or f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC",
+        "written": document.get("created") or now(),
     }
 
 
@@ -127,30 +110,6 @@ def title(key):
     """A key of the model in words."""
     words = WORDS.get(key, key.replace("_", " "))
     return words[:1].upper() + words[1:]
-
-
-def data_uri(picture, kind="svg+xml"):
-    """A picture (bytes) as the address of an image that lies in the page itself."""
-    return f"data:image/{kind};base64," + base64.b64encode(picture).decode()
-
-
-def show(value):
-    """Any value of the model in words, numbers with four figures.
-
-    >>> show([0.25, None]), show(True), show({"E": 12.0})
-    ('0.25, not determined', 'yes', 'E: 12')
-    """
-    if value is None:
-        return "not determined"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, int | float):
-        return f"{value:d}" if isinstance(value, int) else f"{value:.4g}"
-    if isinstance(value, dict):
-        return "; ".join(f"{key}: {show(item)}" for key, item in value.items())
-    if isinstance(value, list | tuple):
-        return ", ".join(show(item) for item in value) or "none"
-    return str(value)
 
 
 def flat(model):
@@ -195,14 +154,3 @@ def warnings(document):
     """Warnings of the document and of its model, each once."""
     found = [*(document.get("warnings") or []), *(document["model"].get("warnings") or [])]
     return list(dict.fromkeys(found))
-
-
-def versions():
-    """Pairs (name, version) of mlscorr and the libraries that made the numbers."""
-    pairs = []
-    for name in ("mlscorr", *LIBRARIES):
-        try:
-            pairs.append((name, version(name)))
-        except PackageNotFoundError:
-            continue
-    return pairs
