@@ -289,6 +289,9 @@ class Pos:
         default_factory=lambda: np.array([1.1e-4, 1.1e-4, 2.45e-4])
     )
     correlation_time: float = 30.0  # s, the paper's section 3.1.1
+    # (start, length, factor, shape): times in which the position has a further error, as without
+    # GNSS, of at most factor sigmas; shape "rise" grows to the end, "hump" to the middle
+    windows: tuple[tuple[float, float, float, str], ...] = ()
 
 
 @dataclass(frozen=True)

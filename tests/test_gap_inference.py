@@ -1,6 +1,6 @@
 """From rows to a verdict: the algebra against plain formulas, and surveys whose cause is known."""
 
-import importlib.util
+import importlib
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -18,8 +18,9 @@ from mlscorr.gap.background import (
 )
 from mlscorr.gap.causes import infer
 from mlscorr.gap.changes import Bench
+from mlscorr.gap.contaminated import contaminated
 from mlscorr.gap.estimate import DETECTABLE
-from mlscorr.gap.evidence import AMPLITUDES, USED, block_gain, evidence, table
+from mlscorr.gap.evidence import AMPLITUDES, USED, block_gain, evidence, novel, table
 from mlscorr.gap.plan import next_data
 from mlscorr.gap.rows import background
 from mlscorr.gap.separability import separability
@@ -29,15 +30,15 @@ from mlscorr.gap.unknown import unknown_blocks
 from mlscorr.gap.verdict import compare, p_value, pairs, verdict
 from mlscorr.gap.whitening import FIX_TIME, whitener
 
-FILE = Path(__file__).parents[1] / "benchmarks" / "gap_study.py"
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
 @pytest.fixture(scope="module")
 def study():
     "The feature-level study, whose geometries and drifts are used here"
-    spec = importlib.util.spec_from_file_location("gap_study", FILE)
-    module = sys.modules["gap_study"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    sys.path.insert(0, str(BENCHMARKS))
+    module = importlib.import_module("gap_study")
+    sys.path.remove(str(BENCHMARKS))
     return module
 
 
@@ -240,6 +241,73 @@ def test_noise_is_named_alone_and_found_again_beside_a_cause(study, with_surface
     assert named(surveyed(study, g, 35, noise), g, signs).label == "range_noise"
     both = named(surveyed(study, g, 35, noise, bias), g, signs).label
     assert set(both.split("+")) == {"range_noise", "range_bias"}
+
+
+def test_patches_that_are_no_planes_are_no_noise(study, with_surface):
+    "One patch in twelve fifteen times as rough as the scanner: leaves and kerbs; and noise beside"
+    g, signs = with_surface
+    for effects, label in (
+        ((), "none"),
+        ((make_effect("range_noise", magnitude=0.006),), "range_noise"),
+    ):
+        rows = surveyed(study, g, 40, *effects)
+        rough = np.flatnonzero(rows.channel == "roughness")[::12]
+        residual = rows.residual.copy()
+        residual[rough] += np.random.default_rng(0).uniform(3.0, 6.0, len(rough))
+        assert named(replace(rows, residual=residual), g, signs).label == label
+
+
+def test_the_likelihood_with_odd_values_is_that_of_the_mixture():
+    "Without an offset the closed form; a value far away costs no more than its share"
+    rng = np.random.default_rng(6)
+    values = 0.2 * rng.standard_normal((300, 1))
+    values[:15] = rng.uniform(2.0, 6.0, (15, 1))
+    variance = np.full(300, 0.04)
+    told = contaminated(values, np.zeros(300), variance, 1 / 6)
+    share = told.share[0]
+    assert share == pytest.approx(0.05, abs=0.02)
+    normal = np.exp(-0.5 * values[:, 0] ** 2 / variance) / np.sqrt(2 * np.pi * variance)
+    plain = np.log((1 - share) * normal + share / 6).sum()
+    assert told.log_likelihood(1e-6)[0] == pytest.approx(plain, abs=0.1)
+    values[0] = 100.0
+    farther = contaminated(values, np.zeros(300), variance, 1 / 6)
+    assert farther.best[0] == pytest.approx(told.best[0], abs=1e-6)
+
+
+def test_an_offset_that_all_share_is_integrated_over():
+    "Laplace's approximation against the normal density with the offset in its covariance"
+    rng = np.random.default_rng(7)
+    values, variance = 0.3 + 0.1 * rng.standard_normal((60, 1)), np.full(60, 0.01)
+    told = contaminated(values, np.zeros(60), variance, 1e-9)
+    v = np.diag(variance) + 0.2**2
+    plain = -0.5 * (
+        np.linalg.slogdet(2 * np.pi * v)[1] + values[:, 0] @ np.linalg.solve(v, values[:, 0])
+    )
+    plain += 60 * np.log(1 - told.share[0])  # nothing is odd, but it might have been
+    assert told.log_likelihood(0.2)[0] == pytest.approx(plain, abs=0.02)
+
+
+def test_an_unknown_error_that_a_known_effect_makes_is_not_unknown(with_surface):
+    "A range error in proportion to the range is range_scale, as long as that is in the library"
+    g, signs = with_surface
+    unknown, observed = unknown_blocks(g.rows, g.survey), epochs(g.rows, g.background)
+    leads = []
+    for library in (signs, tuple(s for s in signs if s.name != "range_scale")):
+        kept = novel(observed, table(g.rows, library, unknown, observed.sigma))
+        members = {block.member for block in kept.blocks if block.label == "unknown"}
+        leads.append({unknown[i].lead for i in members})
+    assert leads[1] - leads[0] == {"range error in proportion to the range"}
+
+
+def test_without_the_time_offset_another_error_of_the_clock_does_not_take_its_name(
+    study, with_surface
+):
+    "A time error that is constant is unknown then, not clock_drift"
+    g, signs = with_surface
+    rows = surveyed(study, g, 41, make_effect("time_offset", magnitude=0.004))
+    answer = named(rows, g, tuple(s for s in signs if s.name != "time_offset"))
+    assert answer.label == "unknown"
+    assert "time error" in answer.lead
 
 
 def test_two_effects_are_named_together(study, with_surface):

@@ -45,6 +45,9 @@ class Setting:
         Sigma of noise of GNSS fixes, in E, N and H. Units: m.
     weight : float
         Prior probability.
+    bursts : tuple of (start, length, factor, shape)
+        Windows (s) in which the POS has a further error, whose sigma is at most the stated one
+        of the position times a factor. It rises with time or has its largest value in the middle.
     """
 
     scale: float = 1.0
@@ -54,9 +57,21 @@ class Setting:
     noise: float = 1.0
     fixes: float = 0.0
     weight: float = 1.0
+    bursts: tuple[tuple[float, float, float, str], ...] = ()
+
+    def growth(self, gps_time):
+        """Factor (n, 1) of what the bursts add at times (n,), on the sigma of position."""
+        factor = np.zeros(len(gps_time))
+        for start, length, largest, shape in self.bursts:
+            part = (gps_time - start) / length
+            inside = (part >= 0) & (part < 1)
+            grown = part if shape == "rise" else 4 * part * (1 - part)
+            factor[inside] = largest * grown[inside]
+        return factor[:, None]
 
 
 BELIEVED = Setting()
+BURST_TIME = 100.0  # s: without GNSS a velocity stays wrong, for longer than most outages last
 
 
 def settings(scales=SCALES):
@@ -114,6 +129,8 @@ class Epochs:
         As believed. Units: s.
     second : (n,) bool array
         False for the first of two looks, which only defines the plane.
+    growth : (n, 1) array
+        Factor of what believed windows add, see Setting.
     """
 
     rows: int
@@ -128,6 +145,7 @@ class Epochs:
     shared: np.ndarray
     correlation_time: float
     second: np.ndarray
+    growth: np.ndarray
 
     def __len__(self):
         return len(self.row)
@@ -191,6 +209,7 @@ def epochs(rows, background):
         shared=shared,
         correlation_time=background.correlation_time,
         second=~first,
+        growth=Setting(bursts=background.windows).growth(time),
     )
 
 

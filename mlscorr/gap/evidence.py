@@ -11,10 +11,13 @@ serves all effects. It is averaged over s and over the Settings of V. What comes
 as events do with their times and widths, is the mean over them: the price of having looked often.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
+from mlscorr.gap.background import BELIEVED
+from mlscorr.gap.separability import SAME
 from mlscorr.gap.unknown import UnknownBlock
 from mlscorr.gap.whitening import whitener
 
@@ -24,7 +27,7 @@ TOUCHED = 0.1  # of a column's largest value: rows above it count as changed
 # Log evidence counts by these factors, for what a covariance of another shape than assumed, or a
 # heavier tail, looks like, and for all else (a power likelihood: Grünwald and van Ommen 2017).
 # Found on seeds of their own: python benchmarks/gap_study.py --seed 5000, 6000 and 7000
-DRIFT_TRUST, TAIL_TRUST, TRUST = 0.65, 0.5, 0.7
+DRIFT_TRUST, TAIL_TRUST, TRUST = 0.65, 0.4, 0.7
 DRIFTING = 0.2  # weight of unknown errors of the position in time while the library has events
 OUTLIER = 4.0  # sigmas of a survey; what is less is no outlier
 FULL = 0.5  # prior weight of all components of a vector together; the rest goes to each alone
@@ -183,7 +186,7 @@ class Evidence:
 
 def evidence(epochs, settings, residual, table):
     """Evidence of residual columns (n, k) of Epochs under none and each block of a Table."""
-    groups = list(_groups(table))
+    several = list(groups(table))
     columns = epochs.columns(table.columns)
     none = np.empty((len(settings), residual.shape[1]))
     total = np.full((len(table.blocks), residual.shape[1]), -np.inf)
@@ -195,11 +198,35 @@ def evidence(epochs, settings, residual, table):
         y, a = white[slice(k)], white[slice(k, None)]
         none[s] = np.log(setting.weight) + log_likelihood(y, factor)
         projected = a.product(y)
-        for index, numbers, amplitudes in groups:
+        for index, numbers, amplitudes in several:
             gain = none[s] + block_gain(a.blocks(index), projected[index], amplitudes)
             total[numbers] = np.logaddexp(total[numbers], gain)
             by_setting[s, numbers] = gain[:, 0]
     return Evidence(tuple(settings), none, total - np.logaddexp.reduce(none, axis=0), by_setting)
+
+
+def novel(epochs, table):
+    """The Table without those unknown errors that some effect makes just so: they are known.
+
+    Effects with many members, events and outliers, are not looked at.
+    """
+    many = {}
+    for block in table.blocks:
+        many.setdefault(block.label, set()).add(block.member)
+    alone = {label for label, members in many.items() if len(members) == 1} - {"unknown"}
+    white = whitener(epochs, BELIEVED).whiten(epochs.columns(table.columns))
+    normal = white.product(white)
+    length = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    normal /= np.outer(length, length)
+    made = np.array([
+        np.einsum("cp,pq,cq->c", normal[:, x], np.linalg.pinv(normal[np.ix_(x, x)], 1e-9),
+                  normal[:, x]) > SAME
+        for x in (b.columns for b in table.blocks if b.label in alone)
+    ])  # fmt: skip
+    if len(made) == 0:
+        return table
+    kept = [b.label != "unknown" or not made[:, b.columns].all(axis=1).any() for b in table.blocks]
+    return replace(table, blocks=tuple(compress(table.blocks, kept)))
 
 
 def log_likelihood(white, factor):
@@ -207,7 +234,7 @@ def log_likelihood(white, factor):
     return -0.5 * (white.squares + factor.log_determinant)
 
 
-def _groups(table):
+def groups(table):
     """Blocks alike in size and amplitudes: column numbers (h, p), block numbers, amplitudes."""
     kinds = {}
     for number, block in enumerate(table.blocks):

@@ -10,6 +10,7 @@ import numpy as np
 
 from mlscorr.effects.vehicle import PositionNoise
 from mlscorr.gap.background import SHAPES, Setting
+from mlscorr.gap.contaminated import contaminated
 from mlscorr.gap.evidence import DRIFT_TRUST, log_likelihood
 from mlscorr.gap.whitening import whitener
 
@@ -19,6 +20,8 @@ BEYOND = (3.3, 5.0, 8.0)  # factors on the POS's sigma that are no belief any mo
 FIXES = (0.5, 1.0, 2.0, 4.0)  # sigma of noise of GNSS fixes, times position_noise's usual size
 SCATTER = ((0.0, 0.5), (0.1, 0.3), (0.3, 0.2))  # of roughness between patches: sigma, weight
 COMMON = ((0.05, 0.5), (0.3, 0.5))  # of all patches together: surfaces are no planes
+ODD_SPAN = 6.0  # of log variance ratios: from a flat patch's to that of 5 cm about the plane
+LOST = 0.005  # share: by which the believed return rate may be off everywhere
 FEW = 1  # settings under which noise of the rows' own is tried
 
 CHANNELS = ("roughness", "return_rate")
@@ -110,13 +113,21 @@ def position_settings():
 
 
 def draw_channels(rows, rng, number):
-    """Residuals (q, 1 + number) of the rows without a metre, and replicas without any effect."""
+    """Residuals (q, 1 + number) of the rows without a metre, and replicas without any effect:
+    as scattered as these residuals are, and as many of them odd."""
     here = np.isin(rows.channel, CHANNELS)
-    values = rows.residual[here][:, None]
+    values, rough = rows.residual[here][:, None], rows.channel[here] == "roughness"
     if not number:
         return values
-    noise = np.sqrt(rows.noise[here])[:, None]
-    return np.hstack([values, noise * rng.standard_normal((len(noise), number))])
+    variance, share = rows.noise[here], np.zeros(len(values))
+    if rough.any():
+        several = _roughness(values[rough], np.zeros(rough.sum()), variance[rough])
+        _, variance[rough], best = max(several, key=lambda each: each[2].best[0])
+        share[rough] = best.share[0]
+    drawn = np.sqrt(variance)[:, None] * rng.standard_normal((len(values), number))
+    odd = rng.random(drawn.shape) < share[:, None]
+    drawn[odd] = ODD_SPAN * rng.random(odd.sum())
+    return np.hstack([values, drawn])
 
 
 def _finer(size):
@@ -168,37 +179,35 @@ def _shift(one, rows):
 def _channels(rows, one, size, values):
     """Log evidence (x, k) of the rows without a metre, over none."""
     here = np.isin(rows.channel, CHANNELS)
-    if not here.any():
+    if not (one.growth[here].any() or one.jacobian[here].any()):
         return np.zeros((len(size), values.shape[1]))
     rough = rows.channel[here] == "roughness"
     noise, growth, shift = rows.noise[here], one.growth[here], one.jacobian[here, 0]
-    none = _channel_likelihood(values, rough, noise)
     told = []
-    for x in size:
+    for x in (0.0, *size):
         mean = np.where(rough, np.log1p(growth * x**2), x * shift)
-        told.append(_channel_likelihood(values - mean[:, None], rough, noise) - none)
-    return np.array(told)
+        told.append(_channel_likelihood(values, mean, rough, noise))
+    return np.array(told[1:]) - told[0]
 
 
-def _channel_likelihood(values, rough, noise):
-    """Log likelihood (k,): independent rows that share an offset, per channel."""
+def _channel_likelihood(values, mean, rough, noise):
+    """Log likelihood (k,) of roughness and return rates."""
     total = np.zeros(values.shape[1])
     if rough.any():
         parts = [
-            np.log(w * v) + _offset_likelihood(values[rough], noise[rough] + s**2, common)
-            for s, w in SCATTER
+            np.log(weight * v) + fitted.log_likelihood(common)
+            for weight, _, fitted in _roughness(values[rough], mean[rough], noise[rough])
             for common, v in COMMON
         ]
         total = total + np.logaddexp.reduce(parts, axis=0)
     if (~rough).any():
-        total = total + _offset_likelihood(values[~rough], noise[~rough], 0.005)
+        told = contaminated(values[~rough], mean[~rough], noise[~rough], 1.0)
+        total = total + told.log_likelihood(LOST)
     return total
 
 
-def _offset_likelihood(values, variance, common):
-    """Of N(0, diag(variance) + common^2 1 1^T), without the constant."""
-    weight = 1 / variance
-    growth = 1 + common**2 * weight.sum()
-    mean = weight @ values
-    squares = weight @ values**2 - common**2 * mean**2 / growth
-    return -0.5 * (squares + np.log(variance).sum() + np.log(growth))
+def _roughness(values, mean, noise):
+    """Weight, variance (q,) and Fitted under each SCATTER."""
+    for scatter, weight in SCATTER:
+        variance = noise + scatter**2
+        yield weight, variance, contaminated(values, mean, variance, 1 / ODD_SPAN)

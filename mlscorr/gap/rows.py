@@ -212,6 +212,8 @@ class Background:
         Units: m.
     correlation_time : float
         As believed. Units: s.
+    windows : tuple of (start, length, factor, shape)
+        In which it is believed to be worse, see Pos.
     """
 
     row: np.ndarray
@@ -220,6 +222,7 @@ class Background:
     jitter: np.ndarray
     attitude: np.ndarray
     correlation_time: float
+    windows: tuple = ()
 
 
 def background(rows, survey):
@@ -240,6 +243,7 @@ def background(rows, survey):
         leg(partials[:, :3], sigmas.jitter),
         leg(partials[:, 3:], sigmas.attitude),
         survey.pos.correlation_time,
+        survey.pos.windows,
     )
 
 

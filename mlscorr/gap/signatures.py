@@ -1,6 +1,6 @@
 """How each effect shows in the rows: derivatives by its parameters, through its own function."""
 
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 
 import numpy as np
 
@@ -203,3 +203,13 @@ def _times(rows, survey, spacing):
         times = np.where(times >= start, times + (end - start), times)
     times = times[survey.trajectory.segment(times) >= 0]
     return [float(round(time - rows.reference.start, 3)) for time in times]
+
+
+def select(signatures, rows):
+    """Signatures in some rows, (m,) bool, alone: a tuple."""
+    return tuple(
+        replace(
+            one, jacobian=one.jacobian[rows], variance=one.variance[rows], growth=one.growth[rows]
+        )
+        for one in signatures
+    )

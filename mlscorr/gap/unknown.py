@@ -2,18 +2,17 @@
 something. The blocks of functions that find it also say in words where to look.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
 
-from mlscorr.gap.covariates import covariates, scanner_origin
+from mlscorr.gap.looks import looks
 
 LEAST_PART = 1e-6  # of a block's largest column; below it nothing of it is seen
 FINE = 10.0  # s between the knots of what comes and goes with time
 LOCAL = 40.0  # m between the knots of what comes and goes with the place
 MOST = 24  # functions of one block
-RATE = 0.5  # s to each side, over which rates and acceleration are taken
 CYCLES = tuple(range(1, 7))  # over the span of the ranges
 
 DIRECTIONS = {
@@ -28,19 +27,20 @@ DIRECTIONS = {
     "roll": "roll error",
     "pitch": "pitch error",
     "yaw": "heading error",
+    "clock": "time error",
 }
 PLACES = ("east", "north", "height")
 BODY = ("right", "forward", "height")
 TURNS = ("roll", "pitch", "yaw")
 BEAMS = ("beam", "scan", "across")
 FUNCTIONS = {  # name: words, directions
-    "constant": ("that is constant", (*BODY, *BEAMS, *TURNS)),
-    "pass": ("that differs between passes", (*PLACES, *BODY[:2], "beam", "scan", *TURNS)),
-    "elapsed": ("that grows with time", (*PLACES, *BODY[:2], "beam", "scan", "across", *TURNS)),
+    "constant": ("that is constant", (*BODY, *BEAMS, *TURNS, "clock")),
+    "pass": ("that differs between passes", (*PLACES, *BODY[:2], "beam", "scan", *TURNS, "clock")),
+    "elapsed": ("that grows with time", (*PLACES, *BODY[:2], *BEAMS, *TURNS, "clock")),
     "warming": ("that grows with time and settles", ("beam", "scan", *TURNS)),
-    "elapsed in the pass": ("that grows in each pass", TURNS),
+    "elapsed in the pass": ("that grows in each pass", (*TURNS, "clock")),
     "time": ("that comes and goes with time", PLACES),
-    "slow time": ("that changes slowly with time", (*PLACES, "beam", *TURNS)),
+    "slow time": ("that changes slowly with time", (*PLACES, "beam", *TURNS, "clock")),
     "location": ("that depends on the place along the drive", PLACES),
     "map": ("that depends on the place on the map", PLACES),
     "range": ("in proportion to the range", ("height", "beam", "right")),
@@ -68,17 +68,6 @@ DRIFTING = ("time", "slow time", "location", "pass", "elapsed")
 
 
 @dataclass(frozen=True)
-class Looks:
-    """Each look at each item: (k,) row in its arrays; two for a plane that was seen twice."""
-
-    item: np.ndarray
-    sign: np.ndarray
-    directions: dict[str, np.ndarray]  # displacement (k, 3) on the map of one unit, m or rad
-    covariates: dict[str, np.ndarray]
-    xyz: np.ndarray
-
-
-@dataclass(frozen=True)
 class UnknownBlock:
     """One direction times one function: columns (m, p) of the rows, and the lead in words.
 
@@ -88,74 +77,6 @@ class UnknownBlock:
     lead: str
     columns: np.ndarray
     is_drift: bool
-
-
-def looks(rows, survey):
-    """The looks behind the metric rows of a survey."""
-    pulses = rows.pulses[np.isin(rows.pulses.item, rows.item[rows.metric])]
-    key = 2 * pulses.item + (pulses.weight < 0)
-    known, number = np.unique(key, return_inverse=True)
-    count = np.bincount(number)
-
-    def mean(values):
-        return np.column_stack([np.bincount(number, v) / count for v in values.T])
-
-    time, xyz = mean(pulses.gps_time[:, None])[:, 0], mean(pulses.xyz)
-    told = covariates(
-        survey, time, xyz, replace(pulses, item=number), np.arange(len(known)),
-        survey.trajectory.segment(time) + 1, np.zeros((len(known), 3)),
-    )  # fmt: skip
-    return Looks(
-        known // 2,
-        np.where(known % 2, -1.0, 1.0),
-        _directions(survey, time, xyz),
-        told | _motion(survey.trajectory, time),
-        xyz,
-    )
-
-
-def _directions(survey, time, xyz):
-    """Displacements (k, 3) by a unit in each of DIRECTIONS."""
-    pose = survey.trajectory.at(time)
-    right, forward, up = np.moveaxis(pose.attitude.as_matrix(), 2, 0)
-    arm, sight = xyz - pose.position, xyz - scanner_origin(survey, time)
-    beam = sight / np.linalg.norm(sight, axis=1, keepdims=True)
-    unit = np.broadcast_to(np.eye(3)[:, None], (3, len(time), 3))
-    found = {
-        "east": unit[0],
-        "north": unit[1],
-        "height": unit[2],
-        "right": right,
-        "forward": forward,
-        "beam": beam,
-        "roll": np.cross(forward, arm),
-        "pitch": np.cross(right, arm),
-        "yaw": np.cross(-up, arm),
-    }
-    if survey.mounting is not None:
-        axis = pose.attitude.apply(survey.mounting.boresight.apply([0.0, 0.0, 1.0]))
-        found |= {"scan": np.cross(axis, sight), "across": axis}
-    return found
-
-
-def _motion(trajectory, time):
-    """Further covariates: roll and pitch rate (rad/s), acceleration (m/s^2), time in the pass."""
-    starts = np.append(trajectory.gps_time[0], trajectory.gaps[:, 1])
-    ends = np.append(trajectory.gaps[:, 0], trajectory.gps_time[-1])
-    segment = trajectory.segment(time)
-    early = np.maximum(time - RATE, starts[segment])
-    late = np.minimum(time + RATE, ends[segment])
-    before, now, after = (trajectory.at(t) for t in (early, (early + late) / 2, late))
-    turn = now.attitude.inv().apply((after.attitude * before.attitude.inv()).as_rotvec())
-    span = (late - early)[:, None]
-    moved = after.position - 2 * now.position + before.position
-    forward = now.attitude.apply([0.0, 1.0, 0.0])
-    return {
-        "roll_rate": (turn / span)[:, 1],
-        "pitch_rate": (turn / span)[:, 0],
-        "acceleration": 4 * np.einsum("ki,ki->k", moved, forward) / span[:, 0] ** 2,
-        "elapsed": (time - starts[segment]) / (ends - starts)[segment],
-    }
 
 
 def unknown_blocks(rows, survey):
@@ -187,7 +108,7 @@ def unknown_blocks(rows, survey):
             along[~only] = 0.0
         if np.abs(along).max(initial=0.0) > LEAST_PART:
             what = DIRECTIONS[direction] + ("" if only is None else " of the surveyed targets")
-            drift = only is None and direction in PLACES and name in DRIFTING
+            drift = only is None and direction in PLACES + BODY and name in DRIFTING
             blocks.append(UnknownBlock(f"{what} {FUNCTIONS[name][0]}", along, drift))
 
     for name, values in functions.items():

@@ -6,13 +6,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.gap.background import Epochs, epochs, settings
+from mlscorr.gap.bursts import burst_evidence, with_bursts
 from mlscorr.gap.events import refine
-from mlscorr.gap.evidence import Evidence, Table, evidence, table
+from mlscorr.gap.evidence import Evidence, Table, evidence, novel, table
 from mlscorr.gap.noise import draw_channels, noise_evidence, position_settings
+from mlscorr.gap.replicas import p_value, replicate
 from mlscorr.gap.tails import without_tails
 from mlscorr.gap.unknown import unknown_blocks
-from mlscorr.gap.weighing import FREE, likelihood, nuisance, relevant
-from mlscorr.gap.whitening import whitener
+from mlscorr.gap.weighing import FREE, nuisance, relevant
 
 # Prior probabilities; shares of a kind are split evenly among its labels. A wrong alarm costs more
 # than a small effect that is missed, and drift has shapes that no Setting has: hence the first one.
@@ -41,6 +42,8 @@ class Found:
         Events that stand out, by label.
     score : dict
         Log of prior times evidence over that of none, (k,) for each label; none is there too.
+    p_value : float
+        Of none.
     odd : (o,) int array
         Rows taken for a tail of the noise.
     """
@@ -52,6 +55,7 @@ class Found:
     noise: tuple
     refined: dict
     score: dict
+    p_value: float
     odd: np.ndarray
 
 
@@ -95,31 +99,25 @@ def compare(rows, background, survey, signatures, rng, replicas=REPLICAS):
         Surveys of the same geometry in which nothing acts.
     """
     observed, unknown = epochs(rows, background), unknown_blocks(rows, survey)
-    columns = table(rows, signatures, unknown, observed.sigma)
+    columns = novel(observed, table(rows, signatures, unknown, observed.sigma))
     constant, slow = nuisance(observed, columns)
     observed, odd = without_tails(observed, rows, FREE * constant)
     residual = observed.columns(rows.residual[:, None])
     none = constant[:, :0]
     choice = relevant(observed, settings(), residual, [none, np.hstack([constant, slow])])
-    residual = np.hstack([residual, _replicas(observed, choice, residual, rng, replicas)])
+    residual = np.hstack([residual, replicate(observed, choice, residual, rng, replicas)])
     found = evidence(observed, choice, residual, columns)
     channels = draw_channels(rows, rng, replicas)
     noise = noise_evidence(observed, rows, signatures, found, residual, channels)
+    if any(one.is_common for one in signatures):
+        noise += burst_evidence(observed, found, residual)
     score = scores(columns, found, noise)
+    chance = p_value(score)  # before events are refined, as those of replicas are not
     events = refine(rows, survey, observed, residual[:, :1], columns, found, signatures)
     for label, event in events.items():
         prior = np.log(EFFECT / (len(columns.labels) - bool(unknown)))
         score[label][0] = np.logaddexp(score[label][0], prior + event.gain)
-    return Found(observed, columns, unknown, found, noise, events, score, odd)
-
-
-def _replicas(observed, choice, residual, rng, number):
-    """Residuals (n, number) in which nothing acts, under Settings as probable as they are."""
-    factors = [whitener(observed, setting) for setting in choice]
-    score = [likelihood(observed, setting, residual) for setting in choice]
-    share = np.exp(np.array(score) - np.logaddexp.reduce(score))
-    count = rng.multinomial(number, share / share.sum())
-    return np.hstack([f.draw(rng, c) for f, c in zip(factors, count, strict=True)])
+    return Found(observed, columns, unknown, found, noise, events, score, chance, odd)
 
 
 def scores(columns, found, noise):
@@ -141,22 +139,6 @@ def _noise_scores(noise, prior):
         mean = np.logaddexp.reduce(gain, axis=0) - np.log(len(gain))
         told[name] = np.log(prior / len(names)) + mean
     return told
-
-
-def p_value(score):
-    """Probability of scores against none as high as the first column's when nothing acts.
-
-    By replicas; beyond the highest ones by the exponential tail that the upper fifth of them has.
-    """
-    against = np.logaddexp.reduce([v for k, v in score.items() if k != "none"], axis=0)
-    mine, replicas = against[0], np.sort(against[1:])
-    if len(replicas) == 0:
-        return float("nan")
-    upper = replicas[int(0.8 * len(replicas)) :]
-    if mine <= upper[0] or len(upper) < 3:
-        return float((1 + (replicas >= mine).sum()) / (1 + len(replicas)))
-    scale = max(upper.mean() - upper[0], 0.5)
-    return float(len(upper) / len(replicas) * np.exp(-(mine - upper[0]) / scale))
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -227,7 +209,8 @@ def _given(rows, signatures, found, first):
     """
     residual = found.epochs.columns(rows.residual[:, None])
     if first == "position_noise":
-        observed, choice, regained = found.epochs, position_settings(), 0.0
+        observed, regained = found.epochs, 0.0
+        choice = position_settings() + with_bursts(found.noise)
         choice = relevant(observed, choice, residual, [np.zeros((len(residual), 0))])
     else:
         columns = found.epochs.columns(accepted(found, first))
@@ -271,7 +254,7 @@ def verdict(found, probability):
             break
     label = names[0]
     lead = best_lead(found)[0] if label == "unknown" else ""
-    return Verdict(label, probability[label], tuple(set_), p_value(found.score), lead)
+    return Verdict(label, probability[label], tuple(set_), found.p_value, lead)
 
 
 def best_lead(found):

@@ -16,7 +16,7 @@ from mlscorr.collocation.markov import MarkovSolver
 from mlscorr.collocation.recursion import filter_covariance
 from mlscorr.collocation.states import Layout, carry
 from mlscorr.covariance import Covariance
-from mlscorr.gap.background import Epochs
+from mlscorr.gap.background import BURST_TIME, Epochs
 
 FIX_TIME = 0.9  # s: noise of GNSS fixes, one a second, has lost 1 / e of its correlation then
 CHUNK = 64  # columns filtered at once: their states stay in the first cache
@@ -127,6 +127,8 @@ def whitener(epochs, setting, extra=0.0):
     Raises ValueError when V is not positive definite.
     """
     time = setting.time * epochs.correlation_time
+    growth = np.hypot(setting.growth(epochs.gps_time), epochs.growth)
+    burst = growth * (epochs.drift + epochs.jitter)
     signals = [
         Signal(factor * mixing[:, None], covariance)
         for factor, mixing, covariance in (
@@ -134,6 +136,7 @@ def whitener(epochs, setting, extra=0.0):
             (setting.scale, epochs.attitude, Covariance(setting.family, time)),
             (setting.scale, epochs.jitter, Covariance("exponential", setting.jitter_time)),
             (setting.fixes, epochs.place, Covariance("exponential", FIX_TIME)),
+            (1.0, burst, Covariance("matern32", BURST_TIME)),
         )
         if factor > 0 and mixing.any()
     ]

@@ -4,15 +4,22 @@ import json
 import warnings
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.spatial.transform import Rotation
 
 from mlscorr.effects import Effect, in_order
 from mlscorr.io.settings import read_settings_file
-from mlscorr.io.survey_file import Degrees, Meters, PosSection, ScannerSection, Three
+from mlscorr.io.survey_file import (
+    Degrees,
+    Meters,
+    PosSection,
+    Positive,
+    ScannerSection,
+    Three,
+)
 from mlscorr.simulate.scenario import EffectScenario
 from mlscorr.survey import Mounting, Pos, Scanner
 
@@ -49,12 +56,29 @@ class MountingSection(_Section):
     boresight: Annotated[list[Degrees], Three]  # deg, about x, y, z
 
 
+class WindowSection(_Section):
+    """A time in which the POS is worse, see Pos."""
+
+    start: Annotated[float, Field(allow_inf_nan=False)]  # gps_time, s
+    length: Positive  # s
+    factor: Positive  # of the largest error on the stated sigma
+    shape: Literal["rise", "hump"] = "rise"
+
+
+class BelievedPosSection(PosSection):
+    windows: list[WindowSection] = []
+
+    def pos(self):
+        windows = tuple((w.start, w.length, w.factor, w.shape) for w in self.windows)
+        return replace(super().pos(), windows=windows)
+
+
 class SimulatorFile(_Section):
     """What stands in simulator.toml, in its own units (deg)."""
 
     mounting: MountingSection | None = None
     scanner: ScannerSection = ScannerSection()
-    pos: PosSection = PosSection()
+    pos: BelievedPosSection = BelievedPosSection()
     effects: list[EffectScenario] = []
 
     @property
@@ -107,6 +131,9 @@ def write_simulator(simulator, path):
         sections.insert(0, ("[mounting]", _mounting_keys(simulator.mounting)))
     for effect in simulator.effects:
         sections.append(("[[effects]]", {"name": effect.name, **asdict(effect)}))
+    keys = ("start", "length", "factor", "shape")
+    for window in pos.windows:
+        sections.append(("[[pos.windows]]", dict(zip(keys, window, strict=True))))
     text = "\n".join(
         "\n".join([title, *(f"{key} = {_toml(value)}" for key, value in keys.items()), ""])
         for title, keys in sections
