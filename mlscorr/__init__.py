@@ -2,9 +2,12 @@
 
 from importlib import import_module
 
-_PIPELINE = ("calibrate", "compare", "correct", "extract")
-_HOMES = {"read_survey": "mlscorr.io.survey_file"} | dict.fromkeys(_PIPELINE, "mlscorr.pipeline")
-__all__ = [*_PIPELINE, "read_survey", "simulate"]
+_PIPELINE = ("calibrate", "compare", "correct", "diagnose", "extract", "plan")
+_HOMES = {
+    "read_simulator": "mlscorr.simulate.beliefs",
+    "read_survey": "mlscorr.io.survey_file",
+} | dict.fromkeys(_PIPELINE, "mlscorr.pipeline")
+__all__ = [*_PIPELINE, "read_simulator", "read_survey", "simulate"]
 
 
 def __getattr__(name):

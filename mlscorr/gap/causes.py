@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.background import BELIEVED, Setting
+from mlscorr.gap.background import BELIEVED, Setting, settings
+from mlscorr.gap.bursts import BurstEvidence
 from mlscorr.gap.estimate import DETECTABLE, Parameter, fit
 from mlscorr.gap.separability import Separability, separability
 from mlscorr.gap.verdict import (
     REPLICAS,
+    Found,
     Verdict,
     best_lead,
     compare,
@@ -22,6 +24,7 @@ from mlscorr.gap.where import Where, locate
 
 TOLD = 6  # causes that are reported at least, best first
 LEAST = 0.005  # probability from which on others are, too
+WINDOW = ("start", "length", "largest sigma over the stated")  # of a POS that is worse in it
 EVENT = ("time", "width")  # what an event has besides its size
 
 
@@ -72,8 +75,10 @@ class Inference:
         Effects that this survey can't tell apart from the label at the size that it has.
     where : Where
     separability : Separability
-    odd : (o,) int array
-        Rows taken for a tail of the noise.
+    probability : dict
+        Of every label that was weighed, most probable first.
+    found : Found
+        What was compared.
     """
 
     verdict: Verdict
@@ -81,7 +86,13 @@ class Inference:
     same: tuple[str, ...]
     where: Where
     separability: Separability
-    odd: np.ndarray
+    probability: dict[str, float]
+    found: Found
+
+    @property
+    def cause(self):
+        """The Cause of the verdict."""
+        return next(one for one in self.causes if one.effect == self.verdict.label)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -111,17 +122,19 @@ def infer(rows, background, survey, signatures, rng, replicas=REPLICAS):
     causes = tuple(cause_of(rows, signatures, found, n, probability[n]) for n in names)
     causes = tuple(sorted(causes, key=lambda cause: -cause.probability))
     best = next(cause for cause in causes if cause.effect == answer.label)
-    chance = _likely_settings(found, rows.residual - best.shift, rng, max(replicas, 20))
+    left = rows.residual - best.shift
+    chance = _likely_settings(found, left, rng, max(replicas, 20), best.setting.bursts)
     where = locate(rows, background, best.shift, rng, chance, best.setting, best.extra)
     compared = separability(found.epochs, signatures, found.evidence.settings[0])
-    return Inference(answer, causes, _same(best, compared), where, compared, found.odd)
+    return Inference(answer, causes, _same(best, compared), where, compared, probability, found)
 
 
-def _likely_settings(found, residual, rng, number):
-    """Settings drawn by their probability given residuals (m,) that nothing acts on."""
+def _likely_settings(found, residual, rng, number, bursts):
+    """Settings drawn by their probability given residuals (m,) that nothing but bursts acts on."""
     columns = found.epochs.columns(residual[:, None])
-    choice = found.evidence.settings
-    score = np.array([likelihood(found.epochs, setting, columns) for setting in choice])
+    choice = settings() if bursts else found.evidence.settings  # those were chosen without them
+    acting = [replace(setting, bursts=bursts) for setting in choice]
+    score = np.array([likelihood(found.epochs, setting, columns) for setting in acting])
     count = rng.multinomial(number, np.exp(score - np.logaddexp.reduce(score)))
     return [s for s, k in zip(choice, count, strict=True) for _ in range(k)]
 
@@ -149,8 +162,8 @@ def cause_of(rows, signatures, found, label, probability):
         chosen = tuple(zip(ones, estimates, strict=True))
     for name in label.split("+"):
         if name in noisy:
-            parameter, part, more, setting = _noise(rows, signatures, found, name, setting)
-            told, chosen = (*told, parameter), (*chosen, *part)
+            parameters, part, more, setting = _noise(rows, signatures, found, name, setting)
+            told, chosen = (*told, *parameters), (*chosen, *part)
             extra = more if extra is None else extra
     return Cause(label, probability, told, chosen, nothing, extra, setting)
 
@@ -188,20 +201,32 @@ def _event(one, found):
 
 
 def _noise(rows, signatures, found, name, setting):
-    """Parameter, parts, variance of the rows' own and Setting of a noise class."""
+    """Parameters, parts, variance of the rows' own and Setting of a noise class."""
     ones = [one for one in found.noise if one.label == name]
     one = max(ones, key=lambda each: each.gain[0])
+    if isinstance(one, BurstEvidence):
+        return _windows(one.bursts), (), None, replace(setting, bursts=one.bursts)
     size, sigma = _peak(one.size, one.by_size[:, 0])
     if one.member < 0:
         told = Parameter("factor on sigma", "ratio", size, sigma, float("nan"))
-        return told, (), None, replace(setting, scale=size)
+        return (told,), (), None, replace(setting, scale=size)
     kind = signatures[one.member]
     told = Parameter("magnitude", kind.units[0], size, sigma, _detectable(rows, found, kind))
     part = ((kind, np.array([size])),)
     if kind.is_common:
-        return told, part, None, replace(setting, fixes=size)
+        return (told,), part, None, replace(setting, fixes=size)
     inside = one.channels.any()  # the stated noise comes from the points: it holds this already
-    return told, part, None if inside else size**2 * kind.variance, setting
+    return (told,), part, None if inside else size**2 * kind.variance, setting
+
+
+def _windows(bursts):
+    """Parameters of windows in which the POS is worse."""
+    told = []
+    for number, burst in enumerate(bursts, start=1):
+        after = f" {number}" if len(bursts) > 1 else ""
+        for name, unit, value in zip(WINDOW, ("s", "s", "ratio"), burst[:3], strict=True):
+            told.append(Parameter(name + after, unit, value, np.nan, np.nan))
+    return tuple(told)
 
 
 def _peak(size, score):

@@ -9,7 +9,7 @@ positive. Each row has one term, so G^2 adds up over any split of the rows. Leng
 as sign(G^2) |G^2|^(1/2), in mm.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -30,6 +30,12 @@ NAMES = {  # what a number of a split is called, and its unit
     "intensity": ("log intensity", "decades"),
     "speed": ("speed", "m/s"),
     "turn_rate": ("turn rate", "deg/s"),
+}
+PLACES = {"pass": "in pass {}", "axis": "along the axis {}", "channel": "{}"}
+CHANNELS = {
+    "target": "on the targets",
+    "surface": "on the reference surface",
+    "shared": "on planes that two passes share",
 }
 DEGREES = ("incidence", "scan_angle", "turn_rate")
 AXES = ("E", "N", "H")
@@ -55,7 +61,8 @@ class Split:
     before, after : (b,) array
         Signed gap of the rows of each bin. Units: mm.
     share : (b,) array
-        Of the squared gap of all rows; sums to one.
+        Of what the cause explains of the squared innovations; without a cause, of the squared gap
+        of all rows. Sums to one.
     band : (b, 2) array
         95 % of what each bin's gap is when nothing is wrong. Units: mm.
     """
@@ -129,30 +136,30 @@ def locate(rows, background, shift, rng, chance, setting=BELIEVED, extra=None):
     observed = epochs(rows, background)
     columns = observed.columns(np.column_stack([rows.residual, rows.residual - shift]))
     believed = whitener(observed, BELIEVED)
-    tails = whitener(observed, max(chance, key=chance.count)).innovations(columns[:, 1:])[0][:, 0]
+    likely = replace(max(chance, key=chance.count), bursts=setting.bursts)
+    tails = whitener(observed, likely).innovations(columns[:, 1:])[0][:, 0]
     drawn = [whitener(observed, s).draw(rng, chance.count(s), tails) for s in dict.fromkeys(chance)]
     u, sigma = believed.innovations(np.hstack([columns, *drawn]))
     terms = sigma[:, None] ** 2 * (u**2 - 1)
+    told = u[:, 0] ** 2 - u[:, 1] ** 2 if shift.any() else terms[:, 0].copy()
     if setting != BELIEVED or extra is not None:
         more = 0.0 if extra is None else extra[observed.row] * observed.half
         again, wider = whitener(observed, setting, more).innovations(columns[:, 1:])
         u[:, 1] = again[:, 0]
         terms[:, 1] = wider**2 * (again[:, 0] ** 2 - 1)
     kept = observed.second
-    terms, row = terms[kept], observed.row[kept]
+    terms, told, row = terms[kept], told[kept], observed.row[kept]
     mean = terms.mean(axis=0)
     band = tuple(float(v) for v in np.percentile(signed_mm(mean[2:]), BAND))
-    splits = tuple(
-        one for by in SPLITS if (one := _split(rows, row, by, terms, mean[0])) is not None
-    )
+    splits = tuple(one for by in SPLITS if (one := _split(rows, row, by, terms, told)) is not None)
     before, after = (float(v) for v in signed_mm(mean[:2]))
     return Where(
         before, after, band, splits, row, observed.gps_time[kept], u[kept, :2], sigma[kept],
-        _headline(before, band, splits, len(row)),
+        _headline(before, band, splits, len(row), shift.any()),
     )  # fmt: skip
 
 
-def _split(rows, row, by, terms, total):
+def _split(rows, row, by, terms, told):
     """The gap by one covariate, or None where it is not known or the same for all rows."""
     edges, bins, number = _bins(rows, row, by)
     if number is None:
@@ -162,7 +169,7 @@ def _split(rows, row, by, terms, total):
     mean = signed_mm(sums / np.maximum(count, 1)[:, None])
     return Split(
         by, edges, bins, count, mean[:, 0], mean[:, 1],
-        sums[:, 0] / (total * len(row)) if total else np.zeros(len(bins)),
+        np.bincount(number, told, len(bins)) / (told.sum() or 1.0),
         np.percentile(mean[:, 2:], BAND, axis=1).T,
     )  # fmt: skip
 
@@ -191,18 +198,16 @@ def _bins(rows, row, by):
     )
 
 
-def _headline(before, band, splits, number):
+def _headline(before, band, splits, number, explained):
     """One sentence: how large, and where most of it is."""
     low, high = band
-    if before <= high:
-        return (
-            f"The gap of {before:.1f} mm is not measurable: when nothing is wrong, it lies between "
-            f"{low:.1f} and {high:.1f} mm."
-        )
+    measurable = before > high
     said = (
-        f"Observed and simulated differ by {before:.1f} mm more than the simulator predicts "
-        f"({low:.1f} to {high:.1f} mm when nothing is wrong)"
+        f"All rows together differ by {before:.1f} mm more than predicted ({low:.1f} to "
+        f"{high:.1f} mm when nothing is wrong)"
     )
+    if not measurable and not explained:
+        return f"Nothing stands out. {said}: that is not measurable."
     best, most = None, 0.0
     for split in splits:
         fraction = split.count / number
@@ -210,17 +215,18 @@ def _headline(before, band, splits, number):
             plain = split.share[i] > PLAIN * fraction[i]
             if plain and split.share[i] - fraction[i] > most:
                 best, most = (split, i), split.share[i] - fraction[i]
+    of = "what the cause explains" if explained else "the gap"
     if best is None:
-        return said + ", everywhere alike."
+        return f"{of.capitalize()} lies everywhere alike. {said}."
     split, i = best
     return (
-        f"{said}; {100 * min(split.share[i], 1.0):.0f} % of it is {_place(split, i)}, where "
-        f"{100 * split.count[i] / number:.0f} % of the rows are."
+        f"{100 * min(split.share[i], 1.0):.0f} % of {of} lies {_place(split, i)}, where "
+        f"{100 * split.count[i] / number:.0f} % of the rows are. {said}."
     )
 
 
 def _place(split, i):
     if split.edges is None:
-        return f"in the {split.by} {split.bins[i]}"
+        return PLACES[split.by].format(CHANNELS.get(split.bins[i], split.bins[i]))
     name, unit = NAMES[split.by]
     return f"at a {name} of {split.bins[i]} {unit}"

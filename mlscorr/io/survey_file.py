@@ -108,7 +108,7 @@ class Settings(_Section):
 
     name: str | None = None
     crs: str | None = None
-    cloud: CloudSection
+    cloud: CloudSection | None = None
     trajectory: TrajectorySection
     mounting: MountingSection | None = None
     control: ControlSection | None = None
@@ -117,8 +117,8 @@ class Settings(_Section):
     scene: SceneSection = SceneSection()
 
 
-def read_survey(path):
-    """Survey of a survey.toml, or of a folder that holds one.
+def read_survey(path, planned=False):
+    """Survey of a survey.toml, or of a folder that holds one; a planned one may have no cloud.
 
     Without a section [control], or with a file that holds no point, control and check are empty.
     Raises ValueError for anything wrong in survey.toml, in the files it names, or between them
@@ -126,6 +126,11 @@ def read_survey(path):
     """
     path = _survey_toml(path)
     settings = read_settings(path)
+    if settings.cloud is None and not planned:
+        raise ValueError(
+            f"{path} lacks the section [cloud] with its files: without a cloud there is nothing to "
+            "work on. mlscorr plan says what a survey will show before it is driven."
+        )
     clouds, trajectory_file, accuracy, control_file, reference = _files(path, settings)
     crs = check_crs(settings.crs) if settings.crs else None
     trajectory = read_trajectory(trajectory_file, settings.crs, accuracy)
@@ -136,6 +141,11 @@ def read_survey(path):
     notes = [f"Coordinates are in {settings.crs} ({crs.name})." if crs else "No CRS was given."]
     if trajectory_file.suffix.lower() in SBET_SUFFIXES:
         notes += describe_projection(settings.crs)
+    if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
+        notes.append(
+            f"Nothing says how well the POS is known: {Pos.position_sigma} m over "
+            f"{Pos.correlation_time:.0f} s are assumed. Give the trajectory's sigmas, or [pos]."
+        )
     files = []
     for cloud in clouds:
         file, note = _cloud_file(cloud, trajectory, settings.cloud.gps_time)
@@ -210,7 +220,7 @@ def _files(path, settings):
         return folder / name
 
     clouds = []
-    for name in settings.cloud.files:
+    for name in settings.cloud.files if settings.cloud else ():
         if glob.has_magic(name) and not (folder / name).exists():
             found = sorted(
                 folder / match for match in glob.glob(name, root_dir=folder, recursive=True)
@@ -220,7 +230,8 @@ def _files(path, settings):
             clouds += found
         else:
             clouds.append(existing("cloud.files", name))
-    _check_distinct(path, clouds)
+    if clouds:
+        _check_distinct(path, clouds)
     return (
         clouds,
         existing("trajectory.file", settings.trajectory.file),

@@ -122,6 +122,14 @@ def find_control(survey, rng=None, progress=None):
     return control, check, finding
 
 
+def nothing_surveyed(survey):
+    """The Finding of a survey without surveyed points; None where there are some."""
+    if len(survey.control) + len(survey.check):
+        return None
+    none, empty = as_observations([]), Candidates(NO_POINTS, np.empty(0, int), NO_POINTS, {})
+    return Finding(Matches(none, none, (), np.empty(0), ()), empty, {})
+
+
 def silent(title, total):
     """A progress that tells nobody."""
     return lambda points: None
