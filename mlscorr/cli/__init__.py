@@ -5,17 +5,23 @@ import warnings
 
 import typer
 
+from mlscorr.cli.blind import blind
 from mlscorr.cli.calibrate import calibrate
 from mlscorr.cli.compare import compare
 from mlscorr.cli.correct import correct
 from mlscorr.cli.demo import demo
+from mlscorr.cli.diagnose import diagnose
 from mlscorr.cli.doctor import doctor
 from mlscorr.cli.extract import extract
+from mlscorr.cli.plan import plan
 from mlscorr.cli.render import render
 from mlscorr.cli.simulate import simulate
 from mlscorr.cli.terminal import interrupt, warn
 
-COMMANDS = (correct, extract, calibrate, compare, render, demo, simulate, doctor)
+COMMANDS = (
+    *(correct, extract, calibrate, compare, render, demo),
+    *(simulate, diagnose, plan, doctor),
+)
 
 app = typer.Typer(
     help="Correct mobile laser scans with surveyed targets by least squares collocation.",
@@ -26,6 +32,7 @@ app = typer.Typer(
 )
 for command in COMMANDS:
     app.command()(command)
+app.add_typer(blind, name="blind")
 
 
 def main():

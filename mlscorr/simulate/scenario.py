@@ -34,6 +34,7 @@ class SceneScenario(_Part):
     trees: NotNegative = 4.0  # per 100 m of street
     cars: NotNegative = 5.0  # parked, per 100 m of street
     poles: NotNegative = 5.5  # per 100 m of street: lamps every 18 m
+    reference: bool = False  # write reference.ply: ground and walls as a static scan gives them
 
     @model_validator(mode="after")
     def _has_a_file(self):

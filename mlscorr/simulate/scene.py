@@ -30,12 +30,15 @@ class Scene:
         Which target each triangle belongs to, -1 for none.
     targets : Targets
     centre_line : CentreLine
+    fixed : int
+        The first so many triangles are ground and walls.
     """
 
     mesh: Mesh
     target: np.ndarray
     targets: Targets
     centre_line: CentreLine
+    fixed: int
 
     @cached_property
     def normal(self):
@@ -60,6 +63,7 @@ def build_scene(scenario, line, length, rng):
         np.concatenate([np.full(len(surroundings), -1), number]),
         placed.targets,
         line,
+        len(site.mesh),
     )
 
 

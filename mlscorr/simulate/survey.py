@@ -23,9 +23,11 @@ from mlscorr.simulate.recording import (
 from mlscorr.simulate.scanner import Pulses, pulses_of_a_pass, shoot
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene import Scene, build_scene
+from mlscorr.simulate.shapes import Mesh
+from mlscorr.simulate.static_scan import static_scan
 from mlscorr.survey import ControlPoints, Mounting, PointCloud, Trajectory
 
-STREAMS = 6  # drive, scene, scan, POS, control, effects: switching one leaves all others
+STREAMS = 7  # drive, scene, scan, POS, control, effects, reference: each leaves all others
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,8 @@ class SimulatedSurvey:
         Random streams of the effects on the beam.
     seed : int or None
         Of the random numbers, where it is known.
+    static_scan : Mesh, optional
+        Ground and walls about the origin as a static scan gives them, where a reference is wanted.
     """
 
     scenario: Scenario
@@ -82,6 +86,7 @@ class SimulatedSurvey:
     streams: dict
     beam_streams: dict
     seed: int | None = None
+    static_scan: Mesh | None = None
 
     @cached_property
     def true_trajectory(self):
@@ -193,7 +198,8 @@ def simulate(scenario, rng):
     >>> survey.files, survey.targets.name
     (('pass-1.laz',), ('T01', 'T02', 'T03'))
     """
-    drive_rng, scene_rng, scan_rng, pos_rng, control_rng, effect_rng = rng.spawn(STREAMS)
+    drive_rng, scene_rng, scan_rng, pos_rng, control_rng, *more = rng.spawn(STREAMS)
+    effect_rng, static_rng = more
     effects, streams = scenario.imperfections, effect_streams(effect_rng)
     seed = getattr(rng.bit_generator.seed_seq, "entropy", None)
 
@@ -226,4 +232,5 @@ def simulate(scenario, rng):
         streams=streams_by_file(len(true_passes), len(mountings), scan_rng, effect_rng),
         beam_streams=streams,
         seed=seed if isinstance(seed, int) else None,
+        static_scan=static_scan(scene, static_rng) if scenario.scene.reference else None,
     )

@@ -11,9 +11,11 @@ import numpy as np
 from mlscorr.io.las_writer import cloud_writer
 from mlscorr.io.npz import npz_writer
 from mlscorr.io.output import output_folder
+from mlscorr.io.ply import write_ply
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.survey import Pos, angles_from_attitude
 
+REFERENCE = "reference.ply"
 ROUNDING = 1e-4  # m, of control.csv: no coordinate in it is better
 CREATED = date(2015, 1, 1)  # in the LAS header, so that a seed gives the same bytes on any day
 
@@ -32,6 +34,9 @@ def write_survey(survey, folder, progress=None):
             truth.watch = progress("Writing their truth", truth.growing)
         write_trajectory_csv(part / "trajectory.csv", survey.trajectory)
         (part / "control.csv").write_text(_control_csv(survey))
+        if survey.static_scan is not None:
+            origin = np.array(survey.scenario.origin)
+            write_ply(part / REFERENCE, survey.static_scan.triangles + origin)
         (part / "survey.toml").write_text(_survey_toml(survey))
         (part / "truth.json").write_text(json.dumps(_truth(survey, points), indent=1) + "\n")
 
@@ -144,6 +149,8 @@ def _survey_toml(survey):
         for k, m in enumerate(map(_mounting, survey.mountings[1:]), start=2)
     )
     lines = "\n".join([*believed, f"lines_per_second = {scanner.lines_per_second}"])
+    given = survey.static_scan is not None
+    scene = f"\n[scene]\nreference = {json.dumps(REFERENCE)}\n" if given else ""
     return f"""\
 name = {json.dumps(scenario.name)}
 crs = {json.dumps(scenario.crs)}
@@ -169,7 +176,7 @@ file = "control.csv"
 position_sigma = {position}
 attitude_sigma = {attitude}
 correlation_time = {Pos.correlation_time}
-"""
+{scene}"""
 
 
 def _pos_sigmas(trajectory):

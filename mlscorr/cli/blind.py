@@ -1,0 +1,85 @@
+"""The commands that check the diagnosis blindly: make surveys, diagnose them, score."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mlscorr.cli.progress import progress_bars
+from mlscorr.cli.terminal import Exit, Json, Quiet, exit_code, say
+
+Check = Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the blind check.")]
+Workers = Annotated[int, typer.Option(min=1, help="Processes side by side.")]
+
+blind = typer.Typer(
+    help="Check the diagnosis on simulated surveys whose labels are sealed.", no_args_is_help=True
+)
+
+
+@blind.command()
+def make(
+    out: Check,
+    cases: Annotated[int, typer.Option(min=1, help="Number of surveys.")] = 300,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same surveys.")] = 1,
+    mechanisms: Annotated[
+        Path | None, typer.Option(help="Python file with mechanisms that no library knows.")
+    ] = None,
+    workers: Workers = 2,
+    quiet: Quiet = False,
+):
+    """Make surveys, seal their labels, and put those into key.json. Goes on where it stopped."""
+    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
+        from mlscorr.pipeline.blind import make_blind
+
+        made = make_blind(out, cases, seed, mechanisms, workers, progress)
+    say(f"{made} surveys are in {out / 'cases'}, their seals in {out / 'seals.json'}.")
+
+
+@blind.command()
+def run(out: Check, workers: Workers = 2, quiet: Quiet = False):
+    """Diagnose each survey that has no answer yet, from its folder alone."""
+    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
+        from mlscorr.pipeline.blind import run_blind
+
+        answered, failed = run_blind(out, workers, progress)
+    say(f"{answered} surveys are diagnosed ({failed} could not be): {out / 'answers'}.")
+
+
+@blind.command(name="score")
+def score_(out: Check, as_json: Json = False, quiet: Quiet = False):
+    """Verify the seals and compare answers with labels."""
+    with exit_code(Exit.BAD_DATA):
+        from mlscorr.pipeline.blind import score_blind
+
+        told = score_blind(out)
+    if as_json:
+        print(json.dumps(told))
+    for line in _table(told["rows"]):
+        say(line)
+    say(f"{told['answered']} of {told['cases']} cases are answered, {len(told['failed'])} failed.")
+    for one in told["wrong"]:
+        size = f" of {one['mdb']:.1f} MDB" if one["mdb"] else ""
+        say(
+            f"{one['case']} {one['kind']}: {one['truth']}{size}, said {one['said']} "
+            f"({one['probability']:.2f}){': ' + one['lead'] if one['lead'] else ''}"
+        )
+    say(f"Score:  {out / 'score.json'}")
+
+
+def _table(rows):
+    """Lines of the table of rates and figures."""
+    yield f"{'':44}{'cases':>6}{'value':>8}  {'95 % interval':16}{'goal':14}"
+    for row in rows:
+        low, high = row["interval"]
+        reached = {None: "", True: "reached", False: "missed"}[row["reached"]]
+        yield (
+            f"{row['name']:44}{row['cases']:6}{row['value']:8.3f}  "
+            f"{f'{low:.3f} to {high:.3f}':16}{_goal(*row['goal']):14}{reached}"
+        )
+
+
+def _goal(least, most):
+    if least is not None and most is not None:
+        return f"{least:g} to {most:g}"
+    return f">= {least:g}" if least is not None else f"<= {most:g}" if most is not None else ""

@@ -1,0 +1,236 @@
+"""The blind check: surveys with sealed labels, answers to them, and the score."""
+
+import hashlib
+import json
+import os
+import secrets
+import shutil
+import tempfile
+import warnings
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from mlscorr.effects import EFFECTS
+from mlscorr.gap.mix import mix
+from mlscorr.gap.scoring import score
+from mlscorr.io.output import document, write_json
+from mlscorr.io.survey_file import read_survey
+from mlscorr.pipeline.blind_cases import load_mechanisms, make_case
+
+WORKERS = 2  # processes: each wants a core and a gigabyte
+SECRET = ("truth*", "key*")  # names of files that no diagnosis may see
+
+
+def make_blind(out, cases, seed, mechanisms=None, workers=WORKERS, progress=None):
+    """Make the surveys of a blind check: OUT/cases, seals.json (public) and key.json (labels).
+
+    What was interrupted goes on where it stopped. Returns the number of cases that are there.
+
+    Parameters
+    ----------
+    out : Path
+    cases : int
+    seed : int
+    mechanisms : Path, optional
+        File with mechanisms that no library knows; none of these cases without it.
+    workers : int
+    progress : function, optional
+        progress(title, total) returns a function of the number of cases just done.
+
+    Raises ValueError when OUT holds another check, or a case can't be made.
+    """
+    out, names = Path(out), ()
+    if mechanisms is not None:
+        names = tuple(load_mechanisms(mechanisms).MECHANISMS)
+    plan = {"cases": cases, "seed": seed, "mechanisms": list(names)}
+    key = _opened(out, plan)
+    several = mix(cases, np.random.default_rng([seed]), names)
+    todo = {
+        _name(i): (case, (seed, i), mechanisms)
+        for i, case in enumerate(several, start=1)
+        if _name(i) not in key["labels"]
+    }
+    done = (progress or _silent)("Making surveys", len(todo))
+    jobs = [(_make, out / "cases" / name, *job) for name, job in todo.items()]
+    for folder, label in _in_processes(jobs, workers):
+        key["labels"][folder.name] = {"label": label, "salt": secrets.token_hex(16)}
+        _write_key(out, key)
+        done(1)
+    seals = {name: _seal(one) for name, one in sorted(key["labels"].items())}
+    write_json(out / "seals.json", document("seals", {"seals": seals}))
+    return len(seals)
+
+
+def run_blind(out, workers=WORKERS, progress=None):
+    """Diagnose each survey of a blind check that has no answer yet: OUT/answers.
+
+    Each diagnosis sees a copy of its survey's folder in a process of its own; the key can't be
+    read meanwhile. Returns the numbers of answers there, and of those that failed.
+
+    Raises ValueError when there are no cases, or a folder holds a truth or a key.
+    """
+    out = Path(out)
+    folders = sorted(path for path in (out / "cases").glob("*") if not path.name.startswith("."))
+    if not folders:
+        raise ValueError(f"{out} holds no cases: make them first with mlscorr blind make.")
+    for folder in folders:
+        _check_blind(folder)
+    answers = out / "answers"
+    answers.mkdir(exist_ok=True)
+    todo = [folder for folder in folders if not (answers / f"{folder.name}.json").exists()]
+    done = (progress or _silent)("Diagnosing", len(todo))
+    with _locked(out / "key.json"):
+        for folder, answer in _in_processes([(_diagnose, folder) for folder in todo], workers):
+            part = answers / f".{folder.name}.part"
+            write_json(part, answer)
+            os.replace(part, answers / f"{folder.name}.json")
+            done(1)
+    failed = sum("error" in json.loads(path.read_text()) for path in answers.glob("*.json"))
+    return len(folders), failed
+
+
+def score_blind(out):
+    """Unseal the labels of a blind check and score its answers: OUT/score.json, returned.
+
+    Raises ValueError when a label or its key was changed after it was sealed, or nothing is
+    answered yet.
+    """
+    out = Path(out)
+    key, seals = _read(out / "key.json")["labels"], _read(out / "seals.json")["seals"]
+    broken = sorted(
+        name
+        for name in {*key, *seals}
+        if name not in key or name not in seals or _seal(key[name]) != seals[name]
+    )
+    if broken:
+        raise ValueError(
+            f"{len(broken)} of {len(seals)} seals of {out} are broken (first: {broken[0]}): a "
+            "label or its salt was changed after it was sealed, so nothing can be scored. Make the "
+            "cases anew."
+        )
+    answers = {path.stem: _read(path) for path in sorted((out / "answers").glob("*.json"))}
+    answered = [name for name in sorted(seals) if name in answers]
+    if not answered:
+        raise ValueError(f"{out} has no answers yet: run mlscorr blind run first.")
+    told = score({name: (key[name]["label"], answers[name]) for name in answered})
+    told = document("score", {"cases": len(seals), "answered": len(answered), **told})
+    write_json(out / "score.json", told)
+    return told
+
+
+def _name(number):
+    return f"{number:04d}"
+
+
+def _silent(title, total):
+    return lambda done: None
+
+
+def _read(path):
+    if not path.is_file():
+        raise ValueError(f"{path} is missing: it is made by mlscorr blind make and run.")
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def _seal(sealed):
+    """SHA-256 of a label's canonical JSON and its salt."""
+    text = json.dumps(sealed["label"], sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256((text + sealed["salt"]).encode()).hexdigest()
+
+
+def _opened(out, plan):
+    """The key of a check that was begun with this plan, or a new one."""
+    path = out / "key.json"
+    if path.exists():
+        key = _read(path)
+        if key["plan"] != plan:
+            raise ValueError(
+                f"{out} holds a blind check of {key['plan']['cases']} cases with seed "
+                f"{key['plan']['seed']} and {len(key['plan']['mechanisms'])} mechanisms, not this "
+                "one: choose another folder."
+            )
+        return key
+    if out.exists() and any(out.iterdir()):
+        raise ValueError(f"{out} holds other files already: choose another folder.")
+    (out / "cases").mkdir(parents=True)
+    key = {"plan": plan, "labels": {}}
+    _write_key(out, key)
+    return key
+
+
+def _write_key(out, key):
+    part = out / ".key.part"
+    part.touch(mode=0o600)
+    write_json(part, key)
+    os.replace(part, out / "key.json")
+
+
+@contextmanager
+def _locked(path):
+    """No one but root can read a file meanwhile."""
+    path.chmod(0o000)
+    try:
+        yield
+    finally:
+        path.chmod(0o600)
+
+
+def _check_blind(folder):
+    """Refuse a folder in which a diagnosis could read what it should find."""
+    seen = sorted(path for name in SECRET for path in folder.rglob(name) if path.is_file())
+    if seen:
+        raise ValueError(
+            f"{seen[0]} can be read by the diagnosis, which must not know the truth: remove it, or "
+            "make the cases anew."
+        )
+
+
+def _in_processes(jobs, workers):
+    """Results of jobs (function, folder, ...) as (folder, result), in the order in which they
+    are done. A process is a fresh interpreter with one thread in BLAS."""
+    context = get_context("spawn")
+    with ProcessPoolExecutor(workers, context, threadpool_limits, (1,)) as pool:
+        futures = {pool.submit(*job): job[1] for job in jobs}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _make(folder, case, entropy, mechanisms):
+    """Make a case in a process of its own, whole or not at all; its label."""
+    warnings.simplefilter("ignore")
+    with tempfile.TemporaryDirectory(prefix=".", dir=folder.parent) as place:
+        made = Path(place) / folder.name
+        label = make_case(made, case, entropy, mechanisms)
+        if folder.exists():  # of a run that was interrupted before it had the label
+            shutil.rmtree(folder)
+        os.replace(made, folder)
+    return label
+
+
+def _diagnose(folder):
+    """Answer of the diagnosis, which is given a copy of the folder and nothing else."""
+    from mlscorr.pipeline.diagnosis import diagnose
+
+    warnings.simplefilter("ignore")
+    start = monotonic()
+    with tempfile.TemporaryDirectory() as place:
+        copy = Path(place) / "survey"
+        shutil.copytree(folder, copy, ignore=shutil.ignore_patterns(*SECRET))
+        without = json.loads((copy / "library.json").read_text())["without"]
+        (copy / "library.json").unlink()
+        library = tuple(kind for kind in EFFECTS if kind.name not in without)
+        try:
+            found = diagnose(read_survey(copy), library=library, rng=np.random.default_rng(0))
+            answer = {"document": found.document}
+        except ValueError as error:
+            answer = {"error": str(error)}
+    return answer | {"seconds": round(monotonic() - start, 2)}
