@@ -18,6 +18,7 @@ bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench_simulate.py
 	$(RUN)/python benchmarks/bench_collocation.py
 	$(RUN)/python benchmarks/bench_targets.py 2
+	$(RUN)/python benchmarks/bench_gap.py
 	$(RUN)/python benchmarks/bench_render.py
 
 examples: $(VENV)/ready

@@ -9,6 +9,7 @@ from mlscorr.survey import Survey
 
 EPOCHS, ON_MAP = 1500, 1500  # of trajectory and rows on the map: more can't be seen on a page
 QUANTILE = 1.96
+LEAST = 1e-4  # probability from which on a pair is listed
 
 
 def gap_document(survey, rows, inference, closure, next_data, advice, effects, left_out, warnings):
@@ -63,7 +64,8 @@ def _sentence(inference):
         + (f" +- {QUANTILE * one.sigma:.2g}" if np.isfinite(one.sigma) else "")
         for one in cause.parameters
     ]
-    return f"{verdict.label.replace('+', ' and ')} explains it ({sure}): {', '.join(said)} (95 %)."
+    several = "+" in verdict.label
+    return f"{verdict.label.replace('+', ' and ')} explain{'' if several else 's'} it ({sure}): {', '.join(said)} (95 %)."
 
 
 def _split(split):
@@ -131,19 +133,22 @@ def _closure(closure):
 
 
 def _evidence(inference):
+    """The ladder; of labels that were weighed last, the ratio follows from the probability."""
     score = {name: float(values[0]) for name, values in inference.found.score.items()}
     chance, none = inference.probability, score["none"]
-    noise = {one.label for one in inference.found.noise}
-    kept = {"none", "unknown", *noise, *(n for n in chance if chance[n] > 1e-4), *score}
+    known = max(score, key=lambda name: chance.get(name, 0.0))
+
+    def ratio(name):
+        if name in score:
+            return score[name] - none
+        if chance[name] == 0.0:  # it underflows
+            return float("nan")
+        return score[known] - none + float(np.log(chance[name] / chance[known]))
+
     return [
-        {
-            "label": name,
-            "log_evidence_ratio": score.get(name, np.log(chance[name] / chance["none"]) + none)
-            - none,
-            "probability": chance[name],
-        }
+        {"label": name, "log_evidence_ratio": ratio(name), "probability": chance[name]}
         for name in chance
-        if name in kept
+        if name in score or chance[name] > LEAST
     ]
 
 

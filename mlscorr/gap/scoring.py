@@ -167,6 +167,8 @@ def _figures(several):
     closed = [_closed(one) for one in clear]
     yield _figure("gap closed at 3 MDB and more, median", closed, np.median, 0.99)
     yield _figure("gap closed at 3 MDB and more, p10", closed, _tenth, 0.95)
+    impostors = [_closed(one) for one in several if one.kind == "withheld"]
+    yield _figure("withheld: gap closed by the best known effect, median", impostors, np.median)
     at_3 = [one for one in clear if one.mdb <= NEAR_3[1] and names(one, one.said)]
     error = [e for e in map(_error, at_3) if e is not None]
     yield _figure("error of the parameters at 3 MDB, median", error, np.median, most=0.08)
