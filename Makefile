@@ -22,7 +22,7 @@ bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench_render.py
 
 examples: $(VENV)/ready
-	for script in examples/*.py; do $(RUN)/python $$script || exit 1; done
+	for script in examples/*.py examples/real/*_gap.py; do $(RUN)/python $$script || exit 1; done
 
 $(VENV)/ready: pyproject.toml setup.sh
 	PYTHON=$(PYTHON) VENV=$(VENV) sh setup.sh

@@ -64,8 +64,9 @@ def _sentence(inference):
         + (f" +- {QUANTILE * one.sigma:.2g}" if np.isfinite(one.sigma) else "")
         for one in cause.parameters
     ]
-    several = "+" in verdict.label
-    return f"{verdict.label.replace('+', ' and ')} explain{'' if several else 's'} it ({sure}): {', '.join(said)} (95 %)."
+    names = verdict.label.replace("+", " and ")
+    do = "explain" if "+" in verdict.label else "explains"
+    return f"{names} {do} it ({sure}): {', '.join(said)} (95 %)."
 
 
 def _split(split):

@@ -1,7 +1,7 @@
 """``diagnose``: where a survey and its simulation differ, why, and how far that can be mended."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mlscorr.gap.document import gap_document
 from mlscorr.gap.folds import best_known
 from mlscorr.gap.pairing import build_rows
 from mlscorr.gap.plan import NextData, next_data
-from mlscorr.gap.rerun import collect_beams, rerun
+from mlscorr.gap.rerun import Beams, collect_beams, rerun
 from mlscorr.gap.rows import Rows, background
 from mlscorr.gap.signatures import select, signatures
 from mlscorr.io.output import check_output, document, output_folder, write_json
@@ -66,27 +66,9 @@ def diagnose(survey, simulator=None, library=EFFECTS, rng=None, progress=None):
     progress = progress or silent
     simulator = beliefs_of(survey) if simulator is None else simulator
     believed, effects = as_believed(survey, simulator)
-    finding = nothing_surveyed(survey) or find_targets(believed, progress=progress)
-    done = progress("Looking for surfaces", sum(file.points for file in survey.clouds))
-    pairing = build_rows(believed, finding.matches.matched, finding.candidates, progress=done)
-    looks = len(np.unique(pairing.rows.item[pairing.rows.metric]))
-    if looks < FEWEST:
-        raise ValueError(too_little(survey, pairing.rows, looks, library))
-    rows = Rows.concatenate([pairing.rows, pairing.check])
-    done = progress("Simulating the survey's own beams", sum(f.points for f in survey.clouds))
-    beams = collect_beams(believed, rows, finding, done)
+    pairing, rows, beams = _observed(survey, believed, library, progress)
+    again = _Again(rows, believed, beams, effects, rng.integers(2**63))
     step = progress("Weighing the causes", STEPS)
-    seed = rng.integers(2**63)
-
-    @cache
-    def run(some):
-        return rerun(rows, believed, beams, some, np.random.default_rng(seed))
-
-    def simulated(more):
-        """What the simulator, run again, says that these effects add to each row."""
-        added, linear = run((*effects, *more)) - run(effects), expected(rows, believed, more).shift
-        return np.where(np.isfinite(added) & rows.metric, added, linear)
-
     observed = compared(rows, believed, effects)
     used = np.arange(len(rows)) < len(pairing.rows)
     signs, left_out = signatures(observed, believed, library, rng)
@@ -96,7 +78,7 @@ def diagnose(survey, simulator=None, library=EFFECTS, rng=None, progress=None):
     cause = _tested(part, mine, inference)
     unknown = inference.verdict.label == "unknown"
     closure = close(
-        observed, used, believed, signs, inference.found, cause, simulated, rng, unknown, step
+        observed, used, believed, signs, inference.found, cause, again.added, rng, unknown, step
     )
     open_ = [n for n in (*inference.verdict.set, *inference.same) if n != "unknown"]
     plan = next_data(part, believed, library, tuple(dict.fromkeys(open_)), inference.separability)
@@ -104,6 +86,45 @@ def diagnose(survey, simulator=None, library=EFFECTS, rng=None, progress=None):
     return DiagnosedSurvey(
         survey, simulator, effects, part, inference, closure, plan, left_out, pairing.notes
     )
+
+
+def _observed(survey, believed, library, progress):
+    """The Pairing, all its rows, check points last, and the Beams on which they stand."""
+    finding = nothing_surveyed(survey) or find_targets(believed, progress=progress)
+    points = sum(file.points for file in survey.clouds)
+    done = progress("Looking for surfaces", points)
+    pairing = build_rows(believed, finding.matches.matched, finding.candidates, progress=done)
+    looks = len(np.unique(pairing.rows.item[pairing.rows.metric]))
+    if looks < FEWEST:
+        raise ValueError(too_little(survey, pairing.rows, looks, library))
+    rows = Rows.concatenate([pairing.rows, pairing.check])
+    done = progress("Simulating the survey's own beams", points)
+    return pairing, rows, collect_beams(believed, rows, finding, done)
+
+
+@dataclass(frozen=True)
+class _Again:
+    """The simulator, run again on a survey's own beams with the same noise each time."""
+
+    rows: Rows
+    survey: Survey
+    beams: Beams
+    effects: tuple
+    seed: int
+
+    def added(self, more):
+        """What further effects add to each row (m,); to the first order where no run tells it."""
+        added = self._run((*self.effects, *more)) - self._plain
+        linear = expected(self.rows, self.survey, more).shift
+        return np.where(np.isfinite(added) & self.rows.metric, added, linear)
+
+    @cached_property
+    def _plain(self):
+        return self._run(self.effects)
+
+    def _run(self, effects):
+        rng = np.random.default_rng(self.seed)
+        return rerun(self.rows, self.survey, self.beams, effects, rng)
 
 
 def _tested(rows, signs, inference):

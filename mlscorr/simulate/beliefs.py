@@ -15,8 +15,8 @@ from mlscorr.io.settings import read_settings_file
 from mlscorr.io.survey_file import (
     Degrees,
     Meters,
-    PosSection,
     Positive,
+    PosSection,
     ScannerSection,
     Three,
 )
@@ -66,7 +66,7 @@ class WindowSection(_Section):
 
 
 class BelievedPosSection(PosSection):
-    windows: list[WindowSection] = []
+    windows: list[WindowSection] = Field(default_factory=list)
 
     def pos(self):
         windows = tuple((w.start, w.length, w.factor, w.shape) for w in self.windows)
