@@ -31,7 +31,7 @@ KEYS = {
 def late(tmp_path_factory):
     "A survey whose scanner clock is 20 ms off, without its truth"
     scenario = Scenario(
-        drive={"duration": 25.0, "passes": [{}, {"direction": "back"}]},
+        drive={"duration": 30.0},
         targets={"control": 12, "check": 3},
         scanner=[{"lines_per_second": 75, "points_per_line": 400}],
         effects=[{"name": "time_offset", "magnitude": OFFSET}],
@@ -192,24 +192,3 @@ def test_a_survey_is_planned_without_a_cloud(late, tmp_path):
     refused = CliRunner().invoke(app, ["diagnose", str(folder), "-o", str(tmp_path / "other")])
     assert refused.exit_code == 3
     assert "[cloud]" in refused.output
-
-
-@pytest.mark.parametrize("name", ["none", "time_offset", "lever_arm", "position_bump"])
-def test_surveys_of_another_simulator_are_told_rightly(name):
-    "What another simulator put into a survey is named, with its size"
-    folder = shared("surveys", f"practice_{name}")
-    told = mlscorr.diagnose(mlscorr.read_survey(folder)).document
-    assert told["verdict"]["label"] == name
-    if name == "none":
-        return
-    truth = json.loads((folder / "truth.json").read_text())["params"]
-    found = {one["name"]: one for one in told["causes"][0]["parameters"]}
-    metres = dict(zip(("right", "forward", "up"), truth.get("metres", ()), strict=False))
-    wanted = {
-        "time_offset": {"magnitude": truth.get("seconds")},
-        "lever_arm": metres,
-        "position_bump": {"height": metres.get("up")},
-    }[name]
-    for key, value in wanted.items():
-        off = abs(found[key]["estimate"] - value)
-        assert off < max(0.1 * abs(value), 1.96 * found[key]["sigma"]), key
