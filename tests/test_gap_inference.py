@@ -21,7 +21,7 @@ from mlscorr.gap.changes import Bench
 from mlscorr.gap.contaminated import contaminated
 from mlscorr.gap.estimate import DETECTABLE
 from mlscorr.gap.evidence import AMPLITUDES, USED, block_gain, evidence, novel, table
-from mlscorr.gap.plan import next_data
+from mlscorr.gap.plan import additions, next_data
 from mlscorr.gap.rows import background
 from mlscorr.gap.separability import separability
 from mlscorr.gap.signatures import signatures
@@ -419,6 +419,16 @@ def test_targets_alone_confuse_a_datum_with_a_lever_arm_and_more_speed_does_not_
     for one in next_data(g.rows, g.survey, EFFECTS, ("time_offset", "clock_drift"), compared):
         assert one.after < one.before
         assert "time_offset and clock_drift" in one.why
+
+
+def test_every_addition_can_be_made_where_pulses_spread_about_their_targets(study):
+    "Five additions, though the first pulse is earlier than the first target; each has more rows"
+    g = study.geometry(6, targets=24, patches=0)
+    time = g.rows.pulses.gps_time
+    early = replace(g.rows.pulses, gps_time=time - 0.2 * (time == time.min()))
+    made = additions(replace(g.rows, pulses=early), g.survey)
+    assert len(made) == 5
+    assert all(len(one.rows) > len(g.rows) for one in made)
 
 
 def test_the_unknown_leaves_out_what_a_survey_does_not_vary(study):

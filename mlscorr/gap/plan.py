@@ -174,7 +174,8 @@ def _stop(name, rows, survey, items):
     low, high = once.gps_time.min(), once.gps_time.max()
 
     def again(seen):
-        return start + (seen - low) / max(high - low, 1.0) * (time[-1] - start)
+        share = (seen - low) / max(high - low, 1.0)  # pulses come before and after their target
+        return start + np.clip(share, 0.0, 1.0) * (time[-1] - start)
 
     return _new_targets(name, rows, replace(survey, trajectory=longer), once, again, 1.0)
 

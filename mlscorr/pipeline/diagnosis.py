@@ -1,6 +1,6 @@
 """``diagnose``: where a survey and its simulation differ, why, and how far that can be mended."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from mlscorr.gap.rows import Rows, background
 from mlscorr.gap.signatures import select, signatures
 from mlscorr.io.output import check_output, document, output_folder, write_json
 from mlscorr.io.survey_file import input_files
-from mlscorr.pipeline.finding import SEED, find_targets, nothing_surveyed, silent
+from mlscorr.pipeline.finding import SEED, found_or_nothing, silent
 from mlscorr.pipeline.planning import too_little
 from mlscorr.simulate.beliefs import Simulator, beliefs_of, write_simulator
 from mlscorr.survey import Survey
@@ -90,13 +90,14 @@ def diagnose(survey, simulator=None, library=EFFECTS, rng=None, progress=None):
 
 def _observed(survey, believed, library, progress):
     """The Pairing, all its rows, check points last, and the Beams on which they stand."""
-    finding = nothing_surveyed(survey) or find_targets(believed, progress=progress)
+    finding, notes = found_or_nothing(believed, progress)
     points = sum(file.points for file in survey.clouds)
     done = progress("Looking for surfaces", points)
     pairing = build_rows(believed, finding.matches.matched, finding.candidates, progress=done)
     looks = len(np.unique(pairing.rows.item[pairing.rows.metric]))
     if looks < FEWEST:
-        raise ValueError(too_little(survey, pairing.rows, looks, library))
+        raise ValueError(too_little(survey, pairing.rows, looks, library, notes))
+    pairing = replace(pairing, notes=(*notes, *pairing.notes))
     rows = Rows.concatenate([pairing.rows, pairing.check])
     done = progress("Simulating the survey's own beams", points)
     return pairing, rows, collect_beams(believed, rows, finding, done)

@@ -122,12 +122,16 @@ def find_control(survey, rng=None, progress=None):
     return control, check, finding
 
 
-def nothing_surveyed(survey):
-    """The Finding of a survey without surveyed points; None where there are some."""
+def found_or_nothing(survey, progress=None):
+    """The Finding, empty where nothing was surveyed or found, and the sentence that says so."""
+    nothing = "No target was surveyed: only surfaces are compared."
     if len(survey.control) + len(survey.check):
-        return None
+        try:
+            return find_targets(survey, progress=progress), ()
+        except ValueError as error:
+            nothing = f"{error} Only surfaces are compared."
     none, empty = as_observations([]), Candidates(NO_POINTS, np.empty(0, int), NO_POINTS, {})
-    return Finding(Matches(none, none, (), np.empty(0), ()), empty, {})
+    return Finding(Matches(none, none, (), np.empty(0), ()), empty, {}), (nothing,)
 
 
 def silent(title, total):

@@ -123,13 +123,14 @@ class PlannedSurvey:
         return content
 
 
-def too_little(survey, rows, looks, library):
+def too_little(survey, rows, looks, library, notes=()):
     """The sentence for a survey that shows too little: what is missing, and the plan."""
     told = (
         f"{survey.path} shows {looks} things with a residual in m, and the POS's error alone has 6 "
         "unknowns: no cause can be told from it. Survey at least 12 targets along the way, better "
         "on two passes, or give a [scene] reference."
     )
+    told = " ".join([*notes, told])
     if survey.mounting is None or looks == 0:
         return told
     signs, _ = signatures(rows, survey, library)

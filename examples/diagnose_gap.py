@@ -1,0 +1,103 @@
+"""Find out, round by round, what a simulator does not know of a survey.
+
+    python examples/diagnose_gap.py [PICTURE]
+
+A street is simulated with a scanner clock that is 6 ms off and control in a height datum that is
+6 cm off. The diagnosis sees the survey alone: it names one effect, puts it into the simulator, and
+is asked again until nothing is left.
+"""
+
+import sys
+import tempfile
+
+import matplotlib as mpl
+import numpy as np
+
+import mlscorr
+from mlscorr.simulate import Scenario, simulate
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+HIDDEN = [
+    {"name": "time_offset", "magnitude": 0.006},
+    {"name": "vertical_datum", "magnitude": 0.06},
+]
+ROUNDS = 4
+BEFORE, AFTER, BAND = "#d55e00", "#0072b2", "0.85"
+
+
+def survey_to_explain(folder):
+    """A survey of two opposite passes, of which only the simulator that made it knows all."""
+    scenario = Scenario(
+        drive={"duration": 40.0, "passes": [{}, {"direction": "back"}]},
+        scene={"reference": True},
+        targets={"control": 14, "check": 5},
+        scanner=[{"lines_per_second": 100, "points_per_line": 400}],
+        effects=HIDDEN,
+    )
+    simulate(scenario, np.random.default_rng(8)).write(folder)
+    return mlscorr.read_survey(folder)
+
+
+def rounds(survey):
+    """Diagnoses, each with the simulator that the one before improved, until none is left."""
+    found, simulator = [], None
+    while len(found) < ROUNDS:
+        found.append(mlscorr.diagnose(survey, simulator))
+        told = found[-1].document
+        print(f"round {len(found)}: {told['verdict']['sentence']}")
+        if told["verdict"]["label"] in ("none", "unknown"):
+            break
+        closure = told["closure"]
+        print(f"         gap {closure['before']:.2f} -> {closure['after']:.2f} mm, held out")
+        simulator = found[-1].improved
+    return [one.document for one in found]
+
+
+def draw(several, path):
+    """The gap of the first round by speed, by what was compared and by axis, and that of all."""
+    first = several[0]
+    figure, axes = plt.subplots(1, 4, figsize=(12, 3.4), width_ratios=[3, 2, 2, 2])
+    for axis, by in zip(axes, ("speed", "channel", "axis"), strict=False):
+        split(axis, next(one for one in first["where"] if one["by"] == by))
+    axes[0].set_ylabel("gap (mm)")
+    axes[0].legend(frameon=False, fontsize=8)
+    numbers = np.arange(len(several))
+    closure = [told["closure"] for told in several]
+    for side, colour, moved in (("before", BEFORE, -0.2), ("after", AFTER, 0.2)):
+        axes[3].bar(numbers + moved, [one[side] for one in closure], 0.4, color=colour)
+    names = [told["verdict"]["label"].replace("+", "\n+ ") for told in several]
+    axes[3].set_xticks(numbers, [f"round {i}:\n{name}" for i, name in enumerate(names, start=1)])
+    axes[3].set_title("held out, by any one cause", fontsize=9)
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.tick_params(labelsize=8)
+        axis.axhline(0, color="0.4", linewidth=0.6)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def split(axis, one):
+    """One split of the gap: before, after, and what chance makes of it."""
+    low, high = np.array(one["null_band"]).T
+    if "edges" in one:
+        edges = np.array(one["edges"])
+    else:
+        edges = np.arange(len(one["bins"]) + 1) - 0.5
+        axis.set_xticks(range(len(one["bins"])), one["bins"])
+    axis.stairs(high, edges, baseline=low, fill=True, color=BAND, label="by chance (95 %)")
+    axis.stairs(one["before"], edges, baseline=None, color=BEFORE, linewidth=2, label="before")
+    axis.stairs(one["after"], edges, baseline=None, color=AFTER, linewidth=2, label="after")
+    axis.set_title(f"by {one['name']}" + (f" ({one['unit']})" if one["unit"] else ""), fontsize=9)
+
+
+def main():
+    path = sys.argv[1] if len(sys.argv) > 1 else "diagnose_gap.png"
+    with tempfile.TemporaryDirectory() as folder:
+        draw(rounds(survey_to_explain(folder)), path)
+    print(f"Picture: {path}")
+
+
+if __name__ == "__main__":
+    main()
