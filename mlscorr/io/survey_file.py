@@ -141,16 +141,16 @@ def read_survey(path, planned=False):
     notes = [f"Coordinates are in {settings.crs} ({crs.name})." if crs else "No CRS was given."]
     if trajectory_file.suffix.lower() in SBET_SUFFIXES:
         notes += describe_projection(settings.crs)
-    if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
-        notes.append(
-            f"Nothing says how well the POS is known: {Pos.position_sigma} m over "
-            f"{Pos.correlation_time:.0f} s are assumed. Give the trajectory's sigmas, or [pos]."
-        )
     files = []
     for cloud in clouds:
         file, note = _cloud_file(cloud, trajectory, settings.cloud.gps_time)
         files.append(file)
         notes.append(note)
+    if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
+        notes.append(
+            f"Nothing says how well the POS is known: {Pos.position_sigma} m over "
+            f"{Pos.correlation_time:.0f} s are assumed. Give the trajectory's sigmas, or [pos]."
+        )
     return Survey(
         name=settings.name or path.absolute().parent.name,
         path=path,
