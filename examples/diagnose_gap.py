@@ -93,7 +93,7 @@ def split(axis, one):
 
 
 def main():
-    path = sys.argv[1] if len(sys.argv) > 1 else "diagnose_gap.png"
+    path = sys.argv[1] if len(sys.argv) > 1 else "assets/diagnose.png"
     with tempfile.TemporaryDirectory() as folder:
         draw(rounds(survey_to_explain(folder)), path)
     print(f"Picture: {path}")

@@ -280,6 +280,14 @@ def test_all_pulses_are_found_again(case):
     assert np.mean(np.abs(found / wanted - 1) < 0.01) > 0.95
 
 
+def test_a_file_that_holds_nothing_of_the_rows_is_passed_over(case):
+    "Of one patch of the first pass, nothing is in the second file"
+    survey, finding, rows, _ = case
+    first = np.flatnonzero((rows.channel == "roughness") & (rows.covariates["pass"] == 1.0))[:1]
+    beams = collect_beams(survey, rows.select(first), finding)
+    assert set(beams.item) == set(rows.item[first])
+
+
 @pytest.mark.parametrize(
     "channel, limit", [("target", 2.0), ("surface", 1.0), ("shared", 1.0), ("roughness", 1.3)]
 )

@@ -140,6 +140,8 @@ def _take_patches(chunk, patches, key, found):
     here = place_key(chunk.xyz, chunk.gps_time)
     place = np.minimum(np.searchsorted(key, here), len(key) - 1)
     rows = np.flatnonzero(key[place] == here)
+    if len(rows) == 0:
+        return
     rows = rows[np.argsort(place[rows], kind="stable")]
     place = place[rows]
     bounds = np.searchsorted(place, place[np.append(True, np.diff(place) != 0)[: len(place)]])
