@@ -327,7 +327,7 @@ def test_the_sky_is_hidden_by_high_houses_and_open_between():
     wall = np.array([[[6.0, -500, 0], [6.0, 500, 0], [6.0, 500, 8.0]]])
     wall = np.concatenate([wall, [[[6.0, -500, 0], [6.0, 500, 8.0], [6.0, -500, 8.0]]]])
     scene = built("street")[3]
-    alone = type(scene)(Mesh(wall, np.full(2, 0.3)), np.full(2, -1), scene.targets, None)
+    alone = type(scene)(Mesh(wall, np.full(2, 0.3)), np.full(2, -1), scene.targets, None, 2)
     times = 357_700.0 + np.arange(0.0, 10.0, 0.01)
     place = ORIGIN + np.column_stack([0 * times, times - times[0], 2.0 + 0 * times])
     north = Trajectory(times, place, attitude_from_angles(0 * times, 0.0, 0.0))
@@ -431,7 +431,7 @@ def test_drive_and_targets_stand_on_the_mesh(tmp_path):
     scenario = on_mesh(path, targets=TargetScenario(control=5, check=3))
     line, length, (trajectory,) = drive(scenario, rng(1))
     scene = build_scene(scenario, line, length, rng(2))
-    mesh = type(scene)(read_mesh(scenario), None, None, None)
+    mesh = type(scene)(read_mesh(scenario), None, None, None, 0)
     local = trajectory.position - ORIGIN
     height = local[:, 2] - height_below(mesh, local)
     assert np.abs(height - 1.8).max() < 0.1  # m, vibration and the smoothing of the ground
