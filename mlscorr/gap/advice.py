@@ -55,8 +55,9 @@ def advise(verdict, same, next_data, impostor=None):
         told.append(f"Look for what makes a {verdict.lead}: no effect of the library does.")
         if impostor is not None and impostor.effect != "none":
             told.append(
-                f"The nearest known effect, {impostor.effect}, closes only "
-                f"{100 * max(0.0, min(1.0, impostor.shrink)):.0f} % of the gap: don't use it."
+                f"The nearest known effect, {impostor.effect}, closes "
+                f"{100 * max(0.0, min(1.0, impostor.shrink)):.0f} % of the gap and leaves "
+                "the rest: don't use it."
             )
     else:
         told += [NEXT[part] for part in verdict.label.split("+") if part in NEXT]

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from mlscorr.gap.background import BELIEVED, epochs
+from mlscorr.gap.measure import signed_root
 from mlscorr.gap.whitening import whitener
 
 SPLITS = (
@@ -110,11 +111,6 @@ class Where:
     headline: str
 
 
-def signed_mm(square):
-    """sign(g) |g|^(1/2) of squares in m^2, in mm."""
-    return 1e3 * np.sign(square) * np.sqrt(np.abs(square))
-
-
 def locate(rows, background, shift, rng, chance, setting=BELIEVED, extra=None):
     """Where the gap lies, before and after a cause is taken off: Where.
 
@@ -150,9 +146,9 @@ def locate(rows, background, shift, rng, chance, setting=BELIEVED, extra=None):
     kept = observed.second
     terms, told, row = terms[kept], told[kept], observed.row[kept]
     mean = terms.mean(axis=0)
-    band = tuple(float(v) for v in np.percentile(signed_mm(mean[2:]), BAND))
+    band = tuple(float(v) for v in np.percentile(signed_root(mean[2:]), BAND))
     splits = tuple(one for by in SPLITS if (one := _split(rows, row, by, terms, told)) is not None)
-    before, after = (float(v) for v in signed_mm(mean[:2]))
+    before, after = (float(v) for v in signed_root(mean[:2]))
     return Where(
         before, after, band, splits, row, observed.gps_time[kept], u[kept, :2], sigma[kept],
         _headline(before, band, splits, len(row), shift.any()),
@@ -166,7 +162,7 @@ def _split(rows, row, by, terms, told):
         return None
     count = np.bincount(number, minlength=len(bins))
     sums = np.array([np.bincount(number, column, len(bins)) for column in terms.T]).T
-    mean = signed_mm(sums / np.maximum(count, 1)[:, None])
+    mean = signed_root(sums / np.maximum(count, 1)[:, None])
     return Split(
         by, edges, bins, count, mean[:, 0], mean[:, 1],
         np.bincount(number, told, len(bins)) / (told.sum() or 1.0),
