@@ -190,5 +190,5 @@ def test_a_survey_is_planned_without_a_cloud(late, tmp_path):
     assert 1e-4 < offset["detectable"] < 0.02
     assert any({"lever_arm", "vertical_datum"} <= set(members) for members in plan["classes"])
     refused = CliRunner().invoke(app, ["diagnose", str(folder), "-o", str(tmp_path / "other")])
-    assert refused.exit_code == 3
-    assert "[cloud]" in refused.output
+    assert refused.exit_code == 2
+    assert "cloud is missing" in refused.output

@@ -17,7 +17,7 @@ def plan(
         from mlscorr.io.output import check_output
         from mlscorr.io.survey_file import input_files
 
-        check_output(out, input_files(survey), overwrite)
+        check_output(out, input_files(survey, planned=True), overwrite)
     with exit_code(Exit.BAD_DATA):
         from mlscorr.io.survey_file import read_survey
         from mlscorr.pipeline import plan

@@ -108,13 +108,19 @@ class Settings(_Section):
 
     name: str | None = None
     crs: str | None = None
-    cloud: CloudSection | None = None
+    cloud: CloudSection
     trajectory: TrajectorySection
     mounting: MountingSection | None = None
     control: ControlSection | None = None
     scanner: ScannerSection = ScannerSection()
     pos: PosSection = PosSection()
     scene: SceneSection = SceneSection()
+
+
+class PlannedSettings(Settings):
+    """The same of a survey that isn't driven yet: it may have no cloud."""
+
+    cloud: CloudSection | None = None
 
 
 def read_survey(path, planned=False):
@@ -125,12 +131,7 @@ def read_survey(path, planned=False):
     (times, coordinates); FileNotFoundError for files that aren't there.
     """
     path = _survey_toml(path)
-    settings = read_settings(path)
-    if settings.cloud is None and not planned:
-        raise ValueError(
-            f"{path} lacks the section [cloud] with its files: without a cloud there is nothing to "
-            "work on. mlscorr plan says what a survey will show before it is driven."
-        )
+    settings = read_settings(path, planned)
     clouds, trajectory_file, accuracy, control_file, reference = _files(path, settings)
     crs = check_crs(settings.crs) if settings.crs else None
     trajectory = read_trajectory(trajectory_file, settings.crs, accuracy)
@@ -167,33 +168,33 @@ def read_survey(path, planned=False):
     )
 
 
-def read_settings(path):
+def read_settings(path, planned=False):
     """Settings of a survey.toml, or of a folder that holds one; no other file is opened.
 
     Raises ValueError that names the line of bad TOML, or every key that is unknown (with the
     nearest known one), missing, or of the wrong type.
     """
-    settings = read_settings_file(_survey_toml(path), Settings)
+    settings = read_settings_file(_survey_toml(path), PlannedSettings if planned else Settings)
     if settings.crs is not None:
         check_crs(settings.crs)
     return settings
 
 
-def input_files(path):
+def input_files(path, planned=False):
     """Paths of a survey.toml and of every file that it names, all of which exist.
 
     Raises as read_settings does, and FileNotFoundError for files that aren't there.
     """
-    return [file for _, file in named_files(path)]
+    return [file for _, file in named_files(path, planned)]
 
 
-def named_files(path):
+def named_files(path, planned=False):
     """Pairs (what it is, path) of a survey.toml and of every file that it names.
 
     Raises as input_files does.
     """
     path = _survey_toml(path)
-    clouds, *others = _files(path, read_settings(path))
+    clouds, *others = _files(path, read_settings(path, planned))
     files = [("survey", path), *(("cloud", cloud) for cloud in clouds)]
     files += zip(("trajectory", "trajectory accuracy", "control", "reference"), others, strict=True)
     return [(what, file) for what, file in files if file is not None]

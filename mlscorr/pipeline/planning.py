@@ -114,7 +114,7 @@ class PlannedSurvey:
         """
         from mlscorr.report.gap_page import plan_page
 
-        check_output(out, input_files(self.survey.path), overwrite)
+        check_output(out, input_files(self.survey.path, planned=True), overwrite)
         content = self.document
         page = plan_page(content, self.survey.name)
         with output_folder(out) as folder:

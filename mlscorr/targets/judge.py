@@ -24,7 +24,6 @@ LARGEST_SIGMA = 0.08  # of the size: beyond it the outline holds the centre in o
 GOOD_SUPPORT = 0.6  # of the outline, from which on a target is beyond doubt
 GOOD_CONTRAST = 0.3  # of bright to dark, difference over sum
 FLAT = 1 / 3, 0.8  # tolerances, sigma about the plane: as flat as noise; as thick as a bush
-FEWEST_BEHIND = 5  # beams through a hole; fewer are stray returns from its rim
 RIM = 48  # places along an outline
 INSIDE = 200  # places within it
 ROUGHLY = 0.1  # by which a rough fit may miss the limits
