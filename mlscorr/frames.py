@@ -1,0 +1,207 @@
+"""Angles, body and map axes; from the scanner to the map and back (Mao et al. 2015, Eq. 1-9)."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from mlscorr.survey import Mounting, Trajectory
+
+# Roll turns about the body's Y (forward), pitch about X (right), heading about -Z
+BODY_AXES = [1, 0, 2]  # numbers of pitch, roll, heading among roll, pitch, heading; own inverse
+
+
+def attitude_from_angles(roll: ArrayLike, pitch: ArrayLike, heading: ArrayLike) -> Rotation:
+    """Rotation R_P^G from body to map: Rz(-heading) Rx(pitch) Ry(roll).
+
+    Parameters
+    ----------
+    roll, pitch, heading : (n,) array or float
+        Roll right side down, pitch nose up, heading clockwise from grid north. Units: rad.
+
+    >>> attitude_from_angles(0.0, 0.0, np.pi / 2).apply([0.0, 1.0, 0.0]).round(12) + 0.0
+    array([1., 0., 0.])
+    """
+    angles = np.stack(np.broadcast_arrays(-np.asarray(heading), pitch, roll), axis=-1)
+    return Rotation.from_euler("ZXY", angles)
+
+
+def angles_from_attitude(attitude: Rotation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Roll, pitch and heading of rotations R_P^G.
+
+    Parameters
+    ----------
+    attitude : Rotation
+        n rotations.
+
+    Returns
+    -------
+    roll, pitch, heading : (n,) array
+        Heading in [0, 2 pi). Units: rad.
+    """
+    minus_heading, pitch, roll = np.moveaxis(attitude.as_euler("ZXY"), -1, 0)
+    return roll, pitch, np.mod(-minus_heading, 2 * np.pi)
+
+
+def map_root(attitude: Rotation, angle_sigma: np.ndarray) -> np.ndarray:
+    """Square root R diag(s) R^T of an attitude's covariance about the map axes.
+
+    Parameters
+    ----------
+    attitude : Rotation
+        n rotations R_P^G.
+    angle_sigma : (n, 3) array
+        One sigma of roll, pitch, heading. Units: rad.
+
+    Returns
+    -------
+    (n, 3, 3) array
+        Units: rad.
+    """
+    rotation = attitude.as_matrix()
+    return (rotation * angle_sigma[:, None, BODY_AXES]) @ rotation.swapaxes(1, 2)
+
+
+def angle_sigma(attitude: Rotation, covariance: np.ndarray) -> np.ndarray:
+    """One sigma of roll, pitch, heading: what map_root is the root of, back about the body axes.
+
+    Parameters
+    ----------
+    attitude : Rotation
+        n rotations R_P^G.
+    covariance : (n, 3, 3) array
+        Of small rotations about the map axes. Units: rad^2.
+
+    Returns
+    -------
+    (n, 3) array
+        Units: rad.
+    """
+    to_body = attitude.inv().as_matrix()
+    variance = np.einsum("nij,njk,nik->ni", to_body, covariance, to_body)
+    return np.sqrt(np.maximum(variance[:, BODY_AXES], 0.0))
+
+
+def scanner_position(
+    trajectory: Trajectory, mounting: Mounting | None, gps_time: np.ndarray
+) -> np.ndarray:
+    """Map coordinates (n, 3) of the scanner's origin, T_G + R_P^G T_L^P. Units: m.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    mounting : Mounting or None
+        Where it is not known the navigation centre stands for the scanner.
+    gps_time : (n,) array
+        Units: s.
+
+    Raises
+    ------
+    ValueError
+        Where a time lies outside the trajectory.
+    """
+    pose = trajectory.at(gps_time)
+    if mounting is None:
+        return pose.position
+    return pose.position + pose.attitude.apply(mounting.lever_arm)
+
+
+def georeference(
+    trajectory: Trajectory, mounting: Mounting, scanner_xyz: np.ndarray, gps_time: np.ndarray
+) -> np.ndarray:
+    """Map coordinates (n, 3) of scanner points: X_G = T_G + R_P^G (R_L^P X_L + T_L^P)  (Eq. 1).
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    mounting : Mounting
+    scanner_xyz : (n, 3) array
+        X_L, X along the zero beam, Y in the scan plane, Z across it. Units: m.
+    gps_time : (n,) array
+        Units: s.
+
+    Raises
+    ------
+    ValueError
+        Where a time lies outside the trajectory.
+    """
+    pose = trajectory.at(gps_time)
+    body = mounting.boresight.apply(scanner_xyz) + mounting.lever_arm
+    return pose.position + pose.attitude.apply(body)
+
+
+def to_scanner(
+    trajectory: Trajectory, mounting: Mounting, xyz: np.ndarray, gps_time: np.ndarray
+) -> np.ndarray:
+    """Scanner coordinates (n, 3) of map points: the inverse of Eq. 1. Units: m.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    mounting : Mounting
+    xyz : (n, 3) array
+        Units: m.
+    gps_time : (n,) array
+        Units: s.
+
+    Raises
+    ------
+    ValueError
+        Where a time lies outside the trajectory.
+    """
+    pose = trajectory.at(gps_time)
+    body = pose.attitude.inv().apply(xyz - pose.position)
+    return mounting.boresight.inv().apply(body - mounting.lever_arm)
+
+
+def skew(vector: np.ndarray) -> np.ndarray:
+    """Cross-product matrices Phi (n, 3, 3) of vectors (n, 3)  (Eq. 4).
+
+    >>> skew(np.array([[1.0, 2.0, 3.0]]))[0] @ [0.0, 0.0, 1.0]
+    array([ 2., -1.,  0.])
+    """
+    x, y, z = np.asarray(vector, dtype=float).T
+    zero = np.zeros_like(x)
+    return np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), -1, 0)
+
+
+def pose_partials(trajectory: Trajectory, position: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
+    """Partial derivatives (n, 3, 6) of map points by the pose: [I, -Phi(G)]  (Eq. 7-9).
+
+    The pose is position (E, N, H; m) and a small rotation about the map axes (rad), not roll,
+    pitch and heading. G = R_P^G (R_L^P X_L + T_L^P) = X_G - T_G (Eq. 8), so no mounting is
+    needed. Eq. 10 prints +Phi(G); Eq. 9 has the right sign.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    position : (n, 3) array
+        The map points. Units: m.
+    gps_time : (n,) array
+        Units: s.
+    """
+    arm = position - trajectory.at(gps_time).position  # G, Eq. 8
+    identity = np.broadcast_to(np.eye(3), (len(arm), 3, 3))
+    return np.concatenate([identity, -skew(arm)], axis=2)
+
+
+def mounting_partials(
+    trajectory: Trajectory, mounting: Mounting, position: np.ndarray, gps_time: np.ndarray
+) -> np.ndarray:
+    """Partial derivatives (n, 3, 6) of map points by the mounting: R_P^G [I, -Phi(P)]  (Eq. 16-18).
+
+    The mounting is the lever arm (m) and a small rotation of the boresight about the body axes
+    (rad). P = R_L^P X_L (Eq. 17) is the point as seen from the scanner, in body axes.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    mounting : Mounting
+    position : (n, 3) array
+        The map points. Units: m.
+    gps_time : (n,) array
+        Units: s.
+    """
+    pose = trajectory.at(gps_time)
+    rotation = pose.attitude.as_matrix()
+    beam = pose.attitude.inv().apply(position - pose.position) - mounting.lever_arm
+    return np.concatenate([rotation, -rotation @ skew(beam)], axis=2)

@@ -1,0 +1,24 @@
+"""What is believed of the POS, once for everybody.
+
+The POS states a sigma per epoch and component; where its file has none, survey.toml's ``[pos]`` or
+the default stands in. What is stated is a hypothesis: searches look farther than it says, and
+estimates scale it. The recorded path itself tells more: a filtered POS that regains GNSS falls back
+within moments, by a step that no vehicle drives. Across it drift starts anew, and the step is what
+the drift had grown to.
+"""
+
+from mlscorr.pos.history import DriftHistory, drift_history, held_sigma
+from mlscorr.pos.settings import SETTINGS
+from mlscorr.pos.stated import StatedSigma, stated_sigma
+from mlscorr.pos.steps import Steps, find_steps
+
+__all__ = [
+    "SETTINGS",
+    "DriftHistory",
+    "StatedSigma",
+    "Steps",
+    "drift_history",
+    "find_steps",
+    "held_sigma",
+    "stated_sigma",
+]

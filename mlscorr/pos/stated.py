@@ -1,0 +1,166 @@
+"""Stated sigmas of the POS, their fallback, and how its drift may have grown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.frames import map_root
+from mlscorr.pos.history import DriftHistory, drift_history
+from mlscorr.pos.settings import SETTINGS
+from mlscorr.survey import Pos, Trajectory
+
+LEAP = 1e7  # s: on a clock, more than any correlation time
+LOG_LEAP = 2e3  # the same on a logarithmic clock
+ONWARD = 1e-6  # 1/s: a clock that stood still would leave no room between two states
+SOONEST = 0.05  # s after its start drift is no different from none
+
+
+@dataclass(frozen=True)
+class StatedSigma:
+    """What is believed of the POS at n epochs.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    position : (n, 3) array
+        One sigma of E, N, H. Units: m.
+    angles : (n, 3) array
+        One sigma of roll, pitch, heading. Units: rad.
+    rotation : Rotation
+        The n recorded attitudes R_P^G.
+    largest : (3,) array
+        The position's largest sigma on the whole trajectory. Units: m.
+    history : DriftHistory
+        Of the whole trajectory.
+    starts : (k,) array
+        When drift begins to grow in each segment of the history. Units: s.
+    """
+
+    gps_time: np.ndarray
+    position: np.ndarray
+    angles: np.ndarray
+    rotation: Rotation
+    largest: np.ndarray
+    history: DriftHistory
+    starts: np.ndarray
+
+    @property
+    def held(self) -> np.ndarray:
+        """The part (3,) of the position's sigma that stays while GNSS holds the POS. Units: m."""
+        return self.history.held
+
+    @cached_property
+    def attitude(self) -> np.ndarray:
+        """Square root (n, 3, 3) of the attitude's covariance about the map axes. Units: rad."""
+        return map_root(self.rotation, self.angles)
+
+    @property
+    def drift(self) -> np.ndarray:
+        """The part (n, 3) of the position's sigma that grows where GNSS is missing. Units: m."""
+        return np.sqrt(np.maximum(self.position**2 - self.held**2, 0.0))
+
+    @property
+    def jitter(self) -> np.ndarray:
+        """The part (n, 3) of the position's sigma that stays. Units: m."""
+        return np.minimum(self.position, self.held)
+
+    @property
+    def gnss(self) -> np.ndarray:
+        """Sigma (n, 3) of a POS that GNSS holds: the stated one, else that of RTK. Units: m."""
+        held = self.held if self.history.is_stated else SETTINGS.gnss
+        return np.minimum(self.position, held)
+
+    @cached_property
+    def since(self) -> np.ndarray:
+        """Time (n,) since drift began to grow, zero before. Units: s."""
+        return np.maximum(self.gps_time - self.starts[self.history.segment(self.gps_time)], 0.0)
+
+    def grown(self, power: float) -> np.ndarray:
+        """Sigma (n, 3) of drift that grows by a power of time to a POS's largest in an outage. m.
+
+        Parameters
+        ----------
+        power : float
+            3/2 for an integrated random walk, 1/2 for a random walk.
+        """
+        share = (np.maximum(self.since, SOONEST) / SETTINGS.outage) ** power
+        return self.largest * np.where(self.since > 0, share, 0.0)[:, None]
+
+    @property
+    def clock(self) -> np.ndarray:
+        """Time (n,) that leaps where drift starts anew. Units: s."""
+        first = self.history.trajectory.gps_time[0]
+        return self.gps_time - first + LEAP * self.history.segment(self.gps_time)
+
+    @property
+    def growth_clock(self) -> np.ndarray:
+        """Logarithm (n,) of the time since drift began to grow, with leaps where it does."""
+        number = 2 * self.history.segment(self.gps_time) + (self.since > 0)
+        onward = ONWARD * (self.gps_time - self.history.trajectory.gps_time[0])
+        return np.log(np.maximum(self.since, SOONEST) / SOONEST) + onward + LOG_LEAP * number
+
+    def at(self, rows: slice | np.ndarray) -> StatedSigma:
+        """That of some epochs.
+
+        Parameters
+        ----------
+        rows : slice, (k,) int or (n,) bool array
+        """
+        return replace(
+            self,
+            gps_time=self.gps_time[rows],
+            position=self.position[rows],
+            angles=self.angles[rows],
+            rotation=self.rotation[rows],
+        )
+
+
+def stated_sigma(
+    trajectory: Trajectory,
+    pos: Pos,
+    gps_time: np.ndarray | None = None,
+    starts: np.ndarray | None = None,
+) -> StatedSigma:
+    """What the POS states, filled in from beliefs where the trajectory has no sigmas.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        As recorded, as a whole: it says how small sigma gets.
+    pos : Pos
+        Stands in for sigmas that the trajectory doesn't have.
+    gps_time : (n,) array, optional
+        The trajectory's own epochs by default. Units: s.
+    starts : (k,) array, optional
+        When drift begins to grow in each segment; what sigma(t) says by default. Units: s.
+
+    Raises
+    ------
+    ValueError
+        Where a time lies outside the trajectory or in one of its gaps.
+    """
+    pose = trajectory if gps_time is None else trajectory.at(gps_time)
+    history = drift_history(trajectory)
+    shape = (len(pose.gps_time), 3)
+    position, angles = pose.position_sigma, pose.attitude_sigma
+    if position is None:
+        position = np.full(shape, pos.position_sigma)
+    if angles is None:
+        angles = np.broadcast_to(pos.attitude_sigma, shape)
+    largest = np.full(3, float(pos.position_sigma))
+    if trajectory.position_sigma is not None:
+        largest = trajectory.position_sigma.max(axis=0)
+    return StatedSigma(
+        gps_time=pose.gps_time,
+        position=position,
+        angles=angles,
+        rotation=pose.attitude,
+        largest=largest,
+        history=history,
+        starts=history.starts if starts is None else starts,
+    )

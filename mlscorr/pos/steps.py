@@ -1,0 +1,124 @@
+"""Steps of the recorded position that no vehicle drives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.pos.settings import SETTINGS
+from mlscorr.survey import Trajectory
+
+SECOND = 1.0  # s
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Where GNSS came back and the POS with it.
+
+    Parameters
+    ----------
+    before, after : (k,) array
+        Last epoch before and first one after each step. Units: s.
+    size : (k, 3) array
+        What the position moves beyond the vehicle's motion, after - before. Units: m.
+    sigma : (k,) array
+        One sigma of it per axis: what the vehicle's motion leaves open. Units: m.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    size: np.ndarray
+    sigma: np.ndarray
+
+    def __len__(self):
+        return len(self.before)
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Times (k,) between before and after. Units: s."""
+        return (self.before + self.after) / 2
+
+    def __getitem__(self, rows):
+        return Steps(self.before[rows], self.after[rows], self.size[rows], self.sigma[rows])
+
+
+def find_steps(trajectory: Trajectory) -> Steps:
+    """Steps of the recorded position against the speed before and after them.
+
+    Over three equal spans the middle one's way is half of both others', but for half the jerk
+    times the span cubed. What is far above the largest differences of all other seconds is a step.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+
+    Examples
+    --------
+    >>> from scipy.spatial.transform import Rotation
+    >>> time = np.arange(0.0, 60.0, 0.1)
+    >>> path = np.outer(time, [10.0, 0.0, 0.0])
+    >>> path[300:, 1] += 1.5
+    >>> steps = find_steps(Trajectory(413200.0 + time, path, Rotation.identity(600)))
+    >>> steps.size.round(6) + 0.0
+    array([[0. , 1.5, 0. ]])
+    """
+    table = [np.empty((0, 6))]
+    for first, last in trajectory.passes:
+        rows = (trajectory.gps_time >= first) & (trajectory.gps_time <= last)
+        table.append(_steps_of_pass(trajectory.gps_time[rows], trajectory.position[rows]))
+    columns = np.vstack(table)
+    return Steps(columns[:, 0], columns[:, 1], columns[:, 2:5], columns[:, 5])
+
+
+def _steps_of_pass(gps_time, position):
+    """Rows (k, 6) of the steps of one pass: before, after, size, sigma."""
+    if len(gps_time) < 2:
+        return np.empty((0, 6))
+    epochs = max(round(SETTINGS.step_duration / float(np.median(np.diff(gps_time)))), 1)
+    spans = {1, *(epochs // part for part in (4, 2, 1))} - {0}
+    candidates = [row for span in spans for row in _differences(gps_time, position, span)]
+    steps = []
+    while candidates:
+        largest = max(candidates, key=_length)
+        group = [row for row in candidates if _is_near(row, largest)]
+        candidates = [row for row in candidates if not _is_near(row, largest)]
+        whole = [row for row in group if _length(row) >= SETTINGS.whole_step * _length(largest)]
+        shortest = min(whole, key=lambda row: row[1] - row[0])
+        spread = np.std([row[2:5] for row in whole], axis=0).max()
+        steps.append([*shortest[:5], np.hypot(shortest[5], spread)])
+    return np.array(sorted(steps)).reshape(-1, 6)
+
+
+def _length(row):
+    return float(np.linalg.norm(row[2:5]))
+
+
+def _is_near(row, other):
+    """Whether two rows are within a second of each other."""
+    return row[0] < other[1] + SECOND and row[1] > other[0] - SECOND
+
+
+def _differences(gps_time, position, span):
+    """Rows (before, after, size, sigma): seconds' largest differences, if far above others'."""
+    if len(gps_time) <= 3 * span + 1:
+        return []
+    ways, times = (values[span:] - values[:-span] for values in (position, gps_time))
+    speed = ways / times[:, None]
+    about = (speed[: -2 * span] + speed[2 * span :]) / 2
+    size = ways[span:-span] - times[span:-span, None] * about
+    length = np.linalg.norm(size, axis=1)
+    start = gps_time[span : span + len(size)]
+    second = np.floor((start - gps_time[0]) / SECOND).astype(int)
+    largest = np.zeros(second[-1] + 1)
+    np.maximum.at(largest, second, length)
+    usual = np.median(largest[np.unique(second)])
+    limit = max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual)
+    rows = np.flatnonzero((length > limit) & (length == largest[second]))
+    # what the spans wholly before and after show is no step: filters and resampling ring beside one
+    beside = np.pad(length, 2 * span, constant_values=usual)
+    ringing = np.maximum(beside[rows], beside[rows + 4 * span])
+    sigma = np.maximum(ringing, usual)
+    return [
+        (start[i], gps_time[i + 2 * span], *size[i], s) for i, s in zip(rows, sigma, strict=True)
+    ]

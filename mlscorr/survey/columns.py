@@ -1,0 +1,35 @@
+"""Records whose fields are columns, one row for each of n things."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What dataclasses of arrays (n, ...), tuples of n and Columns have in common.
+
+    Numbers among their fields hold for all rows.
+    """
+
+    def __len__(self) -> int:
+        return len(getattr(self, fields(self)[0].name))
+
+    def __getitem__(self, rows) -> Self:
+        """Some rows: bool (n,), numbers (k,), or a slice, which gives views."""
+        return type(self)(*(_selected(getattr(self, field.name), rows) for field in fields(self)))
+
+    @classmethod
+    def concatenate(cls, parts: Iterable[Self]) -> Self:
+        """All rows of some records, in their order."""
+        names = [field.name for field in fields(cls)]
+        columns = zip(*([getattr(part, name) for name in names] for part in parts), strict=True)
+        return cls(*(sum(c, ()) if isinstance(c[0], tuple) else np.concatenate(c) for c in columns))
+
+
+def _selected(column, rows):
+    if isinstance(column, tuple):
+        return tuple(np.array(column, object)[rows])
+    return column[rows] if isinstance(column, np.ndarray | Columns) else column

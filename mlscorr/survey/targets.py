@@ -1,0 +1,156 @@
+"""Targets: as they were surveyed, as they were observed, and both together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mlscorr.survey.columns import Columns
+
+KINDS = ("circle", "square", "hole", "checkerboard", "board")  # see ControlPoints
+
+
+@dataclass(frozen=True)
+class ControlPoints(Columns):
+    """Surveyed targets: control points, or check points as another instance.
+
+    Parameters
+    ----------
+    name : tuple of n str
+    position : (n, 3) array
+        Units: m.
+    sigma : (n, 3) array
+        One sigma of E, N, H. Units: m.
+    kind : tuple of n str
+        ``circle`` (bright disc or ring; size is its diameter), ``square`` (bright plate; its edge),
+        ``hole`` (circular, in a board; its diameter), ``checkerboard`` (two white and two black
+        quadrants; the edge of all four) or ``board`` (plain plate, told by its edges; its edge).
+    size : (n,) array
+        Units: m.
+    normal : (n, 3) array
+        Unit normal of the target's plane; NaN where it was not surveyed.
+    """
+
+    name: tuple[str, ...]
+    position: np.ndarray
+    sigma: np.ndarray
+    kind: tuple[str, ...]
+    size: np.ndarray
+    normal: np.ndarray
+
+    @cached_property
+    def _row_of(self):
+        return {name: row for row, name in reversed(list(enumerate(self.name)))}
+
+    def rows(self, names: tuple[str, ...] | list[str]) -> np.ndarray:
+        """Rows (k,) of the points with these names.
+
+        Raises
+        ------
+        KeyError
+            For a name that is none.
+        """
+        return np.array([self._row_of[name] for name in names], dtype=int)
+
+    def __add__(self, other: ControlPoints) -> ControlPoints:
+        return ControlPoints.concatenate([self, other])
+
+
+@dataclass(frozen=True)
+class TargetObservations(Columns):
+    """Targets found in the cloud, one row per target and pass.
+
+    Parameters
+    ----------
+    name : tuple of n (str or None)
+        The control point that it was matched to.
+    pass_number : (n,) int array
+        Passes count from 1 in time.
+    gps_time : (n,) array
+        Units: s.
+    position : (n, 3) array
+        Observed centre. Units: m.
+    covariance : (n, 3, 3) array
+        Units: m^2.
+    normal : (n, 3) array
+    kind : tuple of n str
+    size : (n,) array
+        Units: m.
+    points : (n,) int array
+        Number of points on the target.
+    """
+
+    name: tuple[str | None, ...]
+    pass_number: np.ndarray
+    gps_time: np.ndarray
+    position: np.ndarray
+    covariance: np.ndarray
+    normal: np.ndarray
+    kind: tuple[str, ...]
+    size: np.ndarray
+    points: np.ndarray
+
+
+@dataclass(frozen=True)
+class Matched(Columns):
+    """Observations with the surveyed points that they are, both with n rows.
+
+    Parameters
+    ----------
+    observations : TargetObservations
+    surveyed : ControlPoints
+        The point of each observation; one that was observed twice stands twice.
+    """
+
+    observations: TargetObservations
+    surveyed: ControlPoints
+
+    @classmethod
+    def by_name(cls, observations: TargetObservations, points: ControlPoints) -> Matched:
+        """Each observation with the point of its name.
+
+        Raises
+        ------
+        KeyError
+            Where there is none.
+        """
+        return cls(observations, points[points.rows(observations.name)])
+
+    @classmethod
+    def none(cls) -> Matched:
+        """No observation at all."""
+        empty, vectors = np.empty(0), np.empty((0, 3))
+        points = ControlPoints((), vectors, vectors, (), empty, vectors)
+        none = empty.astype(int)
+        matrices = np.empty((0, 3, 3))
+        return cls(
+            TargetObservations((), none, empty, vectors, matrices, vectors, (), empty, none), points
+        )
+
+    @property
+    def name(self) -> tuple[str, ...]:
+        """Names of the surveyed points."""
+        return self.surveyed.name
+
+    @property
+    def gps_time(self) -> np.ndarray:
+        """Times (n,) of the observations. Units: s."""
+        return self.observations.gps_time
+
+    @property
+    def misclosure(self) -> np.ndarray:
+        """Surveyed - observed (n, 3): what must be added to the cloud. Units: m."""
+        return self.surveyed.position - self.observations.position
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Of the misclosure (n, 3): survey and extraction  (Eq. 19). Units: m^2."""
+        return self.surveyed.sigma**2 + np.einsum("nii->ni", self.observations.covariance)
+
+    @property
+    def point_number(self) -> np.ndarray:
+        """Number (n,) of each observation's surveyed point, from 0, in order of appearance."""
+        number = {name: i for i, name in enumerate(dict.fromkeys(self.name))}
+        return np.array([number[name] for name in self.name], dtype=int)

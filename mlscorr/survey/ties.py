@@ -1,0 +1,172 @@
+"""What passes saw of the street itself: planes and poles, and which of them are the same thing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.survey.columns import Columns
+
+
+@dataclass(frozen=True, eq=False)
+class TieFeatures(Columns):
+    """Planes and poles as each pass saw them, a metre and a second of it in a row.
+
+    Parameters
+    ----------
+    pass_number : (n,) int array
+        Passes count from 1 in time.
+    source : (n,) int array
+        Number of the cloud file, from 0: two scanners write two files.
+    kind : (n,) str array
+        ``plane`` or ``pole``.
+    gps_time : (n,) array
+        Mean of the points. Units: s.
+    centre : (n, 3) array
+        Mean of the points. Units: m.
+    direction : (n, 3) array
+        Unit normal of a plane, towards the scanner; axis of a pole, upwards.
+    variance : (n,) array
+        Of the centre along the normal, or along any direction across the axis. Units: m^2.
+    tilt : (n,) array
+        Variance of the direction about either axis across it. Units: rad^2.
+    extent : (n,) array
+        One sigma of the points along a plane's narrow side, or along a pole. Units: m.
+    points : (n,) int array
+    intensity : (n,) array
+        Mean of the points.
+    sweep : (n, 3) array
+        Gradient of the points' times over a plane, or along a pole: a line scanner on the move sees
+        one end before the other. Units: s/m.
+    """
+
+    pass_number: np.ndarray
+    source: np.ndarray
+    kind: np.ndarray
+    gps_time: np.ndarray
+    centre: np.ndarray
+    direction: np.ndarray
+    variance: np.ndarray
+    tilt: np.ndarray
+    extent: np.ndarray
+    points: np.ndarray
+    intensity: np.ndarray
+    sweep: np.ndarray
+
+    def time_beside(self, rows: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """When points were seen that lie beside the centres of some features. Units: s.
+
+        Parameters
+        ----------
+        rows : int array
+        way : (*rows.shape, 3) array
+            From each centre. Units: m.
+
+        Returns
+        -------
+        array of the rows' shape
+            Not before the first or after the last feature of the pass.
+        """
+        numbers, inverse = np.unique(self.pass_number, return_inverse=True)
+        low, high = np.full(len(numbers), np.inf), np.full(len(numbers), -np.inf)
+        np.minimum.at(low, inverse, self.gps_time)
+        np.maximum.at(high, inverse, self.gps_time)
+        times = self.gps_time[rows] + np.einsum("...i,...i->...", self.sweep[rows], way)
+        return np.clip(times, low[inverse][rows], high[inverse][rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Ties(Columns):
+    """Things that were seen twice: scalar observations of what is wrong between both times.
+
+    n . (correction of place 1 at time 1 - correction of place 2 at time 2) = misclosure + noise. A
+    plane gives a row along its normal, a pole two rows across its axis.
+
+    Parameters
+    ----------
+    gps_time : (n, 2) array
+        Of the earlier and the later view. Units: s.
+    place : (n, 2, 3) array
+        Where both views are compared, as each recorded it: of one point of the thing. Units: m.
+    direction : (n, 3) array
+        Unit vector n along which both are compared.
+    misclosure : (n,) array
+        n . (place 2 - place 1), both as recorded. Units: m.
+    variance : (n,) array
+        Of the noise. Units: m^2.
+    kind : (n,) str array
+        ``plane`` or ``pole``.
+    pass_number : (n, 2) int array
+    feature : (n, 2) int array
+        Rows of both in the TieFeatures.
+    """
+
+    gps_time: np.ndarray
+    place: np.ndarray
+    direction: np.ndarray
+    misclosure: np.ndarray
+    variance: np.ndarray
+    kind: np.ndarray
+    pass_number: np.ndarray
+    feature: np.ndarray
+
+    @classmethod
+    def between(
+        cls,
+        features: TieFeatures,
+        pairs: np.ndarray,
+        direction: np.ndarray,
+        variance: np.ndarray,
+        correction: np.ndarray | None = None,
+    ) -> Ties:
+        """The ties of pairs of features along directions.
+
+        Parameters
+        ----------
+        features : TieFeatures
+        pairs : (n, 2) int array
+            Rows of the features; a pole's pair stands twice.
+        direction : (n, 3) array
+            Unit vectors.
+        variance : (n,) array
+            Units: m^2.
+        correction : (m, 3) array, optional
+            What is missing at each feature: given it, both views are compared midway between their
+            centres, at the times when each saw that; else each at its own centre. Units: m.
+
+        Returns
+        -------
+        Ties
+            With the earlier view first, whatever the order in a pair.
+        """
+        late = features.gps_time[pairs[:, 0]] > features.gps_time[pairs[:, 1]]
+        pairs = np.where(late[:, None], pairs[:, ::-1], pairs)
+        place, gps_time = features.centre[pairs], features.gps_time[pairs]
+        if correction is not None:
+            way = _midway(features, pairs, place + correction[pairs])
+            place = place + way
+            gps_time = features.time_beside(pairs, way)
+        return cls(
+            gps_time=gps_time,
+            place=place,
+            direction=direction,
+            misclosure=np.einsum("ni,ni->n", direction, place[:, 1] - place[:, 0]),
+            variance=variance,
+            kind=features.kind[pairs[:, 0]],
+            pass_number=features.pass_number[pairs],
+            feature=pairs,
+        )
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """One sigma (n,) of the noise. Units: m."""
+        return np.sqrt(self.variance)
+
+
+def _midway(features, pairs, place):
+    """Ways (n, 2, 3) from both places, along their planes or poles, to the middle between them."""
+    way, axis = place.mean(axis=1, keepdims=True) - place, features.direction[pairs]
+    along = np.einsum("nvi,nvi->nv", axis, way)[:, :, None] * axis
+    is_pole = features.kind[pairs[:, :1]] == "pole"
+    return np.where(is_pole[:, :, None], along, way - along)

@@ -1,0 +1,171 @@
+"""Where the POS was, and how the scanner stands on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation, Slerp
+
+GAP_FACTOR = 10.0  # a step longer than ten median steps is a gap
+SAME_EPOCH = 1.0  # s; closer together, two targets say the same of the POS
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Positions and attitudes of the POS navigation centre over time.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Strictly increasing. Units: s.
+    position : (n, 3) array
+        Easting, northing, height. Units: m.
+    attitude : Rotation
+        n rotations R_P^G from body to map axes.
+    position_sigma, attitude_sigma : (n, 3) array, optional
+        One sigma of E, N, H (m) and of roll, pitch, heading (rad).
+
+    Raises
+    ------
+    ValueError
+        For fewer than two epochs, times that do not increase, or values that are not finite.
+    """
+
+    gps_time: np.ndarray
+    position: np.ndarray
+    attitude: Rotation
+    position_sigma: np.ndarray | None = None
+    attitude_sigma: np.ndarray | None = None
+
+    def __post_init__(self):
+        if len(self.gps_time) < 2:
+            raise ValueError(f"A trajectory needs at least 2 epochs, this one has {len(self)}.")
+        for name in ("gps_time", "position", "position_sigma", "attitude_sigma"):
+            values = getattr(self, name)
+            if values is not None and not np.isfinite(values).all():
+                bad = int((~np.isfinite(values)).reshape(len(self), -1).any(axis=1).sum())
+                raise ValueError(
+                    f"{bad} of {len(self)} trajectory epochs have a {name} that is not a number."
+                )
+        steps = np.diff(self.gps_time)
+        if (steps <= 0).any():
+            first = int(np.argmax(steps <= 0))
+            raise ValueError(
+                f"The trajectory's gps_time must increase: {int((steps == 0).sum())} epochs are "
+                f"duplicates and {int((steps < 0).sum())} go back in time (first after "
+                f"{self.gps_time[first]:.3f} s). Sort the file and remove repeated epochs."
+            )
+
+    def __len__(self) -> int:
+        return len(self.gps_time)
+
+    @cached_property
+    def gaps(self) -> np.ndarray:
+        """Start and end (k, 2) of the steps longer than ten times the median step. Units: s."""
+        steps = np.diff(self.gps_time)
+        last = np.flatnonzero(steps > GAP_FACTOR * np.median(steps))
+        return np.column_stack([self.gps_time[last], self.gps_time[last + 1]])
+
+    @cached_property
+    def passes(self) -> np.ndarray:
+        """Start and end (k, 2) of the parts without a gap. Units: s."""
+        starts = np.append(self.gps_time[0], self.gaps[:, 1])
+        return np.column_stack([starts, np.append(self.gaps[:, 0], self.gps_time[-1])])
+
+    def segment(self, gps_time: ArrayLike) -> np.ndarray:
+        """Number of the gap-free segment that holds each time, from 0; -1 where none does.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        """
+        gps_time = np.asarray(gps_time, dtype=float)
+        starts, ends = self.passes.T
+        number = np.maximum(np.searchsorted(starts, gps_time, side="right") - 1, 0)
+        inside = (gps_time >= starts[number]) & (gps_time <= ends[number])
+        return np.where(inside, number, -1)
+
+    def recorded_time(self, start: float, end: float) -> float:
+        """Time from start to end without the gaps that lie whole between them. Units: s."""
+        starts, ends = self.gaps.T
+        return float(end - start - (ends - starts)[(starts >= start) & (ends <= end)].sum())
+
+    def at(self, gps_time: ArrayLike) -> Trajectory:
+        """Trajectory at other times, positions and sigmas linear, attitudes by slerp.
+
+        Parameters
+        ----------
+        gps_time : (m,) array
+            Units: s.
+
+        Raises
+        ------
+        ValueError
+            Where a time lies outside the trajectory or in one of its gaps.
+        """
+        gps_time = np.atleast_1d(np.asarray(gps_time, dtype=float))
+        outside = self.segment(gps_time) < 0
+        if outside.any():
+            raise ValueError(
+                f"{outside.sum()} of {len(gps_time)} times lie outside the trajectory "
+                f"[{self.gps_time[0]:.3f}, {self.gps_time[-1]:.3f}] s or in one of its "
+                f"{len(self.gaps)} gaps (first: {gps_time[np.argmax(outside)]:.3f} s)."
+            )
+
+        def linear(values):
+            if values is None:
+                return None
+            return np.column_stack([np.interp(gps_time, self.gps_time, v) for v in values.T])
+
+        return _Epochs(
+            gps_time,
+            linear(self.position),
+            Slerp(self.gps_time, self.attitude)(gps_time),
+            linear(self.position_sigma),
+            linear(self.attitude_sigma),
+        )
+
+
+class _Epochs(Trajectory):
+    """A trajectory asked at arbitrary times: any order and number of epochs."""
+
+    def __post_init__(self):
+        pass
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """Scanner frame to body frame.
+
+    Parameters
+    ----------
+    lever_arm : (3,) array
+        Units: m.
+    boresight : Rotation
+        R_L^P.
+    covariance : (6, 6) array, optional
+        Of the lever arm (m) and of a small rotation of the boresight about the body axes (rad).
+    """
+
+    lever_arm: np.ndarray
+    boresight: Rotation
+    covariance: np.ndarray | None = None
+
+
+def control_epochs(gps_time: np.ndarray) -> np.ndarray:
+    """Control epochs (k,): times in order, without those within a second of the last one kept.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Times of observed targets. Units: s.
+    """
+    epochs: list[float] = []
+    for time in np.sort(gps_time):
+        if not epochs or time - epochs[-1] > SAME_EPOCH:
+            epochs.append(time)
+    return np.array(epochs)
