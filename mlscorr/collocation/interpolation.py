@@ -1,85 +1,40 @@
-"""Signal at any epoch from the smoothed states at the two observation epochs about it.
+"""Signal at any epoch from the states at the two nodes about it.
 
-Given both states a Markov process between them knows nothing of the rest, so for each process
-
-    E s(t) = a s_i + b s_i+1,   b = c Q^-1,   a = e F1 - b F(dt),   var = q1 - b c^T
-    c = e Q1 F2^T,   Q = Q(dt),   dt = t_i+1 - t_i
-
-with F1, Q1 over t - t_i, F2 over t_i+1 - t, e the first state and q1 the first element of Q1
-(Rasmussen and Williams 2006, appendix B; Särkkä and Solin 2019, section 10). Before the first
-and past the last observation the missing neighbour stands at infinity.
+Nodes are the epochs of the observations in the recursion, and knots in the information form.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from numba import njit
 
-from mlscorr.collocation.states import fill_noise, fill_transition
-from mlscorr.covariance import process_noise, transition
+from mlscorr.collocation.conditional import Epochs, fill_spans, neighbours, predict_between
+from mlscorr.collocation.knots import Knots, enter_cell
+from mlscorr.collocation.pattern import Pattern, locate
+from mlscorr.collocation.states import Layout
+
+CHUNK = 1 << 16  # epochs predicted at once: copies of broadcast designs and mixings stay small
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _invert(matrices, states, out):
-    """Inverses of covariances of d <= 3 states by elimination, which no small step harms: it
-    acts on the elements' ratios."""
-    lower = np.zeros((3, 3))
-    for s in range(states.size):
-        d = states[s]
-        for i in range(d):
-            for j in range(i + 1):
-                total = matrices[s, i, j]
-                for k in range(j):
-                    total -= lower[i, k] * lower[j, k] * lower[k, k]
-                lower[i, j] = total if i == j else total / lower[j, j]
-        for column in range(d):
-            for i in range(d):
-                total = 1.0 if i == column else 0.0
-                for k in range(i):
-                    total -= lower[i, k] * out[s, k, column]
-                out[s, i, column] = total
-            for i in range(d - 1, -1, -1):
-                total = out[s, i, column] / lower[i, i]
-                for k in range(i + 1, d):
-                    total -= lower[k, i] * out[s, k, column]
-                out[s, i, column] = total
+@njit(cache=True, nogil=True)
+def run_end(times: np.ndarray, cell: int, gps_time: np.ndarray, begin: int) -> int:
+    """End of the run of epochs from begin on that lie in the same cell.
 
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _gains(s, states, before, after, whole, inverses, gains):
-    """Gains a, b of signal s into gains (s, 2 d), and the variance that both states leave.
-
-    before and after are the times to the neighbours in units of 1 / rate, infinite at the ends.
+    Parameters
+    ----------
+    times : (u,) array
+        Sorted; cell i lies before times[i], and at or after the time before that.
+    cell, begin : int
+    gps_time : (q,) array
     """
-    q0, q1, q2, _, _, _ = process_noise(states, before)
-    f = transition(states, after)
-    c0 = q0 * f[0] + q1 * f[1] + q2 * f[2]
-    c1 = q0 * f[3] + q1 * f[4] + q2 * f[5]
-    c2 = q0 * f[6] + q1 * f[7] + q2 * f[8]
-    b0 = c0 * inverses[s, 0, 0] + c1 * inverses[s, 1, 0] + c2 * inverses[s, 2, 0]
-    b1 = c0 * inverses[s, 0, 1] + c1 * inverses[s, 1, 1] + c2 * inverses[s, 2, 1]
-    b2 = c0 * inverses[s, 0, 2] + c1 * inverses[s, 1, 2] + c2 * inverses[s, 2, 2]
-    f = transition(states, before)
-    gains[s, 0] = f[0] - b0 * whole[s, 0, 0] - b1 * whole[s, 1, 0] - b2 * whole[s, 2, 0]
-    if states > 1:
-        gains[s, 1] = f[1] - b0 * whole[s, 0, 1] - b1 * whole[s, 1, 1] - b2 * whole[s, 2, 1]
-        gains[s, states + 1] = b1
-    if states > 2:
-        gains[s, 2] = f[2] - b0 * whole[s, 0, 2] - b1 * whole[s, 1, 2] - b2 * whole[s, 2, 2]
-        gains[s, 5] = b2
-    gains[s, states] = b0
-    return max(q0 - b0 * c0 - b1 * c1 - b2 * c2, 0.0)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _last_before(nodes, time, i):
-    """The last node at or before a time, -1 before all; i is where the search starts."""
-    n = nodes.size
-    if i < 0 or nodes[i] > time:
-        return np.searchsorted(nodes, time, side="right") - 1
-    for _ in range(4):
-        if i + 1 == n or nodes[i + 1] > time:
-            return i
-        i += 1
-    return np.searchsorted(nodes, time, side="right") - 1
+    first = times[cell - 1] if cell > 0 else -np.inf
+    last = times[cell] if cell < times.size else np.inf
+    end = begin + 1
+    while end < gps_time.size and first <= gps_time[end] < last:
+        end += 1
+    return end
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -107,144 +62,164 @@ def _gather(layout, i, states, same, following, columns, joint):
                     joint[u, b + e + q] = joint[b + e + q, u] = cross
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _processes(layout, gains, remaining, columns, joint, row, values, covariance):
-    """Columns (k, c) and covariance (k, k) of the processes at one epoch."""
-    k = layout.first.size
-    for j in range(k):
-        s = layout.signal[j]
-        a, d = 2 * layout.first[j], 2 * layout.states[s]
-        for c in range(columns.shape[1]):
-            values[j, c] = gains[s, 0] * columns[a, c]
-            for p in range(1, d):
-                values[j, c] += gains[s, p] * columns[a + p, c]
-        for b in range(a, joint.shape[0]):
-            row[b] = gains[s, 0] * joint[a, b]
-        for p in range(1, d):
-            for b in range(a, joint.shape[0]):
-                row[b] += gains[s, p] * joint[a + p, b]
-        for other in range(j, k):
-            to = layout.signal[other]
-            b = 2 * layout.first[other]
-            total = remaining[s] if other == j else 0.0
-            for p in range(2 * layout.states[to]):
-                total += row[b + p] * gains[to, p]
-            covariance[j, other] = total
-            covariance[other, j] = total
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _mix(e, mixing, processes, mixed, covariance):
-    """B C B^T of epoch e, mixing (q, r, k), into covariance (q, r, r)."""
-    _, r, k = mixing.shape
-    for m in range(r):
-        for j in range(k):
-            mixed[j] = 0.0
-        for j in range(k):
-            weight = mixing[e, m, j]
-            if weight != 0.0:
-                for other in range(k):
-                    mixed[other] += weight * processes[j, other]
-        for other in range(m + 1):
-            total = 0.0
-            for j in range(k):
-                total += mixed[j] * mixing[e, other, j]
-            covariance[e, m, other] = total
-            covariance[e, other, m] = total
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _add_trend(e, design, mixing, values, trend, root, lacking, mean, covariance):
-    """Mean of epoch e, and what of the trend's covariance the signal does not absorb.
-
-    root is upper triangular. lacking (r, p) is room to work in.
-    """
-    _, r, p = design.shape
-    for m in range(r):
-        total = 0.0
-        for j in range(mixing.shape[2]):
-            total += mixing[e, m, j] * values[j, p]
-        for c in range(p):
-            total += design[e, m, c] * trend[c]
-            lacking[m, c] = design[e, m, c]
-            for j in range(mixing.shape[2]):
-                lacking[m, c] -= mixing[e, m, j] * values[j, c]
-        mean[e, m] = total
-        if p == 0:
-            continue
-        for c in range(p - 1, -1, -1):
-            lacking[m, c] *= root[c, c]
-            for b in range(c):
-                lacking[m, c] += lacking[m, b] * root[b, c]
-        for other in range(m + 1):
-            total = 0.0
-            for c in range(p):
-                total += lacking[m, c] * lacking[other, c]
-            covariance[e, m, other] += total
-            if other != m:
-                covariance[e, other, m] += total
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def interpolate(
-    nodes,
-    layout,
-    states,
-    same,
-    following,
-    trend,
-    trend_root,
-    gps_time,
-    design,
-    mixing,
-    mean,
-    covariance,
-):
-    """Trend plus signal at q epochs into mean (q, r) and covariance (q, r, r).
+    nodes: np.ndarray,
+    clocks: np.ndarray,
+    layout: Layout,
+    states: np.ndarray,
+    same: np.ndarray,
+    following: np.ndarray,
+    epochs: Epochs,
+) -> None:
+    """Fill epochs with trend plus signal.
 
     Parameters
     ----------
     nodes : (n,) array
         Times of the observations, sorted.
+    clocks : (n, s) array
+        The signals' clocks there.
     states : (n, d, p + 1) array
         Smoothed states of the columns [A, l - A x].
     same, following : (n, d, d), (n - 1, d, d) array
         Covariances of the smoothed states, and with those of the next node.
-    trend, trend_root : (p,), (p, p) array
-    gps_time, design, mixing : (q,), (q, r, p), (q, r, k) array
+    epochs : Epochs
     """
-    n, size, _ = states.shape
-    q, r, p = design.shape
-    k, number = layout.first.size, layout.states.size
-    whole, spread = np.zeros((number, 3, 3)), np.zeros((number, 3, 3))
-    inverses = np.zeros((number, 3, 3))
-    gains, remaining = np.zeros((number, 6)), np.zeros(number)
-    columns, joint, row = (
-        np.zeros((2 * size, p + 1)),
-        np.zeros((2 * size, 2 * size)),
-        np.zeros(2 * size),
-    )
-    values, processes = np.zeros((k, p + 1)), np.zeros((k, k))
-    mixed, lacking = np.zeros(k), np.zeros((r, p))
-    i = entered = -2  # no interval
-    for e in range(q):
-        i = _last_before(nodes, gps_time[e], i)
-        if i != entered:
-            if i + 1 < n:
-                span = nodes[i + 1] - nodes[i] if i >= 0 else np.inf
-                fill_transition(layout, span, whole)
-                fill_noise(layout, span, spread)
-                _invert(spread, layout.states, inverses)
-            _gather(layout, i, states, same, following, columns, joint)
-            entered = i
-        before = gps_time[e] - nodes[i] if i >= 0 else np.inf
-        after = nodes[i + 1] - gps_time[e] if i + 1 < n else np.inf
-        for s in range(number):
-            x, y = before * layout.rates[s], after * layout.rates[s]
-            remaining[s] = _gains(s, layout.states[s], x, y, whole, inverses, gains)
-        _processes(layout, gains, remaining, columns, joint, row, values, processes)
-        if r == k == 1:
-            covariance[e, 0, 0] = mixing[e, 0, 0] ** 2 * processes[0, 0]
-        else:
-            _mix(e, mixing, processes, mixed, covariance)
-        _add_trend(e, design, mixing, values, trend, trend_root, lacking, mean, covariance)
+    n, size, columns = states.shape
+    about = neighbours(layout.states.size, size, columns - 1)
+    begin = 0
+    while begin < epochs.gps_time.size:
+        cell = np.searchsorted(nodes, epochs.gps_time[begin], side="right")
+        end = run_end(nodes, cell, epochs.gps_time, begin)
+        about.before.fill(-np.inf)
+        about.after.fill(np.inf)
+        if cell > 0:
+            about.before[:] = clocks[cell - 1]
+        if cell < n:
+            about.after[:] = clocks[cell]
+        fill_spans(layout, about)
+        _gather(layout, cell - 1, states, same, following, about.columns, about.joint)
+        predict_between(layout, about, epochs, begin, end)
+        begin = end
+
+
+@njit(cache=True, nogil=True)
+def _slots(layout):
+    """Slot (signal, before or after) of each state in Neighbours.joint, and its place in a knot."""
+    slot, local = np.zeros((2, 2 * layout.states[layout.signal].sum()), dtype=np.int64)
+    u = begin = 0
+    for j in range(layout.signal.size):
+        s, d = layout.signal[j], layout.states[layout.signal[j]]
+        if j > 0 and s != layout.signal[j - 1]:
+            begin = layout.first[j]
+        for end in range(2):
+            for p in range(d):
+                slot[u], local[u] = 2 * s + end, layout.first[j] - begin + p
+                u += 1
+    return slot, local
+
+
+@njit(cache=True, nogil=True)
+def _gather_knots(pattern, nodes, slots, states, inverse, about):
+    """States at the knots (2 s,) about a cell, as of _gather, by the selected inverse."""
+    columns, joint = about.columns, about.joint
+    slot, local = slots
+    positions = np.zeros((nodes.size, nodes.size), dtype=np.int64)
+    for a in range(nodes.size):
+        for b in range(nodes.size):
+            if nodes[a] >= nodes[b] >= 0:
+                positions[a, b] = locate(pattern, nodes[a], nodes[b])
+    for u in range(slot.size):
+        node = nodes[slot[u]]
+        for c in range(columns.shape[1]):
+            columns[u, c] = 0.0 if node < 0 else states[pattern.first[node] + local[u], c]
+        for v in range(slot.size):
+            other = nodes[slot[v]]
+            if node < 0 or other < 0:
+                joint[u, v] = 0.0
+            elif node >= other:
+                width = pattern.first[other + 1] - pattern.first[other]
+                joint[u, v] = inverse[positions[slot[u], slot[v]] + local[u] * width + local[v]]
+                joint[v, u] = joint[u, v]
+
+
+@njit(cache=True, nogil=True)
+def interpolate_knots(
+    layout: Layout,
+    knots: Knots,
+    pattern: Pattern,
+    cells: np.ndarray,
+    states: np.ndarray,
+    inverse: np.ndarray,
+    epochs: Epochs,
+) -> None:
+    """Fill epochs with trend plus signal.
+
+    Parameters
+    ----------
+    layout : Layout
+    knots : Knots
+    pattern : Pattern
+    cells : (u + 1, s, 2) int array
+        Knots.cells in the order of elimination.
+    states : (n, p + 1) array
+        Estimated from the columns [A, l - A x].
+    inverse : (v,) array
+        Values of the selected inverse.
+    epochs : Epochs
+    """
+    size = layout.states[layout.signal].sum()
+    about = neighbours(layout.states.size, size, states.shape[1] - 1)
+    slots = _slots(layout)
+    begin = 0
+    while begin < epochs.gps_time.size:
+        cell = np.searchsorted(knots.times, epochs.gps_time[begin], side="right")
+        end = run_end(knots.times, cell, epochs.gps_time, begin)
+        enter_cell(layout, knots, cell, about)
+        _gather_knots(pattern, cells[cell].ravel(), slots, states, inverse, about)
+        predict_between(layout, about, epochs, begin, end)
+        begin = end
+
+
+def predictor_by(
+    fill: Callable, layout: Layout, trend: np.ndarray, trend_root: np.ndarray
+) -> Callable:
+    """A predictor as ``Collocation.predict`` calls it, in chunks.
+
+    Parameters
+    ----------
+    fill : function of Epochs
+        Which fills them.
+    layout : Layout
+    trend, trend_root : (p,), (p, p) array
+    """
+    processes = np.bincount(layout.signal, minlength=layout.states.size).tolist()
+
+    def predict(gps_time, clocks, design, mixings):
+        q, r = design.shape[:2]
+        shapes = [np.shape(values) for values in (design, *mixings)]
+        if shapes != [(len(gps_time), r, k) for k in (len(trend), *processes)]:
+            raise ValueError(
+                f"{len(gps_time)} epochs are asked with a design and mixings of shapes "
+                f"{shapes}: they should be (epochs, quantities, trend parameters) and (epochs, "
+                f"quantities, processes), of {len(trend)} and {processes} columns."
+            )
+        mean, covariance = np.empty((q, r)), np.empty((q, r, r))
+        for i in range(0, q, CHUNK):
+            part = slice(i, i + CHUNK)
+            blocks = [np.zeros((len(gps_time[part]), r, 0)), *(m[part] for m in mixings)]
+            epochs = Epochs(
+                np.ascontiguousarray(gps_time[part]),
+                np.ascontiguousarray(clocks[part]),
+                np.ascontiguousarray(design[part], dtype=float),
+                np.concatenate(blocks, axis=2),
+                trend,
+                trend_root,
+                mean[part],
+                covariance[part],
+            )
+            fill(epochs)
+        return mean, covariance
+
+    return predict

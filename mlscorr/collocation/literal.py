@@ -9,14 +9,17 @@ rows leave R^2 = 1 - 1e-6, and the one of 21 points starts at 0.1619 m, LS of or
 0.1618 m. If C0 stood in D_Lambda too, the signal would grow less than in proportion.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky
 
+from mlscorr.collocation.covariance import Covariance
 from mlscorr.collocation.dense import CHUNK, DenseSolver
 from mlscorr.collocation.model import NOT_POSITIVE, Collocation, Noise, solve_trend
-from mlscorr.covariance import Covariance
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,13 @@ class LiteralCollocation:
 
     Covariances of predictions are None. The paper gives none, and its own covariances can't: as
     they are no joint covariance, the error variance that follows from them may be negative.
+
+    Parameters
+    ----------
+    gps_time, misclosure, noise, design, signals
+        As in collocate_literal.
+    least_squares : Collocation
+        Of the trend, with V = B D_Lambda B^T + D_omega.
     """
 
     gps_time: np.ndarray
@@ -54,33 +64,45 @@ class LiteralCollocation:
     noise: Noise
     design: np.ndarray
     signals: tuple[LiteralSignal, ...]
-    least_squares: Collocation  # of the trend, with V = B D_Lambda B^T + D_omega
+    least_squares: Collocation
 
     @property
-    def trend(self):
+    def trend(self) -> np.ndarray:
+        """The trend's parameters (p,): x of Eq. 13."""
         return self.least_squares.trend
 
     @property
-    def trend_covariance(self):
+    def trend_covariance(self) -> np.ndarray:
+        """Covariance (p, p) of the trend."""
         return self.least_squares.trend_covariance
 
     @property
-    def weights(self):
+    def weights(self) -> np.ndarray:
+        """V^-1 (l - A x): (n r,)."""
         return self.least_squares.weights
 
     @property
-    def log_likelihood(self):
+    def log_likelihood(self) -> float:
+        """Restricted log-likelihood of the misclosures."""
         return self.least_squares.log_likelihood
 
     @property
-    def sigma0(self):
+    def sigma0(self) -> float:
+        """Sigma of weight one."""
         return self.least_squares.sigma0
 
-    def predict(self, gps_time, design, partials):
+    def predict(
+        self, gps_time: np.ndarray, design: np.ndarray, partials: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, None]:
         """Trend plus signal at other epochs: (q, r), and None for its covariance.
 
-        gps_time (q,), design (q, r, p) and a list of partials (q, r, k), one for each signal, by
-        which Lambda' enters.
+        Parameters
+        ----------
+        gps_time : (q,) array
+            Units: s.
+        design : (q, r, p) array
+        partials : sequence of (q, r, k) arrays
+            By which each signal's Lambda' enters.
         """
         weights = self.weights.reshape(self.misclosure.shape)
         mean = design @ self.trend
@@ -95,31 +117,38 @@ class LiteralCollocation:
                 mean[part] += np.einsum("qrk,qk->qr", partial[part], predicted)
         return mean, None
 
-    def determined_without(self, rows):
+    def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
         return self.least_squares.determined_without(rows)
 
-    def leave_out(self, rows):
+    def leave_out(self, rows: np.ndarray) -> tuple[np.ndarray, None]:
         """What the other epochs say of some: residuals (l - prediction), and None.
 
-        Raises ValueError when the others don't determine the trend, or when rows are not those of
-        whole epochs.
+        Parameters
+        ----------
+        rows : (k,) int array
+
+        Raises
+        ------
+        ValueError
+            Where the others don't determine the trend, and for rows that aren't whole epochs.
         """
         n, r = self.misclosure.shape
         out = np.zeros(n * r, dtype=bool)
         out[rows] = True
         epochs = out.reshape(n, r).any(axis=1)
+        kept = np.flatnonzero(~epochs)
         if epochs.sum() * r != len(rows):
             raise ValueError(
                 f"{len(rows)} rows of {epochs.sum()} epochs are left out: an epoch's {r} rows go "
                 "together."
             )
         others = collocate_literal(
-            self.gps_time[~epochs],
-            self.misclosure[~epochs],
-            self.noise.select(~epochs),
-            self.design[~epochs],
-            [_select(signal, ~epochs) for signal in self.signals],
+            self.gps_time[kept],
+            self.misclosure[kept],
+            self.noise.select(kept),
+            self.design[kept],
+            [_select(signal, kept) for signal in self.signals],
         )
         partials = [signal.partials[epochs] for signal in self.signals]
         mean, _ = others.predict(self.gps_time[epochs], self.design[epochs], partials)
@@ -134,7 +163,13 @@ def _select(signal, epochs):
     return LiteralSignal(signal.partials[epochs], variance, signal.base, signal.correlation_time)
 
 
-def collocate_literal(gps_time, misclosure, noise, design, signals):
+def collocate_literal(
+    gps_time: np.ndarray,
+    misclosure: np.ndarray,
+    noise: Noise,
+    design: np.ndarray,
+    signals: Sequence[LiteralSignal],
+) -> LiteralCollocation:
     """Collocation as the paper prints it; for its experiments, not for surveys.
 
     Without signals, or with C0 = 0, it is least squares of the trend: with weights
@@ -142,18 +177,24 @@ def collocate_literal(gps_time, misclosure, noise, design, signals):
 
     Parameters
     ----------
-    gps_time, misclosure, noise, design : as in collocate
+    gps_time, misclosure, noise, design
+        As in collocate.
     signals : sequence of LiteralSignal
 
-    Returns a LiteralCollocation. Raises ValueError as collocate does.
+    Raises
+    ------
+    ValueError
+        As collocate does.
 
-    >>> time, one = np.array([0.0, 10.0, 20.0]) + 413200.0, np.ones((3, 1, 1))
-    >>> signal = LiteralSignal(one, np.array([0.08]), np.array([0.04]), 30.0)
+    Examples
+    --------
+    >>> time, unit = np.array([0.0, 10.0, 20.0]) + 413200.0, np.ones((3, 1, 1))
+    >>> signal = LiteralSignal(unit, np.array([0.08]), np.array([0.04]), 30.0)
     >>> misclosure = np.array([[0.4], [0.6], [0.5]])
-    >>> solved = collocate_literal(time, misclosure, Noise(0.02 * one), one, [signal])
+    >>> solved = collocate_literal(time, misclosure, Noise(0.02 * unit), unit, [signal])
     >>> solved.trend.round(6)
     array([0.5])
-    >>> solved.predict(time[:1] - 1e4, one[:1], [one[:1]])[0].round(6)  # far away: the trend
+    >>> solved.predict(time[:1] - 1e4, unit[:1], [unit[:1]])[0].round(6)  # far away: the trend
     array([[0.5]])
     """
     n, r = np.shape(misclosure)

@@ -1,13 +1,24 @@
 """V of Markov signals by the recursion: linear in observations and epochs."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from mlscorr.collocation.interpolation import interpolate
-from mlscorr.collocation.model import NOT_POSITIVE, solve_trend
+from mlscorr.collocation.interpolation import interpolate, predictor_by
+from mlscorr.collocation.model import (
+    NOT_POSITIVE,
+    Collocation,
+    Noise,
+    Signal,
+    signal_clocks,
+    solve_trend,
+)
 from mlscorr.collocation.recursion import (
+    Recursion,
     filter_columns,
     filter_covariance,
     precision_between,
@@ -16,10 +27,14 @@ from mlscorr.collocation.recursion import (
 )
 from mlscorr.collocation.states import Layout
 
-CHUNK = 1 << 16  # epochs predicted at once: copies of broadcast designs and mixings stay small
 
-
-def collocate(gps_time, misclosure, noise, design, signals):
+def collocate(
+    gps_time: np.ndarray,
+    misclosure: np.ndarray,
+    noise: Noise,
+    design: np.ndarray,
+    signals: Sequence[Signal],
+) -> Collocation:
     r"""Separate misclosures into trend, signal and noise.
 
     Solves l = A x + B s + n with one covariance function throughout (Mao et al. 2015,
@@ -27,8 +42,9 @@ def collocate(gps_time, misclosure, noise, design, signals):
 
     Work and memory grow with epochs times the square of the states (the processes' 1, 2 or 3
     each). What the passes of a target share costs r columns for each target seen more than once,
-    filtered along with the misclosures, and a dense factor of all these columns: fit for hundreds
-    of such targets, 8 n c (r + 3 d) bytes with c columns and d states.
+    filtered along with the misclosures, and a dense factor of all these columns: fit for dozens
+    of such targets, 8 n c (r + 3 d) bytes with c columns and d states. For more of them, and for
+    rows that see two epochs, ``collocate_rows`` is there.
 
     Parameters
     ----------
@@ -42,18 +58,23 @@ def collocate(gps_time, misclosure, noise, design, signals):
         A. May have no column.
     signals : sequence of Signal
 
-    Returns a Collocation. Raises ValueError when a number is not finite, the trend is not
-    determined (rank of A) or the covariance of the observations is not positive definite.
+    Raises
+    ------
+    ValueError
+        Where a number is not finite, the trend is not determined (rank of A) or the covariance of
+        the observations is not positive definite.
 
+    Examples
+    --------
     >>> from mlscorr.collocation import Noise, Signal, collocate
-    >>> from mlscorr.covariance import Covariance
-    >>> time, one = np.array([0.0, 10.0, 20.0]) + 413200.0, np.ones((3, 1, 1))
-    >>> signal = Signal(0.1 * one, Covariance("matern32", 30.0))
-    >>> noise = Noise(1e-6 * one)
-    >>> solved = collocate(time, np.full((3, 1), 0.5), noise, one, [signal])
+    >>> from mlscorr.collocation.covariance import Covariance
+    >>> time, unit = np.array([0.0, 10.0, 20.0]) + 413200.0, np.ones((3, 1, 1))
+    >>> signal = Signal(0.1 * unit, Covariance("matern32", 30.0))
+    >>> noise = Noise(1e-6 * unit)
+    >>> solved = collocate(time, np.full((3, 1), 0.5), noise, unit, [signal])
     >>> solved.trend.round(6)
     array([0.5])
-    >>> mean, covariance = solved.predict(time[:1] + 5.0, one[:1], [0.1 * one[:1]])
+    >>> mean, covariance = solved.predict(time[:1] + 5.0, unit[:1], [0.1 * unit[:1]])
     >>> mean.round(6)
     array([[0.5]])
     """
@@ -61,20 +82,32 @@ def collocate(gps_time, misclosure, noise, design, signals):
     gps_time = np.asarray(gps_time, dtype=float)
     mixing = np.concatenate([np.zeros((n, r, 0)), *(s.mixing for s in signals)], axis=2)
     shared = noise.common.reshape(n, r, noise.common.shape[1])
-    _check_finite(gps_time, misclosure, noise.separate, shared, design, mixing)
+    check_finite(gps_time, misclosure, noise.separate, shared, design, mixing)
     order = np.argsort(gps_time, kind="stable")
+    layout, clocks = Layout.of(signals), signal_clocks(signals, gps_time)[order]
     gps_time, mixing = gps_time[order], mixing[order]
-    layout = Layout.of(signals)
     own = np.ascontiguousarray(noise.separate[order], dtype=float)
-    filtered = filter_covariance(layout, layout.size, _steps(gps_time), mixing, own)
+    filtered = filter_covariance(layout, layout.size, _steps(clocks), mixing, own)
     if np.isnan(filtered[2]).any():
         raise ValueError(NOT_POSITIVE.format(n * r))
-    solver = MarkovSolver(order, gps_time, layout, mixing, *filtered, noise.common)
+    solver = MarkovSolver(order, gps_time, clocks, layout, mixing, *filtered, noise.common)
     return solve_trend(solver, np.reshape(misclosure, -1), design.reshape(n * r, design.shape[2]))
 
 
-def _check_finite(gps_time, *arrays):
-    """Refuse epochs with what is no number, which the recursion would carry on to all others."""
+def check_finite(gps_time: np.ndarray, *arrays: np.ndarray) -> None:
+    """Refuse epochs with what is no number, which a solver would carry on to all others.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    arrays : (n, ...) arrays
+
+    Raises
+    ------
+    ValueError
+        Where a number is not finite.
+    """
     wrong = np.zeros(len(gps_time), dtype=bool)
     for values in (gps_time, *arrays):
         wrong |= ~np.isfinite(values).all(axis=tuple(range(1, np.ndim(values))))
@@ -86,9 +119,9 @@ def _check_finite(gps_time, *arrays):
         )
 
 
-def _steps(gps_time):
-    """Time since the epoch before, zero for the first."""
-    return np.diff(gps_time, prepend=gps_time[:1])
+def _steps(clocks):
+    """Times (n, s) since the epoch before, zero for the first."""
+    return np.diff(clocks, prepend=clocks[:1], axis=0)
 
 
 @dataclass(frozen=True)
@@ -97,19 +130,32 @@ class MarkovSolver:
 
     With C = [W U; I] = Q T, W the whitener of V0, the whitener of V is [W; 0] less its part in the
     columns of Q, and V^-1 = V0^-1 - Y Y^T with Y = V0^-1 U T^-1 (Woodbury).
+
+    Parameters
+    ----------
+    order : (n,) int array
+        Of time; all that follow but shared are in it.
+    gps_time, clocks : (n,), (n, s) array
+    layout : Layout
+    mixing : (n, r, k) array
+    transitions, gains, whiteners, covariances
+        As of filter_covariance.
+    shared : (n r, c) array
+        U, in the caller's order.
     """
 
-    order: np.ndarray  # (n,) of time
-    gps_time: np.ndarray  # (n,) in that order, as all that follow but shared
+    order: np.ndarray
+    gps_time: np.ndarray
+    clocks: np.ndarray
     layout: Layout
-    mixing: np.ndarray  # (n, r, k)
+    mixing: np.ndarray
     transitions: np.ndarray
     gains: np.ndarray
     whiteners: np.ndarray
     covariances: np.ndarray
-    shared: np.ndarray  # (n r, c) U, in the caller's order
+    shared: np.ndarray
 
-    def whiten(self, columns):
+    def whiten(self, columns: np.ndarray) -> np.ndarray:
         """Columns of which W^T W = c^T V^-1 c, in the order of time."""
         whitened = self._filter(columns)[0].reshape(columns.shape)
         if not self.shared.size:
@@ -119,22 +165,18 @@ class MarkovSolver:
         return padded - basis @ (basis.T @ padded)
 
     @property
-    def processes(self):
-        """Number of processes of each signal."""
-        return np.bincount(self.layout.signal, minlength=self.layout.states.size).tolist()
-
-    @property
-    def log_determinant(self):
+    def log_determinant(self) -> float:
+        """Of V."""
         total = -2 * np.log(np.einsum("nii->ni", self.whiteners)).sum()
         if self.shared.size:
             total += 2 * np.log(np.abs(np.diag(self._woodbury[1]))).sum()
         return total
 
-    def solve(self, columns):
+    def solve(self, columns: np.ndarray) -> np.ndarray:
         """V^-1 c."""
         return self._smooth(self._without_shared(columns))[0]
 
-    def precision(self, rows):
+    def precision(self, rows: np.ndarray) -> np.ndarray:
         """A block of V^-1."""
         r = self.mixing.shape[1]
         position = self._position[np.asarray(rows) // r]
@@ -145,7 +187,7 @@ class MarkovSolver:
             block[a, :, a] = self._smoothed[0][early]
             for b in range(a + 1, len(epochs)):
                 block[a, :, b] = precision_between(
-                    *self._recursion, self._smoothed[1], early, epochs[b]
+                    self._recursion, self._smoothed[1], early, epochs[b]
                 )
                 block[b, :, a] = block[a, :, b].T
         flat = of * r + within
@@ -155,36 +197,20 @@ class MarkovSolver:
             block = block - shared @ shared.T
         return block
 
-    def predictor(self, columns, trend, trend_root):
-        """Prediction from the columns [A, l - A x]; see Collocation.predict."""
+    def predictor(self, columns: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
+        """The predictor of these columns; see Collocation.predict.
+
+        Parameters
+        ----------
+        columns : (m, p + 1) array
+            [A, l - A x].
+        trend, trend_root : (p,), (p, p) array
+        """
         nodes = self._smooth(self._without_shared(columns))[1]
-        same, following = self._node_covariances
-        table = (self.gps_time, self.layout, nodes, same, following, trend, trend_root)
-
-        def predict(gps_time, design, mixings):
-            q, r = design.shape[:2]
-            shapes = [np.shape(values) for values in (design, *mixings)]
-            if shapes != [(len(gps_time), r, k) for k in (len(trend), *self.processes)]:
-                raise ValueError(
-                    f"{len(gps_time)} epochs are asked with a design and mixings of shapes "
-                    f"{shapes}: they should be (epochs, quantities, trend parameters) and (epochs, "
-                    f"quantities, processes), of {len(trend)} and {self.processes} columns."
-                )
-            mean, covariance = np.empty((q, r)), np.empty((q, r, r))
-            for i in range(0, q, CHUNK):
-                part = slice(i, i + CHUNK)
-                blocks = [np.zeros((len(gps_time[part]), r, 0)), *(m[part] for m in mixings)]
-                interpolate(
-                    *table,
-                    np.ascontiguousarray(gps_time[part]),
-                    np.ascontiguousarray(design[part], dtype=float),
-                    np.concatenate(blocks, axis=2),
-                    mean[part],
-                    covariance[part],
-                )
-            return mean, covariance
-
-        return predict
+        table = (self.gps_time, self.clocks, self.layout, nodes, *self._node_covariances)
+        return predictor_by(
+            lambda epochs: interpolate(*table, epochs), self.layout, trend, trend_root
+        )
 
     @cached_property
     def _position(self):
@@ -193,26 +219,25 @@ class MarkovSolver:
 
     @property
     def _recursion(self):
-        return self.layout, self.transitions, self.mixing, self.gains, self.whiteners
+        return Recursion(self.layout, self.transitions, self.mixing, self.gains, self.whiteners)
 
     def _filter(self, columns):
         """Whitened columns and states of V0."""
         n, r, _ = self.mixing.shape
         ordered = columns.reshape(n, r, columns.shape[1])[self.order]
-        return filter_columns(*self._recursion, np.ascontiguousarray(ordered, dtype=float))
+        return filter_columns(self._recursion, np.ascontiguousarray(ordered, dtype=float))
 
     def _smooth(self, columns):
         """V0^-1 c (m, c), and the smoothed states (n, d, c) of the columns."""
         whitened, states = self._filter(columns)
-        weights, adjoints = smooth_columns(*self._recursion, whitened)
+        weights, adjoints = smooth_columns(self._recursion, whitened)
         unsorted = np.empty_like(weights)
         unsorted[self.order] = weights
         return unsorted.reshape(columns.shape), states + self.covariances @ adjoints
 
     @cached_property
     def _smoothed(self):
-        layout, *recursion = self._recursion
-        return smooth_covariance(layout, _steps(self.gps_time), *recursion, self.covariances)
+        return smooth_covariance(self._recursion, _steps(self.clocks), self.covariances)
 
     @cached_property
     def _woodbury(self):

@@ -1,13 +1,19 @@
 """What a collocation is about: signals, noise, and the generalised least squares they share."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from mlscorr.covariance import Covariance
+from mlscorr.collocation.covariance import Covariance
 
-DETERMINED = 1e-9  # least share of the trend's information that must remain without some rows
+SMALLEST_INFORMATION = (
+    1e-9  # least share of the trend's information that must remain without some rows
+)
 NOT_POSITIVE = (
     "The covariance of the {} misclosures is not positive definite: two observations of one time "
     "without noise, or a sigma of zero. Give each observation and control point the sigma that it "
@@ -25,10 +31,28 @@ class Signal:
         B times the sigmas of k independent processes, each of unit variance, at n epochs with r
         observations each.
     covariance : Covariance
+        Of the lags of ``clock``.
+    clock : (n,) array, optional
+        The processes' own time, which never falls as gps_time rises; a leap of more than all
+        correlation times lets them start anew. gps_time by default. Units: s.
     """
 
     mixing: np.ndarray
     covariance: Covariance
+    clock: np.ndarray | None = None
+
+
+def signal_clocks(signals: Sequence[Signal], gps_time: np.ndarray) -> np.ndarray:
+    """Clocks (n, s) of signals at n epochs.
+
+    Parameters
+    ----------
+    signals : sequence of Signal
+    gps_time : (n,) array
+        Units: s.
+    """
+    clocks = [gps_time if s.clock is None else s.clock for s in signals]
+    return np.column_stack([np.zeros((len(gps_time), 0)), *clocks])
 
 
 @dataclass(frozen=True)
@@ -50,43 +74,45 @@ class Noise:
     shared: np.ndarray | None = None
 
     @cached_property
-    def separate(self):
+    def separate(self) -> np.ndarray:
         """Covariance (n, r, r) of each epoch's noise, without what it shares with others."""
         if self.group is None:
             return self.own
-        alone = ~np.isin(self.group, self._repeated)
-        variance = np.where(alone[:, None], self.shared[self.group] ** 2, 0.0)
+        is_single = ~np.isin(self.group, self.repeated)
+        variance = np.where(is_single[:, None], self.shared[self.group] ** 2, 0.0)
         return self.own + variance[:, :, None] * np.eye(variance.shape[1])
 
     @cached_property
-    def common(self):
+    def common(self) -> np.ndarray:
         """Columns (n r, c) of the errors shared by several epochs, each of unit variance."""
         n, r = self.own.shape[:2]
         if self.group is None:
             return np.zeros((n * r, 0))
-        seen = self.group[:, None] == self._repeated
-        sigma = np.where(seen[:, :, None], self.shared[self._repeated], 0.0)
-        return np.einsum("ngk,jk->njgk", sigma, np.eye(r)).reshape(n * r, seen.shape[1] * r)
+        members = self.group[:, None] == self.repeated
+        sigma = np.where(members[:, :, None], self.shared[self.repeated], 0.0)
+        return np.einsum("ngk,jk->njgk", sigma, np.eye(r)).reshape(n * r, members.shape[1] * r)
 
     @property
-    def _repeated(self):
+    def repeated(self) -> np.ndarray:
         """Groups that have several epochs and an error to share."""
+        if self.group is None:
+            return np.zeros(0, dtype=np.int64)
         groups, count = np.unique(self.group, return_counts=True)
         return groups[(count > 1) & np.any(self.shared[groups] > 0, axis=1)]
 
     @property
-    def matrix(self):
+    def matrix(self) -> np.ndarray:
         """All of it as one covariance matrix (n r, n r)."""
         return self.block(np.arange(self.own.shape[0] * self.own.shape[1]))
 
-    def block(self, rows):
+    def block(self, rows: np.ndarray) -> np.ndarray:
         """Covariance of some rows, numbered as in a Collocation."""
         epoch, row = np.divmod(np.asarray(rows, dtype=int), self.own.shape[1])
         separate = self.separate[epoch[:, None], row[:, None], row]
         common = self.common[rows]
         return np.where(epoch[:, None] == epoch, separate, 0.0) + common @ common.T
 
-    def select(self, epochs):
+    def select(self, epochs: np.ndarray) -> Noise:
         """The noise of some epochs: their numbers, or an (n,) mask."""
         group = None if self.group is None else self.group[epochs]
         return Noise(self.own[epochs], group, self.shared)
@@ -100,31 +126,45 @@ class Collocation:
 
     Parameters
     ----------
-    trend, trend_covariance : (p,), (p, p) array
-        x (Eq. 13) and its covariance.
+    solver : DenseSolver or MarkovSolver
+        Of V = B D B^T + N.
+    misclosure, design : (m,), (m, p) array
+        l and A.
+    trend, trend_root : (p,), (p, p) array
+        x (Eq. 13), and the root whose square is its covariance.
     log_likelihood : float
         Restricted log-likelihood of the misclosures.
     sigma0 : float
         Square root of the weighted residual sum of squares over the redundancy m - p; one if the
         model is right.
-    weights : (m,) array
-        V^-1 (l - A x), with V = B D B^T + N.
     """
 
-    solver: object  # of V: dense, or the Markov recursion
-    misclosure: np.ndarray  # (m,)
-    design: np.ndarray  # (m, p)
+    solver: Any
+    misclosure: np.ndarray
+    design: np.ndarray
     trend: np.ndarray
-    trend_root: np.ndarray  # (p, p), its square is the covariance
-    weights: np.ndarray
+    trend_root: np.ndarray
     log_likelihood: float
     sigma0: float
 
     @property
-    def trend_covariance(self):
+    def trend_covariance(self) -> np.ndarray:
+        """Covariance (p, p) of the trend."""
         return self.trend_root @ self.trend_root.T
 
-    def predict(self, gps_time, design, mixings):
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """V^-1 (l - A x), (m,)."""
+        residual = self.misclosure - self.design @ self.trend
+        return self.solver.solve(residual[:, None])[:, 0]
+
+    def predict(
+        self,
+        gps_time: np.ndarray,
+        design: np.ndarray,
+        mixings: Sequence[np.ndarray],
+        clocks: Sequence[np.ndarray | None] | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Trend plus signal at other epochs, with covariance  (Eq. 15).
 
         Parameters
@@ -134,6 +174,8 @@ class Collocation:
         design : (q, r, p) array
         mixings : list of (q, r, k) arrays, one for each signal
             Row q of the result is design @ x + sum of mixing @ s(gps_time).
+        clocks : list of (q,) arrays or None, optional
+            Of the signals that have a clock of their own, there.
 
         Returns
         -------
@@ -141,7 +183,12 @@ class Collocation:
             The covariance is that of the error: it falls where there are observations, and it
             includes that of the trend.
         """
-        return self._predictor(np.asarray(gps_time, dtype=float), design, mixings)
+        gps_time = np.asarray(gps_time, dtype=float)
+        clocks = [None] * len(mixings) if clocks is None else clocks
+        clocks = np.column_stack(
+            [np.zeros((len(gps_time), 0)), *(gps_time if c is None else c for c in clocks)]
+        )
+        return self._predictor(gps_time, clocks, design, mixings)
 
     @cached_property
     def _predictor(self):
@@ -154,45 +201,61 @@ class Collocation:
         return np.linalg.qr(self.design)[0]
 
     @cached_property
-    def _projected(self):
+    def projected(self) -> np.ndarray:
         """V^-1 A times the root of the trend's covariance, (m, p)."""
         return self.solver.solve(self.design) @ self.trend_root
 
-    def determined_without(self, rows):
+    def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
         basis = self._leverage[rows]
         if basis.shape[1] == 0:
             return True
-        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < 1.0 - DETERMINED)
+        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < 1.0 - SMALLEST_INFORMATION)
 
-    def leave_out(self, rows):
+    def leave_out(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the other observations say of some: residuals (l - prediction) and covariance.
 
         The covariance includes the noise of the observations left out, which is what a test of
         them needs. Both come from the block of V^-1 less the trend's part, without solving again
-        (Dubrule 1983, Math. Geology 15, 687-699). Raises ValueError when the others don't
-        determine the trend.
+        (Dubrule 1983, Math. Geology 15, 687-699).
+
+        Parameters
+        ----------
+        rows : (k,) int array
+
+        Raises
+        ------
+        ValueError
+            Where the others don't determine the trend.
         """
         if not self.determined_without(rows):
             raise ValueError(
                 f"Without the {len(rows)} observations that are left out the other "
                 f"{len(self.misclosure) - len(rows)} do not determine the trend."
             )
-        projected = self._projected[rows]
+        projected = self.projected[rows]
         covariance = np.linalg.inv(self.solver.precision(rows) - projected @ projected.T)
         return covariance @ self.weights[rows], covariance
 
 
-def solve_trend(solver, misclosure, design):
-    """Generalised least squares, x = (A^T V^-1 A)^-1 A^T V^-1 l  (Eq. 13), as a Collocation.
-
-    A solver of V has: ``whiten(columns)``, of which W^T W = c^T V^-1 c; ``log_determinant``;
-    ``solve(columns)``, V^-1 c; ``precision(rows)``, a block of V^-1; ``predictor(columns, trend,
-    root)``.
+def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Collocation:
+    """Generalised least squares, x = (A^T V^-1 A)^-1 A^T V^-1 l  (Eq. 13).
 
     The likelihood is the restricted one, of what the trend leaves (Rasmussen and Williams 2006,
-    Eq. 2.45 with the trend's prior infinitely wide). Raises ValueError when the rank of A is less
-    than its columns.
+    Eq. 2.45 with the trend's prior infinitely wide).
+
+    Parameters
+    ----------
+    solver : DenseSolver or MarkovSolver
+        Of V. It has ``whiten(columns)``, of which W^T W = c^T V^-1 c; ``log_determinant``;
+        ``solve(columns)``, V^-1 c; ``precision(rows)``, a block of V^-1; ``predictor(columns,
+        trend, root)``.
+    misclosure, design : (m,), (m, p) array
+
+    Raises
+    ------
+    ValueError
+        Where the rank of A is less than its columns.
     """
     p = design.shape[1]
     whitened = solver.whiten(np.column_stack([design, misclosure]))
@@ -215,7 +278,6 @@ def solve_trend(solver, misclosure, design):
         design=design,
         trend=trend,
         trend_root=root,
-        weights=solver.solve((misclosure - design @ trend)[:, None])[:, 0],
         log_likelihood=float(log_likelihood),
         sigma0=float(np.sqrt(squares / redundancy)) if redundancy else float("nan"),
     )

@@ -15,10 +15,22 @@ its covariance. H = B (mixing) on the first state of each process. Sources: Sär
 section 10 (filter, smoother) and 12 (processes); Durbin and Koopman 2012, section 4.5.
 """
 
+from __future__ import annotations
+
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
+from mlscorr.collocation.matrices import (
+    make_symmetric,
+    multiply,
+    multiply_transposed,
+    subtract_product,
+    whitening_root,
+)
 from mlscorr.collocation.states import (
+    Layout,
     add_blocks,
     carry,
     carry_square,
@@ -28,82 +40,52 @@ from mlscorr.collocation.states import (
     send_back,
 )
 
-SINGULAR = 1e-15  # share of an observation's prior variance below which nothing is left of it
+
+class Recursion(NamedTuple):
+    """The factor of V0 of n epochs, as the compiled loops take it.
+
+    Parameters
+    ----------
+    layout : Layout
+    transitions : (n, s, 3, 3) array
+    mixing : (n, r, k) array
+    gains : (n, r, d) array
+        K^T.
+    whiteners : (n, r, r) array
+        Inverse roots of the innovations' covariances.
+    """
+
+    layout: Layout
+    transitions: np.ndarray
+    mixing: np.ndarray
+    gains: np.ndarray
+    whiteners: np.ndarray
 
 
 @njit(cache=True, nogil=True)
-def _times(a, b):
-    """a b. Plain loops: on matrices this small they are as fast as BLAS, and quick to compile."""
-    out = np.zeros((a.shape[0], b.shape[1]))
-    for i in range(a.shape[0]):
-        for k in range(a.shape[1]):
-            for j in range(b.shape[1]):
-                out[i, j] += a[i, k] * b[k, j]
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _across(a, b):
-    """a^T b."""
-    out = np.zeros((a.shape[1], b.shape[1]))
-    for k in range(a.shape[0]):
-        for i in range(a.shape[1]):
-            for j in range(b.shape[1]):
-                out[i, j] += a[k, i] * b[k, j]
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _take(x, a, b):
-    """x <- x - a b^T, in place."""
-    for i in range(x.shape[0]):
-        for j in range(x.shape[1]):
-            for k in range(a.shape[1]):
-                x[i, j] -= a[i, k] * b[j, k]
-
-
-@njit(cache=True, nogil=True)
-def _even(x):
-    """Make x symmetric, in place."""
-    for i in range(x.shape[0]):
-        for j in range(i):
-            x[i, j] = x[j, i] = 0.5 * (x[i, j] + x[j, i])
-
-
-@njit(cache=True, nogil=True)
-def _whitener(s, prior):
-    """L^-1 with L L^T = s (r, r); a first element that is no number where s is singular."""
-    r = s.shape[0]
-    lower = np.zeros((r, r))
-    white = np.zeros((r, r))
-    for i in range(r):
-        for j in range(i + 1):
-            total = s[i, j]
-            for k in range(j):
-                total -= lower[i, k] * lower[j, k]
-            if j < i:
-                lower[i, j] = total / lower[j, j]
-            elif total > SINGULAR * prior[i]:
-                lower[i, i] = np.sqrt(total)
-            else:
-                white[0, 0] = np.nan
-                return white
-        white[i, i] = 1.0 / lower[i, i]
-        for j in range(i):
-            total = 0.0
-            for k in range(j, i):
-                total -= lower[i, k] * white[k, j]
-            white[i, j] = total / lower[i, i]
-    return white
-
-
-@njit(cache=True, nogil=True)
-def filter_covariance(layout, size, step, mixing, noise):
+def filter_covariance(
+    layout: Layout, size: int, steps: np.ndarray, mixing: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Kalman filter of the covariances over n epochs.
 
-    step (n,) is the time since the epoch before. Returns the transitions (n, s, 3, 3), gains
-    transposed K^T (n, r, d), whiteners (n, r, r) of the innovations and covariances P (n, d, d).
-    A whitener that is no number tells the epoch where V is not positive definite.
+    Parameters
+    ----------
+    layout : Layout
+    size : int
+        Number d of states.
+    steps : (n, s) array
+        Times since the epoch before, by each signal's clock.
+    mixing, noise : (n, r, k), (n, r, r) array
+
+    Returns
+    -------
+    transitions : (n, s, 3, 3) array
+    gains : (n, r, d) array
+        K^T.
+    whiteners : (n, r, r) array
+        Of the innovations; not a number at the epoch where V is not positive definite.
+    covariances : (n, d, d) array
+        P.
     """
     n, r, k = mixing.shape
     number = layout.states.size
@@ -112,16 +94,16 @@ def filter_covariance(layout, size, step, mixing, noise):
     whiteners = np.zeros((n, r, r))
     covariances = np.zeros((n, size, size))
     spread = np.zeros((number, 3, 3))
-    fill_noise(layout, np.inf, spread)  # the stationary covariance
+    fill_noise(layout, np.full(number, np.inf), spread)  # the stationary covariance
     p = np.zeros((size, size))
     for i in range(n):
         if i > 0:
-            fill_transition(layout, step[i], transitions[i])
-            fill_noise(layout, step[i], spread)
+            fill_transition(layout, steps[i], transitions[i])
+            fill_noise(layout, steps[i], spread)
             p = carry_square(layout, transitions[i], p, False)
         add_blocks(layout, spread, p)
-        seen = observe(layout.first, mixing[i], p)  # H P-
-        innovation = observe(layout.first, mixing[i], seen.T.copy())
+        observed = observe(layout.first, mixing[i], p)  # H P-
+        innovation = observe(layout.first, mixing[i], observed.T.copy())
         prior = np.zeros(r)
         for m in range(r):
             prior[m] = noise[i, m, m]
@@ -129,32 +111,47 @@ def filter_covariance(layout, size, step, mixing, noise):
                 prior[m] += mixing[i, m, j] ** 2
             for other in range(r):
                 innovation[m, other] += noise[i, m, other]
-        white = _whitener(innovation, prior)
+        white = whitening_root(innovation, prior)
         whiteners[i] = white
         if np.isnan(white[0, 0]):
             break
-        gain = _across(white, _times(white, seen))  # K^T
-        p = _joseph(layout.first, mixing[i], noise[i], p, gain, seen)
+        gain = multiply_transposed(white, multiply(white, observed))  # K^T
+        p = _joseph(layout.first, mixing[i], noise[i], p, gain, observed)
         gains[i] = gain
         covariances[i] = p
     return transitions, gains, whiteners, covariances
 
 
 @njit(cache=True, nogil=True)
-def _joseph(first, mixing, noise, p, gain, seen):
+def _joseph(first, mixing, noise, p, gain, observed):
     """(I - K H) P- (I - K H)^T + K R K^T from K^T and H P-."""
-    columns, wide = gain.T.copy(), seen.T.copy()
-    _take(p, columns, wide)
+    columns, wide = gain.T.copy(), observed.T.copy()
+    subtract_product(p, columns, wide)
     left = observe(first, mixing, p.T.copy())  # H [(I - K H) P-]^T, which R K^T balances
-    _take(left, noise, columns)
-    _take(p, left.T.copy(), columns)
-    _even(p)
+    subtract_product(left, noise, columns)
+    subtract_product(p, left.T.copy(), columns)
+    make_symmetric(p)
     return p
 
 
 @njit(cache=True, nogil=True)
-def filter_columns(layout, transitions, mixing, gains, whiteners, columns):
-    """Filter columns of observations (n, r, c): whitened (n, r, c) and states x (n, d, c)."""
+def filter_columns(
+    recursion: Recursion,
+    columns: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Filter columns of observations.
+
+    Parameters
+    ----------
+    recursion : Recursion
+    columns : (n, r, c) array
+
+    Returns
+    -------
+    whitened : (n, r, c) array
+    states : (n, d, c) array
+    """
+    layout, transitions, mixing, gains, whiteners = recursion
     n, r, c = columns.shape
     x = np.zeros((gains.shape[2], c))
     states = np.zeros((n, gains.shape[2], c))
@@ -166,8 +163,8 @@ def filter_columns(layout, transitions, mixing, gains, whiteners, columns):
         for m in range(r):
             for b in range(c):
                 innovation[m, b] = columns[i, m, b] - innovation[m, b]
-        whitened[i] = _times(whiteners[i], innovation)
-        step = _across(gains[i], innovation)
+        whitened[i] = multiply(whiteners[i], innovation)
+        step = multiply_transposed(gains[i], innovation)
         for a in range(x.shape[0]):
             for b in range(c):
                 x[a, b] += step[a, b]
@@ -176,16 +173,33 @@ def filter_columns(layout, transitions, mixing, gains, whiteners, columns):
 
 
 @njit(cache=True, nogil=True)
-def smooth_columns(layout, transitions, mixing, gains, whiteners, whitened):
-    """From whitened columns back: V^-1 c (n, r, c), and the adjoints a (n, d, c)."""
+def smooth_columns(
+    recursion: Recursion,
+    whitened: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """From whitened columns back.
+
+    Parameters
+    ----------
+    recursion : Recursion
+    whitened : (n, r, c) array
+
+    Returns
+    -------
+    weights : (n, r, c) array
+        V^-1 c.
+    adjoints : (n, d, c) array
+        a.
+    """
+    layout, transitions, mixing, gains, whiteners = recursion
     n, r, c = whitened.shape
     a = np.zeros((gains.shape[2], c))
     adjoints = np.zeros((n, gains.shape[2], c))
     weights = np.zeros((n, r, c))
     for i in range(n - 1, -1, -1):
         adjoints[i] = a
-        u = _across(whiteners[i], whitened[i])
-        _take(u, gains[i], a.T.copy())
+        u = multiply_transposed(whiteners[i], whitened[i])
+        subtract_product(u, gains[i], a.T.copy())
         weights[i] = u
         send_back(layout.first, mixing[i], u, a)
         if i > 0:
@@ -194,12 +208,29 @@ def smooth_columns(layout, transitions, mixing, gains, whiteners, whitened):
 
 
 @njit(cache=True, nogil=True)
-def smooth_covariance(layout, step, transitions, mixing, gains, whiteners, covariances):
+def smooth_covariance(
+    recursion: Recursion,
+    steps: np.ndarray,
+    covariances: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The backward pass of N.
 
-    Returns the diagonal blocks of V^-1 (n, r, r), K^T N (n, r, d), and the covariances of the
-    smoothed states with themselves (n, d, d) and with those of the next epoch (n - 1, d, d).
+    Parameters
+    ----------
+    recursion : Recursion
+    steps, covariances : (n, s), (n, d, d) array
+        As of filter_covariance.
+
+    Returns
+    -------
+    blocks : (n, r, r) array
+        On the diagonal of V^-1.
+    future : (n, r, d) array
+        K^T N.
+    same, following : (n, d, d), (n - 1, d, d) array
+        Covariances of the smoothed states with themselves, and with those of the next epoch.
     """
+    layout, transitions, mixing, gains, whiteners = recursion
     n, r, _ = mixing.shape
     size = gains.shape[2]
     blocks = np.zeros((n, r, r))
@@ -209,45 +240,60 @@ def smooth_covariance(layout, step, transitions, mixing, gains, whiteners, covar
     spread = np.zeros((layout.states.size, 3, 3))
     information = np.zeros((size, size))
     for i in range(n - 1, -1, -1):
-        future[i] = _times(gains[i], information)
-        weight = _across(whiteners[i], whiteners[i])  # S^-1
+        future[i] = multiply(gains[i], information)
+        weight = multiply_transposed(whiteners[i], whiteners[i])  # S^-1
         blocks[i] = weight
-        _take(blocks[i], -future[i], gains[i])
+        subtract_product(blocks[i], -future[i], gains[i])
         same[i] = covariances[i]
-        _take(same[i], _times(covariances[i], information), covariances[i])
+        subtract_product(same[i], multiply(covariances[i], information), covariances[i])
         if i == 0:
             break
         send_back(layout.first, mixing[i], -future[i], information)  # (I - K H)^T N
         information = information.T.copy()
         back = observe(layout.first, mixing[i], np.eye(size))
-        back = _times(weight, back)
-        _take(back, gains[i], information.T.copy())
+        back = multiply(weight, back)
+        subtract_product(back, gains[i], information.T.copy())
         send_back(layout.first, mixing[i], back, information)  # N-
-        _even(information)
-        fill_noise(layout, step[i], spread)
+        make_symmetric(information)
+        fill_noise(layout, steps[i], spread)
         predicted = carry_square(layout, transitions[i], covariances[i - 1], False)
         add_blocks(layout, spread, predicted)
         forward = covariances[i - 1].copy()
         carry(layout, transitions[i], forward, False)
         forward = forward.T.copy()  # P F^T
         following[i - 1] = forward
-        _take(following[i - 1], _times(forward, information), predicted)
+        subtract_product(following[i - 1], multiply(forward, information), predicted)
         information = carry_square(layout, transitions[i], information, True)
     return blocks, future, same, following
 
 
 @njit(cache=True, nogil=True)
-def precision_between(layout, transitions, mixing, gains, whiteners, future, early, late):
-    """Block (r, r) of V^-1 at an early and a late epoch, walking from late to early."""
+def precision_between(
+    recursion: Recursion,
+    future: np.ndarray,
+    early: int,
+    late: int,
+) -> np.ndarray:
+    """Block (r, r) of V^-1 at an early and a late epoch, walking from late to early.
+
+    Parameters
+    ----------
+    recursion : Recursion
+    future : (n, r, d) array
+        As of smooth_covariance.
+    early, late : int
+        Numbers of the epochs.
+    """
+    layout, transitions, mixing, gains, whiteners = recursion
     y = np.zeros((gains.shape[2], gains.shape[1]))
-    weight = _across(whiteners[late], whiteners[late])  # S^-1 + K^T N K
-    _take(weight, -future[late], gains[late])
+    weight = multiply_transposed(whiteners[late], whiteners[late])  # S^-1 + K^T N K
+    subtract_product(weight, -future[late], gains[late])
     send_back(layout.first, mixing[late], weight, y)
     for a in range(y.shape[0]):
         for m in range(y.shape[1]):
             y[a, m] -= future[late, m, a]
     for i in range(late, early, -1):
         if i < late:  # (I - K H)^T
-            send_back(layout.first, mixing[i], -_times(gains[i], y), y)
+            send_back(layout.first, mixing[i], -multiply(gains[i], y), y)
         carry(layout, transitions[i], y, True)
-    return -_times(gains[early], y)
+    return -multiply(gains[early], y)

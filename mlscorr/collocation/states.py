@@ -4,61 +4,104 @@ H, which observes them, is B (mixing) on the first state of each process; F and 
 for each process. None of them is ever written out.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from mlscorr.covariance import process_noise, transition
+from mlscorr.collocation.covariance import process_noise, transition
+
+if TYPE_CHECKING:
+    from mlscorr.collocation.model import Signal
 
 
 class Layout(NamedTuple):
-    """Where the states of k processes of s signals stand in the d states of all."""
+    """Where the states of k processes of s signals stand in the d states of all.
 
-    first: np.ndarray  # (k,) first state of each process
-    signal: np.ndarray  # (k,) its signal
-    states: np.ndarray  # (s,) number of states of a process
-    rates: np.ndarray  # (s,) 1/s
+    Parameters
+    ----------
+    first, signal : (k,) int array
+        First state of each process, and its signal.
+    states, kinds : (s,) int array
+        Number of states of a process, and that of its covariance family.
+    rates : (s,) array
+        Units: 1/s.
+    """
+
+    first: np.ndarray
+    signal: np.ndarray
+    states: np.ndarray
+    kinds: np.ndarray
+    rates: np.ndarray
 
     @classmethod
-    def of(cls, signals):
+    def of(cls, signals: Sequence[Signal]) -> Layout:
         """The layout of Signals."""
         states = np.array([s.covariance.states for s in signals], dtype=np.int64)
         count = np.array([s.mixing.shape[2] for s in signals], dtype=np.int64)
         signal = np.repeat(np.arange(len(signals)), count)
         first = np.concatenate([[0], np.cumsum(states[signal])[:-1]])[: len(signal)]
         rates = np.array([s.covariance.rate for s in signals], dtype=float)
-        return cls(first.astype(np.int64), signal.astype(np.int64), states, rates)
+        kinds = np.array([s.covariance.kind for s in signals], dtype=np.int64)
+        return cls(first.astype(np.int64), signal.astype(np.int64), states, kinds, rates)
 
     @property
-    def size(self):
+    def size(self) -> int:
         """Number of states in all."""
         return int(self.states[self.signal].sum())
 
 
 @njit(cache=True, nogil=True)
-def fill_transition(layout, span, out):
-    """F of each signal over a span of time (s) into out (s, 3, 3)."""
+def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
+    """F of each signal over a span of its clock.
+
+    Parameters
+    ----------
+    layout : Layout
+    spans : (s,) array
+        Units: s.
+    out : (s, 3, 3) array
+    """
     for s in range(layout.states.size):
-        f = transition(layout.states[s], span * layout.rates[s])
+        f = transition(layout.kinds[s], spans[s] * layout.rates[s])
         out[s, 0, 0], out[s, 0, 1], out[s, 0, 2] = f[0], f[1], f[2]
         out[s, 1, 0], out[s, 1, 1], out[s, 1, 2] = f[3], f[4], f[5]
         out[s, 2, 0], out[s, 2, 1], out[s, 2, 2] = f[6], f[7], f[8]
 
 
 @njit(cache=True, nogil=True)
-def fill_noise(layout, span, out):
-    """Q of each signal over a span of time (s) into out (s, 3, 3)."""
+def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
+    """Q of each signal over a span of its clock.
+
+    Parameters
+    ----------
+    layout : Layout
+    spans : (s,) array
+        Units: s.
+    out : (s, 3, 3) array
+    """
     for s in range(layout.states.size):
-        q = process_noise(layout.states[s], span * layout.rates[s])
+        q = process_noise(layout.kinds[s], spans[s] * layout.rates[s])
         out[s, 0, 0], out[s, 0, 1], out[s, 0, 2] = q[0], q[1], q[2]
         out[s, 1, 0], out[s, 1, 1], out[s, 1, 2] = q[1], q[3], q[4]
         out[s, 2, 0], out[s, 2, 1], out[s, 2, 2] = q[2], q[4], q[5]
 
 
 @njit(cache=True, nogil=True)
-def carry(layout, blocks, x, transposed):
-    """x <- F x, or F^T x, in place; x (d, c)."""
+def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -> None:
+    """X <- F x, or F^T x, in place.
+
+    Parameters
+    ----------
+    layout : Layout
+    blocks : (s, 3, 3) array
+        F of each signal.
+    x : (d, c) array
+    transposed : bool
+    """
     for j in range(layout.first.size):
         a = layout.first[j]
         f = blocks[layout.signal[j]]
@@ -83,8 +126,17 @@ def carry(layout, blocks, x, transposed):
 
 
 @njit(cache=True, nogil=True)
-def carry_square(layout, blocks, x, transposed):
-    """F x F^T, or F^T x F, of a symmetric x (d, d); a new array."""
+def carry_square(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -> np.ndarray:
+    """F x F^T, or F^T x F, of a symmetric x; a new array.
+
+    Parameters
+    ----------
+    layout : Layout
+    blocks : (s, 3, 3) array
+        F of each signal.
+    x : (d, d) array
+    transposed : bool
+    """
     half = x.copy()
     carry(layout, blocks, half, transposed)
     whole = half.T.copy()
@@ -93,8 +145,15 @@ def carry_square(layout, blocks, x, transposed):
 
 
 @njit(cache=True, nogil=True)
-def add_blocks(layout, blocks, x):
-    """Add each process's block of states to the diagonal of x (d, d)."""
+def add_blocks(layout: Layout, blocks: np.ndarray, x: np.ndarray) -> None:
+    """Add each process's block of states to the diagonal of x.
+
+    Parameters
+    ----------
+    layout : Layout
+    blocks : (s, 3, 3) array
+    x : (d, d) array
+    """
     for j in range(layout.first.size):
         a = layout.first[j]
         states = layout.states[layout.signal[j]]
@@ -104,8 +163,15 @@ def add_blocks(layout, blocks, x):
 
 
 @njit(cache=True, nogil=True)
-def observe(first, mixing, x):
-    """H x of states x (d, c): (r, c)."""
+def observe(first: np.ndarray, mixing: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """H x of states: (r, c).
+
+    Parameters
+    ----------
+    first : (k,) int array
+    mixing : (r, k) array
+    x : (d, c) array
+    """
     out = np.zeros((mixing.shape[0], x.shape[1]))
     for m in range(mixing.shape[0]):
         for j in range(first.size):
@@ -115,8 +181,16 @@ def observe(first, mixing, x):
 
 
 @njit(cache=True, nogil=True)
-def send_back(first, mixing, y, x):
-    """x <- x + H^T y, in place; y (r, c), x (d, c)."""
+def send_back(first: np.ndarray, mixing: np.ndarray, y: np.ndarray, x: np.ndarray) -> None:
+    """X <- x + H^T y, in place.
+
+    Parameters
+    ----------
+    first : (k,) int array
+    mixing : (r, k) array
+    y : (r, c) array
+    x : (d, c) array
+    """
     for m in range(mixing.shape[0]):
         for j in range(first.size):
             for c in range(x.shape[1]):

@@ -1,0 +1,52 @@
+"""Which knots and shared errors of sparse rows know of each other: the edges of L."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations, product
+
+import numpy as np
+
+from mlscorr.collocation.knots import Knots
+from mlscorr.collocation.sparse_rows import Sides
+from mlscorr.collocation.states import Layout
+
+
+def information_edges(layout: Layout, knots: Knots, sides: Sequence[Sides]) -> np.ndarray:
+    """Pairs (h, 2) of nodes.
+
+    All knots about a time are linked, so that the inverse knows what is needed at any epoch, and
+    so are all that an observation sees.
+
+    Parameters
+    ----------
+    layout : Layout
+    knots : Knots
+    sides : sequence of Sides
+        Numbered as the knots are, and not in the order of elimination.
+    """
+    about = list(knots.cells.reshape(len(knots.cells), -1).T)
+    pairs = [_distinct(a, b) for a, b in combinations(about, 2)]
+    for part in sides:
+        groups = [[part.unknown]]
+        groups += [list(_visible(layout, knots, part, e)) for e in range(part.cell.shape[1])]
+        for left, right in combinations(groups, 2):
+            pairs += [_distinct(a, b) for a, b in product(left, right)]
+    return np.concatenate([np.zeros((0, 2), dtype=np.int64), *pairs])
+
+
+def _visible(layout, knots, sides, e):
+    """Nodes (n,) visible to side e of each observation, -1 for none: two for each signal."""
+    for s, d in enumerate(layout.states):
+        before, after = knots.cells[sides.cell[:, e], s].T
+        yield before
+        is_between = sides.gains[:, e, s, 1 : 2 * d].any(axis=1)  # not at the knot before
+        yield np.where(is_between, after, -1)
+
+
+def _distinct(a, b):
+    """Distinct pairs of nodes where both are some."""
+    is_pair = (a >= 0) & (b >= 0)
+    size = np.int64(1) << 32
+    codes = np.unique(a[is_pair] * size + b[is_pair])
+    return np.column_stack([codes // size, codes % size])

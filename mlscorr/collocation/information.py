@@ -1,0 +1,291 @@
+"""V of sparse rows in information form: linear in rows and knots, whatever epochs a row links.
+
+With H what the rows see of the states at knots (and of errors that they share), R their noise and
+L0 the information of the prior,
+
+    L = L0 + H^T R^-1 H,   V^-1 = R^-1 - R^-1 H L^-1 H^T R^-1,   |V| = |R| |L| / |L0|
+
+and S = A^T V^-1 A and the rest is least squares of the trend (``solve_trend``). L is factored in
+blocks; L^-1 is known where rows, and epochs between knots, need it, so sigmas, leave-one-out
+residuals and redundancy numbers are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
+
+import numpy as np
+
+from mlscorr.collocation.block_cholesky import factorise, invert_in_place, solve_in_place
+from mlscorr.collocation.graph import information_edges
+from mlscorr.collocation.interpolation import CHUNK, interpolate_knots, predictor_by
+from mlscorr.collocation.knots import Knots, add_prior, prior_roots
+from mlscorr.collocation.pattern import Pattern, diagonal
+from mlscorr.collocation.row_loops import (
+    add_information,
+    observe_states,
+    row_covariances,
+    send_to_states,
+)
+from mlscorr.collocation.sparse_rows import Sides, SparseRows
+from mlscorr.collocation.states import Layout
+
+LARGEST_ERROR = 0.01  # of the log-likelihood by rounding: parameters differ by more than that
+
+
+@dataclass(frozen=True)
+class InformationSolver:
+    """V of sparse rows by L.
+
+    Parameters
+    ----------
+    rows : tuple of SparseRows
+    layout : Layout
+    knots : Knots
+    pattern : Pattern
+    sides : tuple of Sides
+        Of each SparseRows, with nodes in the order of elimination.
+    """
+
+    rows: tuple[SparseRows, ...]
+    layout: Layout
+    knots: Knots
+    pattern: Pattern
+    sides: tuple[Sides, ...]
+
+    @classmethod
+    def of(
+        cls, rows: Sequence[SparseRows], like: InformationSolver | None = None
+    ) -> InformationSolver:
+        """The solver of rows; see ``collocate_rows``."""
+        signals = rows[0].signals
+        layout = Layout.of(signals)
+        if like is None:
+            times, clocks = zip(*(part.epochs for part in rows), strict=True)
+            covariances = [signal.covariance for signal in signals]
+            knots = Knots.of(np.concatenate(times), np.concatenate(clocks), covariances)
+        else:
+            knots = like.knots
+        processes = np.bincount(layout.signal, minlength=len(signals))
+        sizes, sides = np.repeat(processes * layout.states, np.diff(knots.first)), []
+        for part in rows:
+            sides.append(Sides.of(part, layout, knots, len(sizes)))
+            shared = np.full(len(part.noise.repeated), part.misclosure.shape[1])
+            sizes = np.concatenate([sizes, shared])
+        if like is None:
+            pattern = Pattern.of(sizes, information_edges(layout, knots, sides))
+        else:
+            pattern = like.pattern
+        placed = tuple(part.placed(pattern.place) for part in sides)
+        if like is not None:
+            _check_same(sizes, pattern, placed, like.sides)
+        return cls(tuple(rows), layout, knots, pattern, placed)
+
+    def reweighted(self, weights: Sequence[np.ndarray]) -> InformationSolver:
+        """The same with other weights; see ``reweight``."""
+        sides = []
+        for side, part, weight in zip(self.sides, self.rows, weights, strict=True):
+            if not (weight > 0).all():
+                raise ValueError(
+                    f"{np.sum(~(weight > 0))} of {len(weight)} weights are not positive. Leave "
+                    "these observations out, or give them a millionth."
+                )
+            sides.append(side.whitened(self.layout, part.noise.separate / weight[:, None, None]))
+        return replace(self, sides=tuple(sides))
+
+    def by_rows(self, columns: np.ndarray) -> list[np.ndarray]:
+        """Columns (m, c) in parts (n, r, c), one for each SparseRows.
+
+        Parameters
+        ----------
+        columns : (m, c) array
+        """
+        shapes = [part.sigma.shape for part in self.sides]
+        ends = np.cumsum([n * r for n, r in shapes])[:-1]
+        parts = zip(np.split(columns, ends), shapes, strict=True)
+        return [part.reshape(*shape, columns.shape[1]) for part, shape in parts]
+
+    def whiten(self, columns: np.ndarray) -> np.ndarray:
+        """Few rows, of which W^T W = c^T V^-1 c: residuals and steps of the prior, triangular."""
+        white = self._white(columns)
+        is_own = np.array_equal(columns, self.columns)
+        x = self._own_states if is_own else self._estimate(white)
+        parts = chain(self._residuals(white, x), self._prior_steps(x))
+        triangles = [np.linalg.qr(p.reshape(-1, columns.shape[1]), mode="r") for p in parts]
+        return np.asarray(np.linalg.qr(np.concatenate(triangles), mode="r"))
+
+    @property
+    def log_determinant(self) -> float:
+        """Of V."""
+        processes = np.bincount(self.layout.signal, minlength=len(self.layout.states))
+        roots = np.einsum("kii->ki", self._prior[0])
+        roots = np.log(np.where(roots > 0, roots, 1.0)).sum(axis=1)  # states that a signal has
+        total = np.log(diagonal(self.pattern, self._factor)).sum()
+        total -= roots @ np.repeat(processes, np.diff(self.knots.first))
+        total -= sum(np.log(np.einsum("nii->ni", part.white)).sum() for part in self.sides)
+        return float(2 * total)
+
+    def solve(self, columns: np.ndarray) -> np.ndarray:
+        """V^-1 c."""
+        if columns.shape[1] == 0:
+            return columns
+        white = self._white(columns)
+        residuals = self._residuals(white, self._estimate(white))
+        parts = zip(self.sides, residuals, strict=True)
+        weights = [side.white.swapaxes(1, 2) @ residual for side, residual in parts]
+        return np.concatenate([part.reshape(-1, part.shape[2]) for part in weights])
+
+    def precision(self, rows: np.ndarray) -> np.ndarray:
+        """A block of V^-1."""
+        unit = np.zeros((sum(part.sigma.size for part in self.sides), len(rows)))
+        unit[rows, np.arange(len(rows))] = 1.0
+        return self.solve(unit)[rows]
+
+    @cached_property
+    def blocks(self) -> list[np.ndarray]:
+        """Blocks (n, r, r) of V^-1 of each observation, for each SparseRows."""
+        blocks = []
+        for part in self.sides:
+            white = part.white
+            known = row_covariances(self.layout, self.pattern, self._cells, part, self._inverse)
+            blocks.append(white.swapaxes(1, 2) @ (np.eye(white.shape[1]) - known) @ white)
+        return blocks
+
+    def predictor(self, _: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
+        """The predictor of the rows' own columns, whatever is given; see Collocation.predict."""
+        states = self._own_states.copy()
+        states[:, -1] -= states[:, :-1] @ trend
+        table = self.layout, self.knots, self.pattern, self._cells, states, self._inverse
+        return predictor_by(
+            lambda epochs: interpolate_knots(*table, epochs), self.layout, trend, trend_root
+        )
+
+    @cached_property
+    def _cells(self):
+        """Knots.cells in the order of elimination."""
+        cells = self.knots.cells
+        return np.where(cells >= 0, self.pattern.place[cells], -1)
+
+    @cached_property
+    def _prior(self):
+        return prior_roots(self.layout, self.knots)
+
+    def information(self) -> np.ndarray:
+        """Values of L."""
+        values = self.pattern.zeros
+        add_prior(self.layout, self.knots, self.pattern, *self._prior, values)
+        for sides in self.sides:
+            add_information(self.layout, self.pattern, self._cells, sides, values)
+        return values
+
+    @cached_property
+    def _factor(self):
+        """Values of the factor of L."""
+        pattern, values = self.pattern, self.information()
+        before = diagonal(pattern, values)
+        state = factorise(pattern, values)
+        error = np.zeros(pattern.states)
+        if state >= 0:
+            error[state] = np.inf
+        else:
+            error = np.finfo(float).eps * before / diagonal(pattern, values) ** 2
+        if error.sum() > LARGEST_ERROR:
+            self._refuse(error)
+        return values
+
+    @cached_property
+    def _inverse(self):
+        """Values of the selected inverse of L, in the place of its factor.
+
+        Who needs both has the factor worked out again: it is most of the memory.
+        """
+        values, _ = self._factor, self._own_states
+        del self.__dict__["_factor"]
+        invert_in_place(self.pattern, values)
+        return values
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """Columns (m, p + 1) of the rows themselves, [A, l]."""
+        width = self.rows[0].design.shape[2] + 1
+        parts = [np.dstack([part.design, part.misclosure]) for part in self.rows]
+        return np.concatenate([part.reshape(-1, width) for part in parts])
+
+    @cached_property
+    def _own_states(self):
+        """States (n, p + 1) by these columns."""
+        return self._estimate(self._white(self.columns))
+
+    def _refuse(self, error):
+        """Say where knots stand too close, by the error of each state's pivot."""
+        place = np.searchsorted(self.pattern.first, np.argmax(error), side="right") - 1
+        node = np.flatnonzero(self.pattern.place == place)[0]
+        where = "of a shared error"
+        if node < len(self.knots.clock):
+            s = np.searchsorted(self.knots.first, node, side="right") - 1
+            signal, clock = self.rows[0].signals[s].covariance, self.knots.clock
+            step = clock[node] - clock[node - 1] if node > self.knots.first[s] else np.inf
+            where = (
+                f"of signal {s + 1} ({signal.family}, {signal.correlation_time:g} s) at a knot "
+                f"{step:.3g} s after the one before"
+            )
+        raise np.linalg.LinAlgError(
+            f"Rounding leaves the log-likelihood of {len(error)} states wrong by {error.sum():.1g} "
+            f"(limit {LARGEST_ERROR:g}), most by those {where}: a smooth signal's information "
+            "grows as the step to the power 1 - 2 d. These knots were taken from a solution with "
+            "shorter correlation times, or the noise is next to nothing beside the signals. Let "
+            "the solver place its own, and give each observation the sigma that it has."
+        )
+
+    def _white(self, columns):
+        """W c in parts (n, r, c)."""
+        parts = zip(self.sides, self.by_rows(columns), strict=True)
+        return [np.ascontiguousarray(side.white @ part) for side, part in parts]
+
+    def _estimate(self, white):
+        """L^-1 H^T R^-1 c (states, c) of columns W c."""
+        x = np.zeros((self.pattern.states, white[0].shape[2]))
+        for sides, part in zip(self.sides, white, strict=True):
+            send_to_states(self.layout, self.pattern, self._cells, sides, part, x)
+        solve_in_place(self.pattern, self._factor, x)
+        return x
+
+    def _residuals(self, white, x):
+        """W (c - H x)."""
+        for sides, part in zip(self.sides, white, strict=True):
+            yield part - observe_states(self.layout, self.pattern, self._cells, sides, x)
+
+    def _prior_steps(self, x):
+        """Steps of the states from knot to knot, whitened by their prior, and shared errors."""
+        first, place = self.knots.first, self.pattern.place
+        for s, d in enumerate(self.layout.states):
+            local = np.arange(d * np.sum(self.layout.signal == s))
+            for begin in range(first[s], first[s + 1], CHUNK):
+                knots = np.arange(begin, min(begin + CHUNK, first[s + 1]))
+                before = np.maximum(knots - 1, first[s])  # nothing is carried to the first
+                roots, carried = (part[knots, None, :d, :d] for part in self._prior)
+                here, there = (
+                    self.pattern.first[place[k]][:, None] + local for k in (knots, before)
+                )
+                shape = (len(knots), -1, d, x.shape[1])
+                yield roots @ x[here].reshape(shape) - carried @ x[there].reshape(shape)
+        is_shared = np.zeros(len(place), dtype=bool)
+        is_shared[place[first[-1] :]] = True
+        yield x[np.repeat(is_shared, np.diff(self.pattern.first))]
+
+
+def _check_same(sizes, pattern, sides, known):
+    """Refuse rows that see other states than those whose knots they should use."""
+    same = np.array_equal(sizes, np.diff(pattern.first)[pattern.place]) and len(sides) == len(known)
+    for here, there in zip(sides, known, strict=False):
+        same = same and np.array_equal(here.cell, there.cell)
+        same = same and np.array_equal(here.unknown, there.unknown)
+    if not same:
+        raise ValueError(
+            f"The {sum(len(part.cell) for part in sides)} observations see other epochs, shared "
+            "errors or states than those of the solution whose knots they should use. Leave "
+            "``like`` out."
+        )

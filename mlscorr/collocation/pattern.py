@@ -1,0 +1,182 @@
+"""Where the blocks of a sparse symmetric matrix and of its Cholesky factor stand.
+
+A matrix has a node for each block of rows, and an edge for each block that may hold something.
+Nodes are eliminated in an order of minimum degree, and all that depends on the edges alone is
+worked out once.
+
+Sources: George and Liu 1989, SIAM Review 31, 1-19 (minimum degree); Davis 2006, Direct Methods for
+Sparse Linear Systems, chapter 4 (fill).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.sparse import coo_array
+from scipy.sparse.linalg import splu
+
+
+class Pattern(NamedTuple):
+    """Where the blocks of a matrix, of its factor and of its inverse stand.
+
+    Nodes and states are in the order of elimination. A column's blocks are stacked in ``values``,
+    the one on the diagonal first, each row of a block after the other.
+
+    Parameters
+    ----------
+    place : (k,) int array
+        Of each node, as the caller numbers them, in the order of elimination.
+    first : (k + 1,) int array
+        State at which each node begins.
+    start : (k + 1,) int array
+        Where the panel of each column begins in values.
+    column : (k + 1,) int array
+        Where the nodes below the diagonal of each column begin in ``row``.
+    row, height : (l,) int array
+        These nodes, in order, and how many rows of the panel stand above each.
+    """
+
+    place: np.ndarray
+    first: np.ndarray
+    start: np.ndarray
+    column: np.ndarray
+    row: np.ndarray
+    height: np.ndarray
+
+    @classmethod
+    def of(cls, sizes: np.ndarray, edges: np.ndarray) -> Pattern:
+        """The pattern of a matrix.
+
+        Parameters
+        ----------
+        sizes : (k,) int array
+            Number of states of each node.
+        edges : (e, 2) int array
+            Pairs of nodes, in any order and more than once.
+        """
+        count = len(sizes)
+        place = _elimination_order(count, edges)
+        low, high = np.sort(place[edges].reshape(-1, 2), axis=1).T
+        graph = coo_array((np.ones(len(low)), (low, high)), shape=(count, count)).tocsr()
+        row, column = _fill_in(graph.indptr.astype(np.int64), graph.indices.astype(np.int64))
+        ordered = np.empty(count, dtype=np.int64)
+        ordered[place] = sizes
+        first = np.concatenate([[0], np.cumsum(ordered)])
+        above = np.concatenate([[0], np.cumsum(ordered[row])])
+        height = above[:-1] + np.repeat(ordered - above[column[:-1]], np.diff(column))
+        heights = ordered + above[column[1:]] - above[column[:-1]]
+        start = np.concatenate([[0], np.cumsum(heights * ordered)])
+        return cls(place, first, start, column, row, height)
+
+    @property
+    def states(self) -> int:
+        """Number of states."""
+        return int(self.first[-1])
+
+    @property
+    def zeros(self) -> np.ndarray:
+        """Values of a matrix without anything in it."""
+        return np.zeros(self.start[-1])
+
+
+def _elimination_order(count, edges):
+    """Place of each node; the factor that SuperLU makes of the graph to find it is thrown away."""
+    if count == 0:
+        return np.zeros(0, dtype=np.int64)
+    distinct = edges[edges[:, 0] != edges[:, 1]]
+    both = np.vstack([distinct, distinct[:, ::-1]]).T
+    graph = coo_array((np.full(both.shape[1], -1.0), tuple(both)), shape=(count, count)).tocsc()
+    graph.data[:] = -1.0
+    graph.setdiag(np.diff(graph.indptr) + 1.0)  # dominant: nothing is swapped
+    options = {"SymmetricMode": True}
+    factor = splu(graph.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return factor.perm_c.astype(np.int64)
+
+
+@njit(cache=True, nogil=True)
+def _fill_in(pointer, index):
+    """Nodes below the diagonal of each column of the factor, and where each column begins.
+
+    A column's nodes are those of the matrix and those of the columns whose first node it is.
+    """
+    count = pointer.size - 1
+    row = np.empty(4 * index.size + count, dtype=np.int64)
+    column = np.zeros(count + 1, dtype=np.int64)
+    child, sibling = np.full(count, -1), np.full(count, -1)
+    mark = np.full(count, -1)
+    end = 0
+    for j in range(count):
+        begin = end
+        if row.size - end < count - j:  # a column has no more nodes than follow it
+            larger = np.empty(2 * row.size + count, dtype=np.int64)
+            larger[:end] = row[:end]
+            row = larger
+        for k in range(pointer[j], pointer[j + 1]):
+            i = index[k]
+            if i > j and mark[i] != j:
+                mark[i] = j
+                row[end] = i
+                end += 1
+        c = child[j]
+        while c >= 0:
+            for k in range(column[c], column[c + 1]):
+                i = row[k]
+                if i > j and mark[i] != j:
+                    mark[i] = j
+                    row[end] = i
+                    end += 1
+            c = sibling[c]
+        column[j + 1] = end
+        row[begin:end].sort()
+        if end > begin:
+            parent = row[begin]
+            sibling[j], child[parent] = child[parent], j
+    return row[:end].copy(), column
+
+
+@njit(cache=True, nogil=True)
+def locate(pattern: Pattern, i: int, j: int) -> int:
+    """Where block (i, j) of the lower triangle begins in values.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    i, j : int
+
+    Returns
+    -------
+    position : int
+        -1 where there is no such block, or it stands above the diagonal.
+    """
+    if i <= j:
+        return pattern.start[j] if i == j else -1
+    low, end = pattern.column[j], pattern.column[j + 1]
+    high = end
+    while low < high:
+        middle = (low + high) // 2
+        if pattern.row[middle] < i:
+            low = middle + 1
+        else:
+            high = middle
+    if low == end or pattern.row[low] != i:
+        return -1
+    return pattern.start[j] + pattern.height[low] * (pattern.first[j + 1] - pattern.first[j])
+
+
+@njit(cache=True, nogil=True)
+def diagonal(pattern: Pattern, values: np.ndarray) -> np.ndarray:
+    """Diagonal of a matrix, or of a factor.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    values : (v,) array
+    """
+    out = np.empty(pattern.first[-1])
+    for j in range(pattern.start.size - 1):
+        b = pattern.first[j + 1] - pattern.first[j]
+        for a in range(b):
+            out[pattern.first[j] + a] = values[pattern.start[j] + a * (b + 1)]
+    return out

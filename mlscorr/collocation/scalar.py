@@ -1,0 +1,113 @@
+"""The Markov recursion for scalar observations, which keeps no states."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mlscorr.collocation.recursion import Recursion
+from mlscorr.collocation.states import carry
+
+
+@njit(cache=True, nogil=True)
+def whiten_columns(recursion: Recursion, columns: np.ndarray, out: np.ndarray) -> None:
+    """Whiten columns by the filter of scalar observations, without keeping its states.
+
+    Parameters
+    ----------
+    recursion : Recursion
+        Without the axis of observations: mixing (n, k), gains (n, d), whiteners (n,).
+    columns, out : (n, c) array
+    """
+    layout, transitions, mixing, gains, whiteners = recursion
+    n, c = columns.shape
+    x = np.zeros((gains.shape[1], c))
+    for i in range(n):
+        if i > 0:
+            carry(layout, transitions[i], x, False)
+        for b in range(c):
+            out[i, b] = columns[i, b]
+        for j in range(layout.first.size):
+            for b in range(c):
+                out[i, b] -= mixing[i, j] * x[layout.first[j], b]
+        for a in range(x.shape[0]):
+            for b in range(c):
+                x[a, b] += gains[i, a] * out[i, b]
+        for b in range(c):
+            out[i, b] *= whiteners[i]
+
+
+@njit(cache=True, nogil=True)
+def colour_columns(recursion: Recursion, columns: np.ndarray, out: np.ndarray) -> None:
+    """Give white columns the covariance V0: the inverse of whiten_columns.
+
+    Parameters
+    ----------
+    recursion : Recursion
+        Without the axis of observations: mixing (n, k), gains (n, d), whiteners (n,).
+    columns, out : (n, c) array
+    """
+    layout, transitions, mixing, gains, whiteners = recursion
+    n, c = columns.shape
+    x = np.zeros((gains.shape[1], c))
+    for i in range(n):
+        if i > 0:
+            carry(layout, transitions[i], x, False)
+        for b in range(c):
+            out[i, b] = columns[i, b] / whiteners[i]
+        for a in range(x.shape[0]):
+            for b in range(c):
+                x[a, b] += gains[i, a] * columns[i, b] / whiteners[i]
+        for j in range(layout.first.size):
+            for b in range(c):  # x is the updated state: what the gain added is not predicted
+                gain = gains[i, layout.first[j]] * columns[i, b] / whiteners[i]
+                out[i, b] += mixing[i, j] * (x[layout.first[j], b] - gain)
+
+
+@njit(cache=True, nogil=True)
+def common_innovations(shared: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Innovations where observations have unit errors in common.
+
+    Recursive least squares: the errors are estimated from all earlier observations.
+
+    Parameters
+    ----------
+    shared : (n, c) array
+        By which the errors enter white observations.
+    columns : (n, k) array
+        White but for these errors.
+
+    Returns
+    -------
+    innovations : (n, k) array
+    growth : (n,) array
+        Of their sigma by what isn't known of the errors.
+    """
+    n, k = columns.shape
+    c = shared.shape[1]
+    p = np.eye(c)
+    x = np.zeros((c, k))
+    u = np.empty((n, k))
+    growth = np.empty(n)
+    for i in range(n):
+        known = np.flatnonzero(shared[i])
+        gain = np.zeros(c)
+        for a in known:
+            for b in range(c):
+                gain[b] += shared[i, a] * p[a, b]
+        s = 1.0
+        for a in known:
+            s += shared[i, a] * gain[a]
+        growth[i] = np.sqrt(s)
+        touched = np.flatnonzero(gain)
+        for b in range(k):
+            v = columns[i, b]
+            for a in known:
+                v -= shared[i, a] * x[a, b]
+            u[i, b] = v / growth[i]
+            for a in touched:
+                x[a, b] += gain[a] * v / s
+        for a in touched:
+            for b in touched:
+                p[a, b] -= gain[a] * gain[b] / s
+    return u, growth

@@ -1,0 +1,247 @@
+"""Whitening: V of scalar observations factored once, for thousands of columns a second.
+
+V = V0 + U U^T with V0 of Markov signals and separate noise and U the errors that observations have
+in common. The recursion is that of ``collocate``, without keeping states and their covariances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from mlscorr.collocation.model import NOT_POSITIVE, Signal, signal_clocks
+from mlscorr.collocation.recursion import Recursion, filter_covariance
+from mlscorr.collocation.scalar import colour_columns, common_innovations, whiten_columns
+from mlscorr.collocation.states import Layout
+
+CHUNK = 64  # columns filtered at once: their states stay in the first cache
+
+
+@dataclass(frozen=True)
+class Whitened:
+    """Columns c, whitened: those by V0, less what the errors in common explain of them.
+
+    Parameters
+    ----------
+    separate : (n, k) array
+    shared : (c, k) array
+    """
+
+    separate: np.ndarray
+    shared: np.ndarray
+
+    def __getitem__(self, columns: slice | np.ndarray) -> Whitened:
+        return Whitened(self.separate[:, columns], self.shared[:, columns])
+
+    def product(self, other: Whitened) -> np.ndarray:
+        """a^T V^-1 b of two sets of columns: (k, l)."""
+        return self.separate.T @ other.separate - self.shared.T @ other.shared
+
+    @property
+    def squares(self) -> np.ndarray:
+        """c^T V^-1 c of each column: (k,)."""
+        return (self.separate**2).sum(axis=0) - (self.shared**2).sum(axis=0)
+
+    def blocks(self, index: np.ndarray) -> np.ndarray:
+        """Products within blocks of columns: (h, p, p).
+
+        Parameters
+        ----------
+        index : (h, p) int array
+            Numbers of the columns of each block.
+        """
+        separate, shared = (v[:, index].transpose(1, 2, 0) for v in (self.separate, self.shared))
+        return separate @ separate.swapaxes(1, 2) - shared @ shared.swapaxes(1, 2)
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """The factor of V of n scalar observations in the order of time, made by ``factor``.
+
+    Parameters
+    ----------
+    recursion : Recursion
+        Of V0, without the axis of observations: gains (n, d), whiteners (n,).
+    common : (n, c) array
+        U: errors of unit variance that observations have in common.
+    """
+
+    recursion: Recursion
+    common: np.ndarray
+
+    def with_common(self, common: np.ndarray) -> Whitener:
+        """The same V0 with other errors in common: nothing is factored again but these.
+
+        Parameters
+        ----------
+        common : (n, c) array
+        """
+        return replace(self, common=common)
+
+    def whiten(self, columns: np.ndarray) -> Whitened:
+        """Columns c as Whitened: their products are c^T V^-1 c.
+
+        Parameters
+        ----------
+        columns : (n, k) array
+        """
+        separate = self._filter(columns)
+        if not self.common.shape[1]:
+            return Whitened(separate, np.zeros((0, columns.shape[1])))
+        common, root = self._common
+        return Whitened(separate, solve_triangular(root, common.T @ separate, lower=True))
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """Of V."""
+        total = -2 * np.log(self.recursion.whiteners).sum()
+        if self.common.shape[1]:
+            total += 2 * np.log(np.diag(self._common[1])).sum()
+        return float(total)
+
+    def log_likelihood(self, columns: np.ndarray | Whitened) -> np.ndarray:
+        """Of columns with covariance V, without the constant of 2 pi: (k,).
+
+        Parameters
+        ----------
+        columns : (n, k) array or Whitened
+        """
+        white = columns if isinstance(columns, Whitened) else self.whiten(columns)
+        return -0.5 * (white.squares + self.log_determinant)
+
+    def innovations(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Each observation less its prediction by all earlier ones, over its sigma.
+
+        Parameters
+        ----------
+        columns : (n, k) array
+
+        Returns
+        -------
+        innovations : (n, k) array
+            Of unit variance.
+        sigma : (n,) array
+        """
+        filtered, sigma = self._filter(columns), 1.0 / self.recursion.whiteners
+        if not self.common.shape[1]:
+            return filtered, sigma
+        innovations, growth = common_innovations(self._filter(self.common), filtered)
+        return innovations, sigma * growth
+
+    def solve(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """V^-1 c, and the diagonal of V^-1.
+
+        Parameters
+        ----------
+        columns : (n, k) array
+
+        Returns
+        -------
+        weights : (n, k) array
+        precision : (n,) array
+        """
+        n = len(self.common)
+        white, weights, precision = self.whiten(columns), np.empty(columns.shape), np.empty(n)
+        for start in range(0, n, CHUNK):
+            part = slice(start, start + CHUNK)
+            unit = self.whiten(np.eye(n, len(range(n)[part]), -start))
+            weights[part], precision[part] = unit.product(white), unit.squares
+        return weights, precision
+
+    def draw(
+        self, rng: np.random.Generator, number: int, tails: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Random columns of covariance V.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+        number : int
+        tails : (q,) array, optional
+            Innovations whose distribution theirs should have, scaled to unit variance; normal by
+            default.
+
+        Returns
+        -------
+        columns : (n, number) array
+        """
+        noise = rng.standard_normal((len(self.common), number))
+        if tails is not None:
+            noise = rng.choice(tails / np.sqrt(np.mean(tails**2)), noise.shape)
+        values = np.empty_like(noise)
+        colour_columns(self.recursion, noise, values)
+        return values + self.common @ rng.standard_normal((self.common.shape[1], number))
+
+    def _filter(self, columns):
+        out = np.empty(columns.shape)
+        for start in range(0, columns.shape[1], CHUNK):
+            part = slice(start, start + CHUNK)
+            chunk = np.ascontiguousarray(columns[:, part], dtype=float)
+            white = np.empty_like(chunk)
+            whiten_columns(self.recursion, chunk, white)
+            out[:, part] = white
+        return out
+
+    @cached_property
+    def _common(self):
+        """W U, and the root of I + (W U)^T W U, with W the whitener of V0."""
+        filtered = self._filter(self.common)
+        return filtered, np.linalg.cholesky(filtered.T @ filtered + np.eye(filtered.shape[1]))
+
+
+def factor(
+    gps_time: np.ndarray,
+    signals: Sequence[Signal],
+    variance: np.ndarray,
+    common: np.ndarray | None = None,
+) -> Whitener:
+    """Factor V of scalar observations (Mao et al. 2015, Eq. 14: B D B^T + N).
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        In order. Units: s.
+    signals : sequence of Signal
+        With mixings (n, 1, k).
+    variance : (n,) array
+        Of each observation's own noise.
+    common : (n, c) array, optional
+        Errors of unit variance that observations have in common.
+
+    Returns
+    -------
+    whitener : Whitener
+
+    Raises
+    ------
+    ValueError
+        Where times are out of order, or V is not positive definite.
+
+    >>> from mlscorr.collocation.covariance import Covariance
+    >>> time = np.array([0.0, 1.0, 2.0])
+    >>> drift = Signal(np.ones((3, 1, 1)), Covariance("exponential", 10.0))
+    >>> factor(time, [drift], np.full(3, 0.01)).whiten(np.ones((3, 1))).squares.round(3)
+    array([1.095])
+    """
+    n = len(gps_time)
+    step = np.diff(gps_time, prepend=gps_time[:1])
+    if (step < 0).any():
+        raise ValueError(
+            f"{(step < 0).sum()} of {n} observations are earlier than the one before: the "
+            "recursion takes them in the order of time."
+        )
+    layout = Layout.of(signals)
+    mixing = np.concatenate([np.zeros((n, 1, 0)), *(s.mixing for s in signals)], axis=2)
+    clocks = signal_clocks(signals, np.asarray(gps_time, dtype=float))
+    steps = np.diff(clocks, prepend=clocks[:1], axis=0)
+    transitions, gains, whiteners, _ = filter_covariance(
+        layout, layout.size, steps, mixing, np.asarray(variance, dtype=float)[:, None, None]
+    )
+    if np.isnan(whiteners).any():
+        raise ValueError(NOT_POSITIVE.format(n))
+    recursion = Recursion(layout, transitions, mixing[:, 0], gains[:, 0], whiteners[:, 0, 0])
+    return Whitener(recursion, np.zeros((n, 0)) if common is None else common)
