@@ -2,10 +2,12 @@
 
 The first kind moves the cloud as one body and knows nothing of time: shift, transformation, rigid,
 affine and, in ``mlscorr.baselines.registration``, ICP. The second kind follows time: a polynomial
-per axis, and the collocation as Mao et al. 2015 printed it.
+per axis, interpolation between control points, a Gaussian process, and the collocation as Mao et
+al. 2015 printed it.
 """
 
-from mlscorr.baselines.geometry import Undetermined
+from mlscorr.baselines.interpolation import fit_gaussian_process, fit_linear, fit_pchip
+from mlscorr.baselines.pairs import Undetermined
 from mlscorr.baselines.polynomial import fit_literal, fit_polynomial
 from mlscorr.baselines.transformation import (
     RAW,
@@ -15,15 +17,3 @@ from mlscorr.baselines.transformation import (
     fit_rigid,
     fit_shift,
 )
-
-__all__ = [
-    "RAW",
-    "Transformation",
-    "Undetermined",
-    "fit_affine",
-    "fit_horizontal_and_height",
-    "fit_literal",
-    "fit_polynomial",
-    "fit_rigid",
-    "fit_shift",
-]

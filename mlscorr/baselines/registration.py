@@ -7,15 +7,10 @@ import numpy as np
 import open3d
 from scipy.spatial import cKDTree
 
-from mlscorr.baselines.geometry import Pairs
+from mlscorr.baselines.pairs import CentredPairs
+from mlscorr.baselines.settings import SETTINGS
 from mlscorr.baselines.transformation import Transformation
-
-PLANE_TOLERANCE = 0.03  # m: several sigmas of range noise, less than a board's frame stands out
-SPACING = 0.02  # m between the points of a surveyed surface, and of the targets' thinned points
-INLIER = 0.05  # m from a surveyed surface: beyond it a corrected target is still wrong
-POOR = 0.5  # share of inliers below which no rigid motion fits the targets
-ITERATIONS = 200
-NOISE = 0.001  # m of control RMSE that are no worsening
+from mlscorr.survey import Matched, PointCloud
 
 
 @dataclass(frozen=True)
@@ -41,7 +36,7 @@ class Registration(Transformation):
     control_after: float = field(kw_only=True)
 
 
-def fit_icp(observations, control, cloud, pass_number):
+def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Registration:
     """Rigid motion by iterative closest points, of the targets' points to the surveyed surfaces.
 
     Point-to-point first, then point-to-plane from there; the one with the more inliers is taken.
@@ -51,102 +46,107 @@ def fit_icp(observations, control, cloud, pass_number):
 
     Parameters
     ----------
-    observations : TargetObservations
-        Each with the name of a control point.
-    control : ControlPoints
+    matched : Matched
+        Observed control points.
     cloud : PointCloud
         Points near the targets.
     pass_number : (n,) int array
         Pass of each point.
 
-    Returns a Registration, and warns where few points fit or the control points fit worse than
-    before. Raises Undetermined for fewer than 3 targets, or targets on one line.
+    Returns
+    -------
+    Registration
+        Warns where few points fit or the control points fit worse than before.
+
+    Raises
+    ------
+    Undetermined
+        For fewer than 3 targets, or targets on one line.
     """
-    pairs = Pairs.of(observations, control)
+    pairs = CentredPairs.of(matched)
     pairs.require(2, 3, "The 6 parameters of ICP")
-    source, surface = _surfaces(observations, control, cloud, pass_number, pairs.origin)
+    source, surface = _surfaces(matched, cloud, pass_number, pairs.origin)
     misclosure = np.linalg.norm(pairs.misclosure, axis=1)
-    reach = max(2.0 * float(misclosure.max()), 2.0 * INLIER)
-    point = _register(source, surface, reach, np.eye(4), "PointToPoint")
-    plane = _register(source, surface, reach, point, "PointToPlane")
-    scored = [
-        (name, matrix, open3d.pipelines.registration.evaluate_registration(
-            source, surface, INLIER, matrix))
-        for name, matrix in (("point-to-point", point), ("point-to-plane", plane))
-    ]  # fmt: skip
-    name, matrix, score = max(scored, key=lambda one: (one[2].fitness, -one[2].inlier_rmse))
+    largest = 2.0 * max(float(misclosure.max()), SETTINGS.inlier)
+    point = _register(source, surface, largest, np.eye(4), "PointToPoint")
+    plane = _register(source, surface, largest, point, "PointToPlane")
+    motions = {"point-to-point": point, "point-to-plane": plane}
+    evaluate = open3d.pipelines.registration.evaluate_registration
+    scores = {name: evaluate(source, surface, SETTINGS.inlier, m) for name, m in motions.items()}
+    variant = max(scores, key=lambda name: (scores[name].fitness, -scores[name].inlier_rmse))
+    matrix, score = motions[variant], scores[variant]
     change = matrix[:3, :3] - np.eye(3)
     remaining = pairs.misclosure - matrix[:3, 3] - pairs.observed @ change.T
-    found = Registration(
+    registration = Registration(
         pairs.origin,
         matrix[:3, 3].copy(),
         change,
-        variant=name,
+        variant=variant,
         fitness=float(score.fitness),
         inlier_rmse=float(score.inlier_rmse),
         control_before=float(np.sqrt(np.mean(misclosure**2))),
         control_after=float(np.sqrt(np.mean(np.sum(remaining**2, axis=1)))),
     )
-    _warn(found)
-    return found
+    _warn(registration)
+    return registration
 
 
-def _warn(found):
+def _warn(registration):
     """Say aloud what makes the registration doubtful."""
-    if found.fitness < POOR:
+    variant, fitness = registration.variant, registration.fitness
+    if fitness < SETTINGS.poor_fitness:
         warnings.warn(
-            f"ICP ({found.variant}) brings only {100 * found.fitness:.0f} % of the targets' points "
-            f"within {INLIER} m of the surveyed surfaces (inlier RMSE {found.inlier_rmse:.4f} m): "
-            "no rigid motion fits them.",
+            f"ICP ({variant}) brings only {100 * fitness:.0f} % of the targets' points within "
+            f"{SETTINGS.inlier} m of the surveyed surfaces (inlier RMSE "
+            f"{registration.inlier_rmse:.4f} m): no rigid motion fits them.",
             stacklevel=3,
         )
-    if found.control_after > found.control_before + NOISE:
+    if registration.control_after > registration.control_before + SETTINGS.worsening:
         warnings.warn(
-            f"ICP ({found.variant}) moved the cloud away from control: 3D RMSE "
-            f"{found.control_before:.4f} m before, {found.control_after:.4f} m after "
-            f"(fitness {found.fitness:.2f}, inlier RMSE {found.inlier_rmse:.4f} m).",
+            f"ICP ({variant}) moved the cloud away from control: 3D RMSE "
+            f"{registration.control_before:.4f} m before, {registration.control_after:.4f} m "
+            f"after (fitness {fitness:.2f}, inlier RMSE {registration.inlier_rmse:.4f} m).",
             stacklevel=3,
         )
 
 
-def _register(source, surface, reach, start, estimation):
-    """The 4 x 4 matrix of one ICP."""
+def _register(source, surface, largest, start, estimation):
+    """The 4 x 4 matrix of one ICP; points farther than the largest distance are no partners."""
     icp = open3d.pipelines.registration
-    found = icp.registration_icp(
+    return icp.registration_icp(
         source,
         surface,
-        reach,
+        largest,
         start,
         getattr(icp, f"TransformationEstimation{estimation}")(),
-        icp.ICPConvergenceCriteria(max_iteration=ITERATIONS),
-    )
-    return found.transformation
+        icp.ICPConvergenceCriteria(max_iteration=SETTINGS.iterations),
+    ).transformation
 
 
-def _surfaces(observations, control, cloud, pass_number, origin):
+def _surfaces(matched, cloud, pass_number, origin):
     """The targets' points and the surveyed surfaces about the origin, as Open3D clouds."""
     tree = cKDTree(cloud.xyz)
     source, surface, normals = [], [], []
-    for i, name in enumerate(observations.name):
-        row = control.name.index(name)
+    observations, surveyed = matched.observations, matched.surveyed
+    for i in range(len(matched)):
         axes = _axes(observations.normal[i])
         local = _points_on(observations, i, axes, tree, cloud, pass_number)
         source.append(local @ axes[:2] + observations.position[i] - origin)
-        surveyed = control.normal[row]
-        if np.isfinite(surveyed).all():
-            axes = _axes(surveyed * np.sign(surveyed @ axes[2] or 1.0))
-        grid = _outline(control.kind[row], control.size[row], local)
-        surface.append(grid @ axes[:2] + control.position[row] - origin)
+        facing = surveyed.normal[i]
+        if np.isfinite(facing).all():
+            axes = _axes(facing * np.sign(facing @ axes[2] or 1.0))
+        grid = _outline(surveyed.kind[i], surveyed.size[i], local)
+        surface.append(grid @ axes[:2] + surveyed.position[i] - origin)
         normals.append(np.tile(axes[2], (len(grid), 1)))
-    return _as_open3d(source).voxel_down_sample(SPACING), _as_open3d(surface, normals)
+    return _as_open3d(source).voxel_down_sample(SETTINGS.spacing), _as_open3d(surface, normals)
 
 
 def _as_open3d(points, normals=None):
-    made = open3d.geometry.PointCloud()
-    made.points = open3d.utility.Vector3dVector(np.vstack(points))
+    cloud = open3d.geometry.PointCloud()
+    cloud.points = open3d.utility.Vector3dVector(np.vstack(points))
     if normals is not None:
-        made.normals = open3d.utility.Vector3dVector(np.vstack(normals))
-    return made
+        cloud.normals = open3d.utility.Vector3dVector(np.vstack(normals))
+    return cloud
 
 
 def _axes(normal):
@@ -159,11 +159,11 @@ def _axes(normal):
 def _points_on(observations, i, axes, tree, cloud, pass_number):
     """Bright points (n, 2) of one target in its plane, about its observed centre. Units: m."""
     size = observations.size[i]
-    reach = size / 2 if observations.kind[i] == "circle" else size / np.sqrt(2)
-    rows = np.array(tree.query_ball_point(observations.position[i], reach), dtype=int)
+    radius = size / 2 if observations.kind[i] == "circle" else size / np.sqrt(2)
+    rows = np.array(tree.query_ball_point(observations.position[i], radius), dtype=int)
     rows = np.sort(rows[pass_number[rows] == observations.pass_number[i]])
     local = (cloud.xyz[rows] - observations.position[i]) @ axes.T
-    on_plane = np.abs(local[:, 2]) < PLANE_TOLERANCE
+    on_plane = np.abs(local[:, 2]) < SETTINGS.plane_tolerance
     local, intensity = local[on_plane, :2], cloud.intensity[rows[on_plane]]
     core = np.linalg.norm(local, axis=1) < size / 3  # inside of any outline
     bright = np.median(intensity[core]) if core.any() else 0.0
@@ -172,7 +172,7 @@ def _points_on(observations, i, axes, tree, cloud, pass_number):
 
 def _outline(kind, size, local):
     """Grid (n, 2) over a disc, or over a plate that is turned as the target's points are."""
-    half = np.arange(0.0, size / 2 + 1e-9, SPACING)
+    half = np.arange(0.0, size / 2 + 1e-9, SETTINGS.spacing)
     line = np.concatenate([-half[:0:-1], half])
     grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
     if kind == "circle":

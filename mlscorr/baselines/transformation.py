@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlscorr.baselines.geometry import Pairs, Undetermined
+from mlscorr.baselines.pairs import CentredPairs, Undetermined
+from mlscorr.survey import Matched, PointCloud
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Transformation:
     shift: np.ndarray
     change: np.ndarray
 
-    def apply(self, cloud):
+    def apply(self, cloud: PointCloud) -> PointCloud:
         """The PointCloud, transformed."""
         increments = self.shift + (cloud.xyz - self.origin) @ self.change.T
         return replace(cloud, xyz=cloud.xyz + increments)
@@ -44,54 +45,68 @@ class Transformation:
 RAW = Transformation(np.zeros(3), np.zeros(3), np.zeros((3, 3)))  # the cloud as it was recorded
 
 
-def fit_shift(observations, control):
+def fit_shift(matched: Matched) -> Transformation:
     """Transformation by the weighted mean misclosure: 3 parameters.
 
     Parameters
     ----------
-    observations : TargetObservations
-        Each with the name of a control point.
-    control : ControlPoints
+    matched : Matched
+        Observed control points.
     """
-    pairs = Pairs.of(observations, control)
+    pairs = CentredPairs.of(matched)
     return Transformation(pairs.origin, pairs.mean, np.zeros((3, 3)))
 
 
-def fit_horizontal_and_height(observations, control):
+def fit_horizontal_and_height(matched: Matched) -> Transformation:
     """Transformation with plan and height solved apart (Mao et al. 2015, section 3.1.5).
 
     The paper tells only that the two are solved individually. Here, as is usual, the plan has the
     4 parameters of a similarity (shift, turn, scale), and the height 3 of an inclined plane, or a
     mean shift alone where fewer than 4 targets, or targets on a line, would have to incline it.
 
-    Raises Undetermined where the targets do not lie apart in plan.
+    Parameters
+    ----------
+    matched : Matched
+
+    Raises
+    ------
+    Undetermined
+        Where the targets do not lie apart in plan.
     """
-    pairs = Pairs.of(observations, control)
+    pairs = CentredPairs.of(matched)
     pairs.require(1, 2, "The 4 parameters in plan", axes=2)
     root = np.sqrt(pairs.weight)
     change = np.zeros((3, 3))
     east, north, _ = (root * pairs.observed).T
-    wanted = root * (pairs.misclosure - pairs.mean)
+    misclosure = root * (pairs.misclosure - pairs.mean)
     # scale - 1 = a and turn b: dE = a E - b N, dN = b E + a N
     design = np.vstack([np.column_stack([east, -north]), np.column_stack([north, east])])
-    a, b = np.linalg.lstsq(design, wanted[:, :2].T.ravel(), rcond=None)[0]
+    a, b = np.linalg.lstsq(design, misclosure[:, :2].T.ravel(), rcond=None)[0]
     change[:2, :2] = [[a, -b], [b, a]]
     try:
         pairs.require(2, 4, "The inclination of the height", axes=2)
     except Undetermined:
         return Transformation(pairs.origin, pairs.mean, change)
     plan = root * pairs.observed[:, :2]
-    change[2, :2] = np.linalg.lstsq(plan, wanted[:, 2], rcond=None)[0]
+    change[2, :2] = np.linalg.lstsq(plan, misclosure[:, 2], rcond=None)[0]
     return Transformation(pairs.origin, pairs.mean, change)
 
 
-def fit_rigid(observations, control):
+def fit_rigid(matched: Matched) -> Transformation:
     """Rigid motion: 6 parameters (Helmert without scale), by the singular value decomposition.
 
     Source: Arun, Huang and Blostein 1987, IEEE Trans. PAMI 9, 698-700, with Kabsch's sign.
-    Raises Undetermined for fewer than 3 targets, or targets on one line.
+
+    Parameters
+    ----------
+    matched : Matched
+
+    Raises
+    ------
+    Undetermined
+        For fewer than 3 targets, or targets on one line.
     """
-    pairs = Pairs.of(observations, control)
+    pairs = CentredPairs.of(matched)
     pairs.require(2, 3, "The 6 parameters of a rigid motion")
     surveyed = pairs.observed + pairs.misclosure - pairs.mean
     left, _, right = np.linalg.svd((pairs.weight * pairs.observed).T @ surveyed)
@@ -100,14 +115,21 @@ def fit_rigid(observations, control):
     return Transformation(pairs.origin, pairs.mean, rotation - np.eye(3))
 
 
-def fit_affine(observations, control):
+def fit_affine(matched: Matched) -> Transformation:
     """Affine transformation: 12 parameters.
 
-    Raises Undetermined for fewer than 4 targets, or targets on one plane.
+    Parameters
+    ----------
+    matched : Matched
+
+    Raises
+    ------
+    Undetermined
+        For fewer than 4 targets, or targets on one plane.
     """
-    pairs = Pairs.of(observations, control)
+    pairs = CentredPairs.of(matched)
     pairs.require(3, 4, "The 12 parameters of an affine transformation")
     root = np.sqrt(pairs.weight)
-    wanted = root * (pairs.misclosure - pairs.mean)
-    change = np.linalg.lstsq(root * pairs.observed, wanted, rcond=None)[0].T
+    misclosure = root * (pairs.misclosure - pairs.mean)
+    change = np.linalg.lstsq(root * pairs.observed, misclosure, rcond=None)[0].T
     return Transformation(pairs.origin, pairs.mean, change)

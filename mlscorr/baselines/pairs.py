@@ -1,0 +1,107 @@
+"""Pairs of observed and surveyed places, and whether they determine what is asked of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.baselines.settings import SETTINGS
+from mlscorr.survey import Matched
+
+SHAPES = ("point", "line", "plane")  # that targets must not all lie on, by dimensions less one
+
+
+class Undetermined(ValueError):
+    """The control points can't determine a method's parameters; the sentence tells why."""
+
+
+@dataclass(frozen=True)
+class CentredPairs:
+    """Observed and surveyed places about an origin.
+
+    Parameters
+    ----------
+    origin : (3,) array
+        Units: m.
+    observed, misclosure : (n, 3) array
+        Place about the origin, and surveyed - observed. Units: m.
+    sigma : (n,) array
+        Of each pair. Units: m.
+    targets : int
+        How many different targets they are; passes over one add none.
+    """
+
+    origin: np.ndarray
+    observed: np.ndarray
+    misclosure: np.ndarray
+    sigma: np.ndarray
+    targets: int
+
+    @classmethod
+    def of(cls, matched: Matched) -> CentredPairs:
+        """The pairs of matched observations, about their weighted mean."""
+        observations, variance = matched.observations, np.mean(matched.variance, axis=1)
+        weight = 1.0 / variance
+        start = np.round(observations.position[0])  # keeps the digits of the mean
+        origin = start + np.average(observations.position - start, axis=0, weights=weight)
+        return cls(
+            origin=origin,
+            observed=observations.position - origin,
+            misclosure=matched.misclosure,
+            sigma=np.sqrt(variance),
+            targets=len(set(matched.name)),
+        )
+
+    @property
+    def weight(self) -> np.ndarray:
+        """Weights (n, 1) of sum one."""
+        weight = 1.0 / self.sigma**2
+        return (weight / weight.sum())[:, None]
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Weighted mean misclosure (3,). Units: m."""
+        return np.sum(self.weight * self.misclosure, axis=0)
+
+    def require(self, dimensions: int, smallest: int, parameters: str, axes: int = 3) -> None:
+        """Refuse places that don't fill so many dimensions.
+
+        Parameters
+        ----------
+        dimensions : int
+            1: they are apart; 2: not on one line; 3: not on one plane.
+        smallest : int
+            Number of targets.
+        parameters : str
+            What they shall determine, for the sentence.
+        axes : int
+            How many of the first axes count.
+
+        Raises
+        ------
+        Undetermined
+        """
+        shape = SHAPES[dimensions - 1]
+        if self.targets < smallest:
+            raise Undetermined(
+                f"{parameters} need at least {smallest} control points in the cloud that do not "
+                f"lie on one {shape}; there {'is' if self.targets == 1 else 'are'} {self.targets}."
+            )
+        spread = self.spread(axes)[dimensions - 1]
+        sigma, digits = float(np.median(self.sigma)), 1e-9 * float(np.abs(self.origin).max())
+        least = max(SETTINGS.clear_spread * sigma, digits)
+        if spread < least:
+            raise Undetermined(
+                f"{parameters} are not determined: the {self.targets} control points lie on one "
+                f"{shape}, from which they differ by {spread:.4f} m (RMS); {least:.4f} m would be "
+                f"needed, {SETTINGS.clear_spread:.0f} times the sigma of a misclosure."
+            )
+
+    def spread(self, axes: int = 3) -> np.ndarray:
+        """RMS extents of the places along their principal axes, longest first. Units: m."""
+        extents = np.zeros(axes)
+        weighted = np.sqrt(self.weight) * self.observed[:, :axes]
+        singular = np.linalg.svd(weighted, compute_uv=False)
+        extents[: len(singular)] = singular
+        return extents

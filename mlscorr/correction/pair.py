@@ -1,0 +1,202 @@
+"""The pair recorded -> corrected of trajectory and mounting, and what follows for points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.correction.kernel import fill_increments, move_integers
+from mlscorr.frames import angle_sigma
+from mlscorr.survey import Mounting, PointCloud, Trajectory
+
+
+@dataclass(frozen=True)
+class Correction:
+    """The pair recorded -> corrected of trajectory and mounting, applied to points by their time.
+
+    With T, R the recorded pose, T', R' the corrected one, and a mounting that turns by
+    C = R_L^P' (R_L^P)^T, Eq. 1 backward and forward again gives
+
+        x' = x + shift(t) + turn(t) (x - T(t))
+        turn = R' C R^T - I,  shift = T' - T + R' (T_L^P' - C T_L^P)
+
+    Both are small and smooth, so they, not the poses, are interpolated between epochs.
+
+    Parameters
+    ----------
+    recorded, corrected : Trajectory
+        Of the same n epochs.
+    recorded_mounting, corrected_mounting : Mounting, optional
+        Without both, the mounting stays as it is, and cancels.
+    covariance : (n, 6, 6) array, optional
+        Of the corrected position (m) and of a small rotation about the map axes (rad).
+
+    Raises
+    ------
+    ValueError
+        When the two trajectories have different epochs.
+    """
+
+    recorded: Trajectory
+    corrected: Trajectory
+    recorded_mounting: Mounting | None = None
+    corrected_mounting: Mounting | None = None
+    covariance: np.ndarray | None = None
+
+    def __post_init__(self):
+        if not np.array_equal(self.recorded.gps_time, self.corrected.gps_time):
+            raise ValueError("Recorded and corrected trajectory must have the same epochs.")
+
+    @classmethod
+    def by_pose_error(
+        cls,
+        trajectory: Trajectory,
+        pose: np.ndarray,
+        covariance: np.ndarray | None = None,
+        recorded_mounting: Mounting | None = None,
+        corrected_mounting: Mounting | None = None,
+    ) -> Correction:
+        """The correction that takes a POS error away, and a mounting's if both are given.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            As recorded.
+        pose : (n, 6) array
+            What must be added: position in m, a rotation about the map axes in rad.
+        covariance : (n, 6, 6) array, optional
+            Of the pose; becomes the sigmas of the corrected trajectory, which has none without.
+        recorded_mounting, corrected_mounting : Mounting, optional
+        """
+        position_sigma = attitude_sigma = None
+        if covariance is not None:
+            variance = np.maximum(np.einsum("qii->qi", covariance), 0.0)
+            position_sigma = np.sqrt(variance[:, :3])
+            attitude_sigma = angle_sigma(trajectory.attitude, covariance[:, 3:, 3:])
+        corrected = replace(
+            trajectory,
+            position=trajectory.position + pose[:, :3],
+            attitude=Rotation.from_rotvec(pose[:, 3:]) * trajectory.attitude,
+            position_sigma=position_sigma,
+            attitude_sigma=attitude_sigma,
+        )
+        return cls(trajectory, corrected, recorded_mounting, corrected_mounting, covariance)
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """Per epoch (n, 15): T - origin, shift, and turn row by row; float64."""
+        old, new = self.recorded, self.corrected
+        turned = new.attitude
+        shift = new.position - old.position
+        if self.recorded_mounting is not None and self.corrected_mounting is not None:
+            before, after = self.recorded_mounting, self.corrected_mounting
+            change = after.boresight * before.boresight.inv()
+            turned = turned * change
+            shift += new.attitude.apply(after.lever_arm - change.apply(before.lever_arm))
+        turn = (turned * old.attitude.inv()).as_matrix() - np.eye(3)
+        return np.hstack([old.position - self.origin, shift, turn.reshape(-1, 9)])
+
+    @property
+    def origin(self) -> np.ndarray:
+        """Local origin (3,) that keeps products of coordinates small. Units: m."""
+        return np.round(self.recorded.position[0])
+
+    def increments(self, xyz: np.ndarray, gps_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What must be added to points.
+
+        Parameters
+        ----------
+        xyz, gps_time : (n, 3), (n,) array
+            Units: m, s.
+
+        Returns
+        -------
+        increments : (n, 3) array
+            Zero outside the trajectory. Units: m.
+        inside : (n,) bool array
+        """
+        increments = np.zeros((len(gps_time), 3))
+        inside = np.zeros(len(gps_time), dtype=bool)
+        fill_increments(
+            np.ascontiguousarray(gps_time, dtype=float),
+            np.ascontiguousarray(xyz - self.origin),
+            self.recorded.gps_time,
+            self._step,
+            self.is_gap,
+            self.table,
+            increments,
+            inside,
+        )
+        return increments, inside
+
+    def apply(self, cloud: PointCloud) -> PointCloud:
+        """Corrected PointCloud; points outside the trajectory are left as they were."""
+        increments, _ = self.increments(cloud.xyz, cloud.gps_time)
+        return PointCloud(cloud.xyz + increments, cloud.gps_time, cloud.intensity)
+
+    def shift_integers(
+        self,
+        xyz: np.ndarray | Sequence[np.ndarray],
+        scale: np.ndarray,
+        offset: np.ndarray,
+        gps_time: np.ndarray,
+        time_constant: float = 0.0,
+    ) -> int:
+        """Correct the scaled integers of a LAS record in place, as x' = scale * X' + offset.
+
+        Only whole increments are added, so that a correction of zero changes no bit.
+
+        Parameters
+        ----------
+        xyz : three (n,) int32 arrays
+            Changed in place.
+        scale, offset : (3,) array
+            Units: m.
+        gps_time : (n,) array
+            In the file's own time system. Units: s.
+        time_constant : float
+            Added to gps_time, it gives the trajectory's time. Units: s.
+
+        Returns
+        -------
+        int
+            Number of points outside the trajectory (unchanged).
+
+        Raises
+        ------
+        ValueError
+            When a corrected coordinate does not fit the file's 32 bit integers.
+        """
+        outside, overflow = move_integers(
+            *xyz,
+            np.asarray(scale, dtype=float),
+            np.asarray(offset, dtype=float) - self.origin,
+            gps_time,
+            float(time_constant),
+            self.recorded.gps_time,
+            self._step,
+            self.is_gap,
+            self.table,
+        )
+        if overflow:
+            raise ValueError(
+                f"{overflow} corrected points do not fit the file's scale {scale} m and offset "
+                f"{offset} m: the correction or the file's header is wrong by kilometres."
+            )
+        return outside
+
+    @cached_property
+    def _step(self):
+        """Median step of the epochs. Units: s."""
+        return float(np.median(np.diff(self.recorded.gps_time)))
+
+    @cached_property
+    def is_gap(self) -> np.ndarray:
+        """Whether the step after each epoch is a gap: (n,) bool."""
+        gap = np.isin(self.recorded.gps_time, self.recorded.gaps[:, 0])
+        gap[-1] = True
+        return gap

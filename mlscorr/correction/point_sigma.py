@@ -1,0 +1,175 @@
+"""Uncertainty of points: what the sigmas of pose, mounting and beam do to E, N and H (Eq. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from mlscorr.correction.kernel import locate
+from mlscorr.correction.pair import Correction
+from mlscorr.frames import map_root, skew
+from mlscorr.survey import Mounting, Scanner
+
+ELEMENTS = (  # those of the pose's covariance that enter the variances of E, N and H
+    (0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (0, 4), (0, 5), (1, 3), (1, 5), (2, 3), (2, 4),
+    (3, 4), (3, 5), (4, 5),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PointSigma:
+    """One sigma of the corrected points' E, N and H.
+
+    It follows from the covariance of the corrected pose (of all six components where the
+    correction has it, else from its sigmas), the covariance of the mounting,
+    and the noise of range and angle. The angle's counts across the beam in any direction.
+
+    Parameters
+    ----------
+    epochs, is_gap : (n,) array
+        Of the trajectory; whether the step after each one is a gap.
+    origin : (3,) array
+        Local origin. Units: m.
+    table : (n, 21) array
+        Place of POS and scanner about the origin, and the elements ``ELEMENTS`` of the pose's
+        covariance.
+    range_noise, angle_noise : float
+        Units: m, rad.
+    """
+
+    epochs: np.ndarray
+    is_gap: np.ndarray
+    origin: np.ndarray
+    table: np.ndarray
+    range_noise: float
+    angle_noise: float
+
+    @classmethod
+    def of(
+        cls, correction: Correction, scanner: Scanner, mounting: Mounting | None = None
+    ) -> PointSigma:
+        """Sigmas of the points that a correction moves.
+
+        Parameters
+        ----------
+        correction : Correction
+            With covariance, or sigmas of its corrected trajectory.
+        scanner : Scanner
+        mounting : Mounting, optional
+            Without one the beams are taken to start at the navigation centre.
+
+        Raises
+        ------
+        ValueError
+            When the corrected trajectory has no sigmas.
+        """
+        corrected = correction.corrected
+        covariance = _pose_covariance(correction)
+        arm = np.zeros((len(corrected), 3))
+        if mounting is not None:
+            arm = corrected.attitude.apply(mounting.lever_arm)
+            if mounting.covariance is not None:
+                covariance = covariance + _mounting_covariance(corrected, mounting, arm)
+        place = corrected.position - correction.origin
+        elements = np.stack([covariance[:, i, j] for i, j in ELEMENTS], axis=1)
+        table = np.hstack([place, place + arm, elements])
+        return cls(
+            corrected.gps_time,
+            correction.is_gap,
+            correction.origin,
+            table.astype(np.float32),
+            float(scanner.range_noise),
+            float(scanner.angle_noise),
+        )
+
+    def at(self, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
+        """One sigma (n, 3) of corrected points (n, 3), NaN outside the trajectory. Units: m."""
+        return self.of_integers(
+            np.asarray(xyz, dtype=float).T, np.ones(3), np.zeros(3), np.asarray(gps_time, float)
+        )
+
+    def of_integers(
+        self,
+        xyz: np.ndarray | Sequence[np.ndarray],
+        scale: np.ndarray,
+        offset: np.ndarray,
+        gps_time: np.ndarray,
+        time_constant: float = 0.0,
+    ) -> np.ndarray:
+        """The same for the scaled integers of a LAS record, when they are corrected.
+
+        Parameters
+        ----------
+        xyz, scale, offset, gps_time, time_constant
+            As ``Correction.shift_integers`` has left them.
+        """
+        scale = np.asarray(scale, dtype=float)
+        offset = np.asarray(offset, dtype=float) - self.origin
+        step = float(np.median(np.diff(self.epochs)))
+        index = locate(gps_time, float(time_constant), self.epochs, step, self.is_gap)
+        out = np.full((len(gps_time), 3), np.nan)
+        beam = np.square([self.range_noise, self.angle_noise])
+        arrays = (gps_time, float(time_constant), self.epochs, index, self.table, beam, out)
+        _variances(*xyz, scale, offset, *arrays)
+        return np.sqrt(out)
+
+
+def _pose_covariance(correction):
+    """Covariance (n, 6, 6) of the corrected position and of a small rotation about map axes."""
+    if correction.covariance is not None:
+        return correction.covariance
+    corrected = correction.corrected
+    if corrected.position_sigma is None or corrected.attitude_sigma is None:
+        raise ValueError(
+            "The corrected trajectory has no sigmas of position and attitude, so none of the "
+            "points follow. Estimate the correction from control points."
+        )
+    covariance = np.zeros((len(corrected), 6, 6))
+    covariance[:, range(3), range(3)] = corrected.position_sigma**2
+    root = map_root(corrected.attitude, corrected.attitude_sigma)
+    covariance[:, 3:, 3:] = root @ root.swapaxes(1, 2)
+    return covariance
+
+
+def _mounting_covariance(corrected, mounting, arm):
+    """What the covariance of the mounting adds, as if the pose had them: (n, 6, 6).
+
+    A turn of the scanner about its own place is one about the POS and a shift by the lever arm.
+    """
+    rotation = corrected.attitude.as_matrix()
+    partials = np.zeros((len(corrected), 6, 6))
+    partials[:, :3, :3] = partials[:, 3:, 3:] = rotation
+    partials[:, :3, 3:] = skew(arm) @ rotation
+    return partials @ mounting.covariance @ partials.swapaxes(1, 2)
+
+
+@njit(cache=True, nogil=True)
+def _variances(xs, ys, zs, scale, offset, gps_time, constant, epochs, index, table, beam, out):
+    row = np.empty(table.shape[1])
+    for p in range(gps_time.size):
+        i = index[p]
+        if i < 0:
+            continue
+        w = (gps_time[p] + constant - epochs[i]) / (epochs[i + 1] - epochs[i])
+        for k in range(row.size):
+            row[k] = (1.0 - w) * table[i, k] + w * table[i + 1, k]
+        x = xs[p] * scale[0] + offset[0]
+        y = ys[p] * scale[1] + offset[1]
+        z = zs[p] * scale[2] + offset[2]
+        gx, gy, gz = x - row[0], y - row[1], z - row[2]
+        ee, nn, hh, aa, bb, cc = row[6], row[7], row[8], row[9], row[10], row[11]
+        eb, ec, na, nc, ha, hb = row[12], row[13], row[14], row[15], row[16], row[17]
+        ab, ac, bc = row[18], row[19], row[20]
+        # d(point) = d(position) + turn x G, turn = (a, b, c) about E, N, H  (Eq. 7-9)
+        vx = ee + 2.0 * (eb * gz - ec * gy) + bb * gz * gz - 2.0 * bc * gy * gz + cc * gy * gy
+        vy = nn + 2.0 * (nc * gx - na * gz) + aa * gz * gz - 2.0 * ac * gx * gz + cc * gx * gx
+        vz = hh + 2.0 * (ha * gy - hb * gx) + aa * gy * gy - 2.0 * ab * gx * gy + bb * gx * gx
+        dx, dy, dz = (x - row[3]) ** 2, (y - row[4]) ** 2, (z - row[5]) ** 2
+        square = max(dx + dy + dz, 1e-12)
+        along, across = beam[0] / square - beam[1], beam[1] * square
+        out[p, 0] = max(vx + along * dx + across, 0.0)
+        out[p, 1] = max(vy + along * dy + across, 0.0)
+        out[p, 2] = max(vz + along * dz + across, 0.0)

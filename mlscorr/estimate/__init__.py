@@ -1,0 +1,68 @@
+"""Misclosures of targets -> the POS error over time -> Correction (Mao et al. 2015, section 2.4.2).
+
+The POS error is a polynomial trend of the position (Eq. 11) plus random signals:
+
+- drift: 3 of the position, with the part of sigma(t) that grows where GNSS is missing;
+- jitter: 3 of the position, with the part of sigma(t) that stays while GNSS holds the POS;
+- bias: 3 of the position, slow, on the same part but of nearly free size: what is not stated;
+- attitude: 3 small rotations about the map axes.
+
+Where the POS states no sigma(t), or a constant one, there is only drift, of nearly free size.
+Without the split the centimetres of good GNSS would set the correlation time of the metres of an
+outage. Scales, correlation times and covariance family are estimated from the control points, and
+what they leave open of them is a part of the stated sigmas.
+"""
+
+from mlscorr.estimate.calibration import Calibration, MountingEstimate
+from mlscorr.estimate.guards import COMPONENTS
+from mlscorr.estimate.mounting import believed_mounting, estimate_mounting
+from mlscorr.estimate.mounting_check import MountingCheck, find_mounting_error
+from mlscorr.estimate.placement import (
+    NextControl,
+    PlannedAccuracy,
+    place_control,
+    predict_accuracy,
+)
+from mlscorr.estimate.pos_error import (
+    Estimate,
+    believed_correction,
+    estimate_correction,
+    previewed_correction,
+    with_ties,
+)
+from mlscorr.estimate.screening import Outlier
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters
+from mlscorr.estimate.support import Support, WeakStretch
+from mlscorr.estimate.tie_value import TieValue, tie_value
+from mlscorr.estimate.tied import TieResiduals
+from mlscorr.estimate.tied_mounting import calibration_with_ties, previewed_mounting
+
+__all__ = [
+    "COMPONENTS",
+    "SETTINGS",
+    "Calibration",
+    "Estimate",
+    "MountingCheck",
+    "MountingEstimate",
+    "NextControl",
+    "Outlier",
+    "PlannedAccuracy",
+    "SignalParameters",
+    "Support",
+    "TieResiduals",
+    "TieValue",
+    "WeakStretch",
+    "believed_correction",
+    "believed_mounting",
+    "calibration_with_ties",
+    "estimate_correction",
+    "estimate_mounting",
+    "find_mounting_error",
+    "place_control",
+    "predict_accuracy",
+    "previewed_correction",
+    "previewed_mounting",
+    "tie_value",
+    "with_ties",
+]

@@ -1,0 +1,222 @@
+"""The observation equations l = A x + B s + n of the POS error or the mounting (Eq. 7-12, 16-19).
+
+Both have the same misclosures, signals and noise; they differ in A, the trend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mlscorr.collocation import Collocation, Noise, SparseRows, collocate, collocate_rows
+from mlscorr.collocation.trend import polynomial_design
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
+from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.pos import StatedSigma, stated_sigma
+from mlscorr.survey import Pos, Trajectory, control_epochs
+
+NO_TREND = -1  # the order of a polynomial without any coefficient
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The observation equations of n observed targets, three rows each.
+
+    Parameters
+    ----------
+    names : (n,) array of str
+    gps_time : (n + h,) array
+        The last h epochs observe no target: they are fall-backs of the POS, or hold the mounting
+        weakly, so that what a site doesn't determine stays as it was recorded. Units: s.
+    misclosure : (n + h, 3) array
+        Surveyed - observed. Units: m.
+    noise : Noise
+        Survey and extraction (Eq. 19).
+    partials : (n + h, 3, 6) array
+        B by position and rotation (Eq. 7-9).
+    stated : StatedSigma
+        At the n + h epochs.
+    order : int
+        Of the polynomial trend of the position (Eq. 11).
+    mounting : (n + h, 3, p) array, optional
+        A in its place: partial derivatives by lever arm (m) and boresight (rad) about the body
+        axes (Eq. 16-18). Columns beyond the sixth are differences between coordinate systems.
+    prior : function of Equations
+        What is believed of the parameters before the misclosures: a Prior.
+    trajectory : Trajectory
+    pos : Pos
+    fallbacks : int
+        Number of fall-backs among the last h epochs.
+    ties : TieEquations, optional
+        Of what two passes both saw.
+    """
+
+    names: np.ndarray
+    gps_time: np.ndarray
+    misclosure: np.ndarray
+    noise: Noise
+    partials: np.ndarray
+    stated: StatedSigma
+    order: int
+    prior: Callable
+    trajectory: Trajectory
+    pos: Pos
+    mounting: np.ndarray | None = None
+    fallbacks: int = 0
+    ties: TieEquations | None = None
+
+    @cached_property
+    def stated_epochs(self) -> StatedSigma:
+        """What the POS states at all epochs of the trajectory."""
+        return stated_sigma(self.trajectory, self.pos, starts=self.stated.starts)
+
+    def with_starts(self, starts: np.ndarray) -> Equations:
+        """The same with drift that grows from other times on.
+
+        Parameters
+        ----------
+        starts : (k,) array
+            One for each segment. Units: s.
+        """
+        ties = None if self.ties is None else self.ties.with_starts(starts)
+        return replace(self, stated=replace(self.stated, starts=starts), ties=ties)
+
+    @property
+    def observed(self) -> np.ndarray:
+        """Times (n,) of the observed targets, without those that hold the mounting. Units: s."""
+        return self.gps_time[: len(self.names)]
+
+    def select(self, rows: np.ndarray | Sequence[int]) -> Equations:
+        """The equations of some targets.
+
+        Parameters
+        ----------
+        rows : (n,) bool or (k,) int array
+        """
+        rows = np.asarray(rows)
+        rows = np.flatnonzero(rows) if rows.dtype == bool else rows
+        kept = np.append(rows, np.arange(len(self.names), len(self.gps_time)))
+        return replace(self._rows(kept), names=self.names[rows])
+
+    def _rows(self, kept):
+        return replace(
+            self,
+            gps_time=self.gps_time[kept],
+            misclosure=self.misclosure[kept],
+            noise=self.noise.select(kept),
+            partials=self.partials[kept],
+            stated=self.stated.at(kept),
+            mounting=None if self.mounting is None else self.mounting[kept],
+        )
+
+    def without_outer_fallbacks(self) -> Equations:
+        """The equations without fall-backs outside the control span."""
+        n, first = len(self.gps_time), len(self.gps_time) - self.fallbacks
+        fallbacks = self.gps_time[first:]
+        inside = (fallbacks >= self.span[0]) & (fallbacks <= self.span[1])
+        kept = np.append(np.arange(first), np.arange(first, n)[inside])
+        return replace(self._rows(kept), fallbacks=int(inside.sum()))
+
+    def without(self, names: Collection[str]) -> Equations:
+        """The equations of all targets but some.
+
+        Parameters
+        ----------
+        names : collection of str
+        """
+        return self.select(~np.isin(self.names, list(names))) if names else self
+
+    def with_order(self, order: int) -> Equations:
+        """The same misclosures with a polynomial trend of another order."""
+        return replace(self, order=order)
+
+    def affordable(self) -> Equations:
+        """The same with a trend of at most the order that the control epochs can carry."""
+        return self.with_order(max(min(self.order, self.epochs - 1), NO_TREND))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last control epoch; those of the trajectory without any. Units: s."""
+        if len(self.observed) == 0:
+            return tuple(self.trajectory.gps_time[[0, -1]].tolist())
+        return float(self.observed.min()), float(self.observed.max())
+
+    @property
+    def epochs(self) -> int:
+        """Number of control epochs; targets within a second share one."""
+        return len(control_epochs(self.observed))
+
+    @property
+    def interval(self) -> float:
+        """Mean interval of the control epochs without the trajectory's gaps between them. Units: s.
+
+        The whole trajectory's length where there is only one epoch, the believed correlation time
+        as the paper's rule has it where there is none.
+        """
+        epochs = control_epochs(self.observed)
+        if len(epochs) == 0:
+            return self.pos.correlation_time / SETTINGS.start_ratio
+        if len(epochs) == 1:
+            return float(np.ptp(self.trajectory.gps_time))
+        return self.trajectory.recorded_time(epochs[0], epochs[-1]) / (len(epochs) - 1)
+
+    @property
+    def target_rows(self) -> dict[str, np.ndarray]:
+        """Rows of the observation equations of each target, all its passes together."""
+        names = np.repeat(self.names, 3)
+        return {str(name): np.flatnonzero(names == name) for name in dict.fromkeys(self.names)}
+
+    def solve(
+        self, parameters: SignalParameters | None, like: Collocation | None = None
+    ) -> Collocation:
+        """Collocation under given parameters.
+
+        Parameters
+        ----------
+        parameters : SignalParameters or None
+            Without any it is least squares.
+        like : Collocation, optional
+            Of the same equations under parameters near by; with ties its knots are used again.
+        """
+        signals: tuple = ()
+        if parameters is not None:
+            signals = pose_signals(self.stated, parameters, self.partials)
+            signals = drift_alone(signals, self.fallbacks)
+        if self.ties is None or parameters is None:
+            return collocate(self.gps_time, self.misclosure, self.noise, self.design, signals)
+        times = self.gps_time[:, None]
+        control = SparseRows(times, self.misclosure, self.noise, self.design, signals)
+        rows = [control, self.ties.rows(parameters, self.pose_design)]
+        return collocate_rows(rows, None if like is None else like.solver)
+
+    @property
+    def design(self) -> np.ndarray:
+        """A (n + h, 3, p) of the observations; fall-backs tell nothing of a trend."""
+        if self.mounting is not None:
+            return self.mounting
+        design = self._trend(self.gps_time)
+        design[len(design) - self.fallbacks :] = 0.0
+        return design
+
+    def pose_design(self, gps_time: np.ndarray) -> np.ndarray:
+        """A (q, 6, p) of position and rotation at any epochs; a mounting moves no pose.
+
+        Parameters
+        ----------
+        gps_time : (q,) array
+            Units: s.
+        """
+        if self.mounting is not None:
+            return np.zeros((len(gps_time), 6, self.mounting.shape[2]))
+        position = self._trend(gps_time)
+        return np.concatenate([position, np.zeros_like(position)], axis=1)
+
+    def _trend(self, gps_time):
+        """A (q, 3, p) of the position."""
+        if self.order == NO_TREND:
+            return np.zeros((len(gps_time), 3, 0))
+        return polynomial_design(gps_time, self.span, self.order)

@@ -1,0 +1,239 @@
+"""What the control points of a survey can't tell, and sentences about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from mlscorr.collocation import Collocation
+from mlscorr.collocation.covariance import INTEGRATED
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters, pose_signals
+from mlscorr.frames import angle_sigma
+from mlscorr.pos import stated_sigma
+from mlscorr.survey import Trajectory
+
+COMPONENTS = ("easting", "northing", "height", "roll", "pitch", "heading")
+
+
+@dataclass(frozen=True)
+class GlobalTest:
+    """sigma0^2 times the redundancy against the chi-squared limits of 95 %.
+
+    Parameters
+    ----------
+    statistic : float
+    redundancy : int
+    lower, upper : float
+        The limits.
+    """
+
+    statistic: float
+    redundancy: int
+    lower: float
+    upper: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the statistic is within its limits."""
+        return self.lower <= self.statistic <= self.upper
+
+
+@dataclass(frozen=True)
+class Guards:
+    """Where the correction stands on control points, and where it doesn't.
+
+    Parameters
+    ----------
+    gap : (float, float)
+        Start and end of the longest stretch without control inside a pass, the ends of passes
+        included. Units: s.
+    passes_without_control : tuple of (float, float)
+        Start and end of each. Units: s.
+    variance_ratio : (6,) array
+        Posterior over prior variance of E, N, H, roll, pitch, heading: median at control epochs.
+    global_test : GlobalTest or None
+        None with ties: a second of them shares more than it states.
+    """
+
+    gap: tuple[float, float]
+    passes_without_control: tuple[tuple[float, float], ...]
+    variance_ratio: np.ndarray
+    global_test: GlobalTest | None
+
+    @property
+    def determined(self) -> np.ndarray:
+        """Which of the six components this geometry tells, (6,) bool."""
+        return self.variance_ratio < SETTINGS.determined_ratio
+
+
+def find_guards(
+    equations: Equations, solved: Collocation, parameters: SignalParameters, corrected: Trajectory
+) -> Guards:
+    """Guards of an estimate.
+
+    Parameters
+    ----------
+    equations : Equations
+    solved : Collocation
+        Under these parameters.
+    parameters : SignalParameters
+    corrected : Trajectory
+        With its sigmas.
+    """
+    passes = equations.trajectory.passes.tolist()
+    times = np.sort(equations.observed)
+    control = [times[(times >= first) & (times <= last)] for first, last in passes]
+    return Guards(
+        gap=_longest_gap(passes, control),
+        passes_without_control=tuple(
+            (first, last)
+            for (first, last), inside in zip(passes, control, strict=True)
+            if not len(inside)
+        ),
+        variance_ratio=_variance_ratio(equations, parameters, corrected),
+        global_test=None if equations.ties is not None else _global_test(solved),
+    )
+
+
+def _longest_gap(passes, control):
+    longest = (0.0, 0.0)
+    for (first, last), inside in zip(passes, control, strict=True):
+        if len(inside):
+            edges = np.concatenate([[first], inside, [last]])
+            k = int(np.argmax(np.diff(edges)))
+            longest = max(
+                longest, (float(edges[k]), float(edges[k + 1])), key=lambda gap: gap[1] - gap[0]
+            )
+    return longest
+
+
+def _variance_ratio(equations, parameters, corrected):
+    """Median over the control epochs of posterior over prior variance (6,), at most one."""
+    trajectory = equations.trajectory
+    if len(equations.observed) == 0:
+        return np.ones(6)
+    last = len(trajectory) - 1
+    rows = np.clip(np.searchsorted(corrected.gps_time, equations.observed), 0, last)
+    stated = stated_sigma(trajectory, equations.pos, trajectory.gps_time[rows])
+    partials = np.broadcast_to(np.eye(6), (len(rows), 6, 6))
+    prior = sum(
+        s.mixing @ s.mixing.swapaxes(1, 2) for s in pose_signals(stated, parameters, partials)
+    )
+    turned = angle_sigma(stated.rotation, prior[:, 3:, 3:])
+    before = np.hstack([np.einsum("qii->qi", prior[:, :3, :3]), turned**2])
+    after = np.hstack([corrected.position_sigma[rows], corrected.attitude_sigma[rows]]) ** 2
+    ratio = np.divide(after, before, out=np.ones_like(after), where=before > 0)
+    return np.minimum(np.median(ratio, axis=0), 1.0)
+
+
+def _global_test(solved):
+    redundancy = len(solved.misclosure) - len(solved.trend)
+    if redundancy < 1:
+        return None
+    half = SETTINGS.global_significance / 2
+    lower, upper = chi2.ppf([half, 1 - half], redundancy)
+    return GlobalTest(solved.sigma0**2 * redundancy, redundancy, float(lower), float(upper))
+
+
+def sparse_warnings(equations: Equations, order: int, fitted_order: int) -> Iterator[str]:
+    """Sentences about control points that are few, all at one epoch, or a lowered order.
+
+    Parameters
+    ----------
+    equations : Equations
+    order, fitted_order : int
+        As asked for, and as used.
+    """
+    targets, epochs = len(equations.target_rows), equations.epochs
+    if fitted_order < order:
+        yield (
+            f"{targets} control points at {epochs} epochs are too few for a "
+            f"trend of order {order}, which needs {order + 2}: order {fitted_order} is used."
+        )
+    if targets < SETTINGS.smallest_targets:
+        yield (
+            f"Only {targets} control {'point takes' if targets == 1 else 'points take'} part: a "
+            "wrong one can't be found, and how fast the POS drifts is what it states itself. "
+            f"Survey at least {SETTINGS.smallest_targets}."
+        )
+    if epochs == 1 and targets > 1:
+        yield (
+            f"All {targets} control points were seen within {np.ptp(equations.observed):.1f} s at "
+            f"{equations.observed.min():.1f} s: the correction is known there, and elsewhere it is "
+            "the same shift with growing sigmas."
+        )
+
+
+def guard_warnings(
+    guards: Guards, equations: Equations, parameters: SignalParameters
+) -> Iterator[str]:
+    """Sentences about time without control points, and about the global test.
+
+    Parameters
+    ----------
+    guards : Guards
+    equations : Equations
+    parameters : SignalParameters
+    """
+    if len(equations.names) == 0:
+        yield (
+            "No control point takes part. The passes agree with each other, but nothing is known "
+            "of where they are beyond what the POS states: accuracy is relative only."
+        )
+        return
+    time = parameters.bias_time
+    if parameters.family != INTEGRATED:
+        time = max(time, parameters.drift_time)
+    yield from _extrapolated(equations, time)
+    length = guards.gap[1] - guards.gap[0]
+    first, last = equations.span
+    if length > SETTINGS.faded_times * time and first <= guards.gap[0] and guards.gap[1] <= last:
+        yield (
+            f"No control point for {length:.0f} s from {guards.gap[0]:.1f} s "
+            f"({length / time:.1f} correlation times): only the trend applies in the middle of it."
+        )
+    for first, last in guards.passes_without_control:
+        yield (
+            f"The pass from {first:.1f} to {last:.1f} s has no control point: only the trend of "
+            "the other passes and what is left of their signal correct it."
+        )
+    yield from global_test_warnings(guards)
+
+
+def global_test_warnings(guards: Guards) -> Iterator[str]:
+    """A sentence where the global test fails.
+
+    Parameters
+    ----------
+    guards : Guards
+    """
+    test = guards.global_test
+    if test is not None and not test.passed:
+        side = "more" if test.statistic > test.upper else "less"
+        yield (
+            f"The global test fails: the misclosures vary {side} than the stated sigmas allow "
+            f"(chi-squared {test.statistic:.0f} outside [{test.lower:.0f}, {test.upper:.0f}] of "
+            f"{test.redundancy} degrees of freedom). Are the sigmas of control points right?"
+        )
+
+
+def _extrapolated(equations, time):
+    """Sentences about both ends beyond the control span."""
+    first, last = equations.span
+    ends = equations.trajectory.gps_time[[0, -1]]
+    for length, where in ((first - ends[0], "before the first"), (ends[1] - last, "past the last")):
+        if length > time:
+            effect = (
+                "only the trend applies"
+                if length >= SETTINGS.faded_times * time
+                else "it fades to the trend"
+            )
+            yield (
+                f"Signal extrapolated {length:.0f} s {where} control point ({length / time:.1f} "
+                f"correlation times): {effect} there."
+            )

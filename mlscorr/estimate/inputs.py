@@ -1,0 +1,118 @@
+"""What can't be estimated from, and what is done where the POS doesn't state its sigmas."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.survey import Matched, Pos, Trajectory
+
+
+def checked_inputs(
+    trajectory: Trajectory, matched: Matched, pos: Pos, order: int
+) -> tuple[Trajectory, tuple[str, ...]]:
+    """The trajectory with all its sigmas, and sentences on those that were filled in.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    matched : Matched
+    pos : Pos
+    order : int
+        Of the trend.
+
+    Raises
+    ------
+    ValueError
+        Without any observation, for an order below zero, and for sigmas that can't be: negative
+        ones, or none at all of a control point and its observation together.
+    """
+    if len(matched) == 0:
+        raise ValueError(
+            "There is no observation of a control point to estimate a correction from."
+        )
+    if order < 0:
+        raise ValueError(f"The trend's order is {order}; it should be 0 (a shift) or more.")
+    _check_noise(matched)
+    if pos.position_sigma < 0 or np.any(np.asarray(pos.attitude_sigma) < 0):
+        raise ValueError(
+            f"The believed sigmas of the POS are {pos.position_sigma} m and "
+            f"{np.degrees(pos.attitude_sigma).tolist()} deg; none may be negative."
+        )
+    return filled_sigmas(trajectory)
+
+
+def _check_noise(matched):
+    """Refuse noise that is negative, not a number, or nothing."""
+    sigma = matched.surveyed.sigma
+    wrong = ~(sigma >= 0).all(axis=1) | ~(matched.variance >= SETTINGS.resolution**2).all(axis=1)
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        raise ValueError(
+            f"{wrong.sum()} of {len(matched)} observed control points have a sigma that is "
+            f"negative, not a number, or zero together with that of their observation (first: "
+            f"{matched.name[first]}, {sigma[first].tolist()} m). No survey is free of noise: "
+            "give sigma_horizontal and sigma_vertical, 0.002 m at least with a total station."
+        )
+
+
+def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[str, ...]]:
+    """The trajectory with all its sigmas, and sentences on those that were filled in.
+
+    Sigmas of zero, and those that jump at single epochs, are taken from the epochs beside; zero at
+    all epochs is no statement.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+
+    Raises
+    ------
+    ValueError
+        For negative sigmas.
+    """
+    notes: list[str] = []
+    columns: dict[str, np.ndarray | None] = {}
+    for name, unit in (("position_sigma", "m"), ("attitude_sigma", "deg")):
+        sigma = getattr(trajectory, name)
+        if sigma is None:
+            continue
+        if (sigma < 0).any():
+            raise ValueError(
+                f"{(sigma < 0).any(axis=1).sum()} of {len(trajectory)} trajectory epochs have a "
+                f"negative {name}. Is the file's column order right?"
+            )
+        stated = (sigma > 0).all(axis=1)
+        if not stated.any():
+            columns[name] = None
+            notes.append(
+                f"All {len(trajectory)} trajectory epochs state a {name} of 0 {unit}, which no POS "
+                "has: what survey.toml's [pos] believes is used."
+            )
+            continue
+        stated &= ~_is_lone_jump(sigma)
+        if stated.all():
+            continue
+        columns[name] = np.column_stack(
+            [
+                np.interp(trajectory.gps_time, trajectory.gps_time[stated], v[stated])
+                for v in sigma.T
+            ]
+        )
+        first = trajectory.gps_time[np.argmin(stated)]
+        notes.append(
+            f"{(~stated).sum()} of {len(trajectory)} trajectory epochs state a {name} of 0 {unit}, "
+            f"or one that jumps at these epochs alone (first at {first:.3f} s), which is no "
+            "statement: those of the epochs before and after are used there."
+        )
+    return (replace(trajectory, **columns) if columns else trajectory), tuple(notes)
+
+
+def _is_lone_jump(sigma):
+    """Which epochs (n,) state sigmas (n, 3) far from those of both sides."""
+    usual = median_filter(sigma, size=(SETTINGS.neighbours, 1), mode="nearest")
+    ratio = np.divide(sigma, usual, out=np.ones_like(sigma), where=usual > 0)
+    return ((ratio > SETTINGS.lone_jump) | (ratio < 1 / SETTINGS.lone_jump)).any(axis=1)

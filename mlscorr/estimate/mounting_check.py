@@ -1,0 +1,104 @@
+"""Whether ties disagree as a wrong mounting makes them, rather than as a POS drifts.
+
+Drift depends on time, a boresight's part on the direction of travel. The mounting's parameters
+stand beside trend and signals as six more columns M of A; with P = V^-1 - V^-1 A (A'V^-1 A)^-1
+A'V^-1, which the solver applies to any misclosures, they are (M'PM)^-1 M'Pl (Mao et al. 2015,
+Eq. 13-18). Nothing in the estimate changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+from threadpoolctl import threadpool_limits
+
+from mlscorr.estimate.mounting import UNMEASURED
+from mlscorr.estimate.pos_error import Estimate
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.frames import mounting_partials
+from mlscorr.survey import Matched, Mounting
+
+
+@dataclass(frozen=True)
+class MountingCheck:
+    """What a mounting lacks by the ties of a correction, and whether that is chance.
+
+    Parameters
+    ----------
+    correction, sigma : (6,) array
+        Lever arm (m) and boresight (rad) about right, forward, up.
+    statistic, critical : float
+        Chi-squared of six degrees of freedom, and its critical value.
+    """
+
+    correction: np.ndarray
+    sigma: np.ndarray
+    statistic: float
+    critical: float
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence where a wrong boresight is significant, and large enough to matter."""
+        angle, sigma = self.correction[3:], self.sigma[3:]
+        limit = np.maximum(SETTINGS.setup_sigmas * sigma, SETTINGS.determined_sigma[1])
+        if self.statistic <= self.critical or not (np.abs(angle) > limit).any():
+            return ()
+        values = ", ".join(
+            f"{a:.2f} ± {s:.2f} about {axis}"
+            for a, s, axis in zip(
+                *np.degrees([angle, sigma]), ("right", "forward", "up"), strict=True
+            )
+        )
+        return (
+            "Passes disagree by their direction of travel, as a wrong boresight makes them: it "
+            f"lacks {values} deg (chi-squared {self.statistic:.0f}, critical {self.critical:.0f}). "
+            "This correction takes that for drift. Run mlscorr calibrate first, and correct with "
+            "the mounting that it writes.",
+        )
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def find_mounting_error(
+    estimate: Estimate, matched: Matched, mounting: Mounting
+) -> MountingCheck | None:
+    """Test the recorded mounting by the ties of a correction; None without any.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        With ties.
+    matched : Matched
+        Its control points.
+    mounting : Mounting
+        As recorded.
+    """
+    equations, residuals = estimate.equations, estimate.ties
+    if equations.ties is None or residuals is None:
+        return None
+    used, targets = residuals.ties[residuals.used], matched[estimate.used]
+    trajectory, pos, starts = equations.trajectory, equations.pos, equations.stated.starts
+    ties = TieEquations.of(trajectory, pos, used, starts, mounting).mounting
+    control = np.zeros((len(equations.gps_time), 3, 6))
+    control[: len(targets)] = mounting_partials(
+        trajectory, mounting, targets.observations.position, targets.gps_time
+    )
+    columns = np.vstack([control.reshape(-1, 6), ties])
+    weights = [_weights(estimate, control[:, :, k], ties[:, k]) for k in range(6)]
+    weights = np.column_stack(weights)
+    matrix = columns.T @ weights + np.diag(UNMEASURED**-2)
+    covariance = np.linalg.inv(matrix)
+    right = weights.T @ np.append(equations.misclosure.ravel(), equations.ties.misclosure)
+    correction = covariance @ right
+    critical = float(chi2.isf(SETTINGS.significance, len(correction)))
+    sigma = np.sqrt(np.diag(covariance))
+    return MountingCheck(correction, sigma, float(right @ correction), critical)
+
+
+def _weights(estimate, control, ties):
+    """V^-1 (l - A x) of any misclosures, with the parameters of the estimate."""
+    equations = estimate.equations
+    changed = replace(equations, misclosure=control, ties=replace(equations.ties, misclosure=ties))
+    return changed.solve(estimate.parameters).weights

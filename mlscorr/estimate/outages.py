@@ -1,0 +1,99 @@
+"""When drift began to grow, and which steps of the path are fall-backs.
+
+A filtered POS errs little until GNSS goes, and falls back when it returns. The fall-backs stand in
+the recorded path; the starts don't, so each segment's is sought between its control epochs by
+likelihood. A step that contradicts the control points is no fall-back, only a restart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import chi2
+
+from mlscorr.collocation.covariance import INTEGRATED
+from mlscorr.estimate.assembly import with_fallbacks
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.posterior import Objective
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.pos import SETTINGS as POS_SETTINGS
+
+
+def with_drift_history(equations: Equations) -> Equations:
+    """The equations with fall-backs, and with the most likely start of growth in each segment.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of control points alone.
+    """
+    steps = equations.stated.history.steps
+    while True:
+        complete, parameters = _with_starts(with_fallbacks(equations, steps))
+        contradicted = _contradicted(complete, parameters)
+        if contradicted is None:
+            return complete
+        steps = steps[np.arange(len(steps)) != contradicted]
+
+
+def _with_starts(equations):
+    """The equations with the most likely starts, and the SignalParameters that go with them."""
+    history = equations.stated.history
+    edges, starts = history.edges, equations.stated.starts
+    ends_by_step = np.isin(edges[1:], history.steps.middle)
+    begins_pass = np.isin(edges[:-1], history.trajectory.passes[:, 0])
+    segments = list(zip(edges[:-1], edges[1:], begins_pass, ends_by_step, strict=True))
+    objective = Objective.of(equations)
+    mode, _ = objective.maximum(INTEGRATED, objective.initial)
+    for _ in range(SETTINGS.rounds):
+        before = starts
+        for number, segment in enumerate(segments):
+            part = _about(equations, *segment[:2])
+            best = Objective.of(part.with_starts(starts))(INTEGRATED, mode)
+            for candidate in _candidates(equations.observed, *segment):
+                tried = np.where(np.arange(len(starts)) == number, candidate, starts)
+                value = Objective.of(part.with_starts(tried))(INTEGRATED, mode)
+                if value > best:
+                    starts, best = tried, value
+        if np.array_equal(before, starts):
+            break
+        objective = Objective.of(equations.with_starts(starts))
+        mode, _ = objective.maximum(INTEGRATED, mode)
+    return equations.with_starts(starts), objective.parameters(INTEGRATED, mode)
+
+
+def _about(equations, first, last):
+    """The equations; of large surveys those of targets about a segment, which feel its start."""
+    if len(equations.names) <= SETTINGS.block:
+        return equations
+    times = equations.observed
+    inside = np.abs(times - (first + last) / 2) <= (last - first) / 2 + POS_SETTINGS.outage
+    inside |= np.isin(np.arange(len(times)), np.argsort(np.abs(times - last))[: SETTINGS.block])
+    return equations.select(inside).without_outer_fallbacks()
+
+
+def _candidates(times, first, last, begins_pass, ends_by_step):
+    """Starts that control epochs can tell apart: the segment's own, halfway between them, never.
+
+    And one before the pass, which may have begun without GNSS.
+    """
+    inside = np.sort(times[(times > first) & (times < last)])
+    inside = inside[:: max(1, len(inside) // SETTINGS.start_epochs)]
+    edges = np.concatenate([[first], inside, [last]])
+    before = [first - POS_SETTINGS.outage] * bool(begins_pass)
+    endless = [np.inf] * (not ends_by_step)
+    return np.concatenate([[first], before, (edges[1:] + edges[:-1]) / 2, endless])
+
+
+def _contradicted(equations, parameters):
+    """Number of the step that all else contradicts most, or None."""
+    number = equations.fallbacks
+    if number == 0:
+        return None
+    solved, first = equations.solve(parameters), 3 * (len(equations.gps_time) - number)
+    critical = chi2.isf(SETTINGS.significance / number, 3)
+    statistics = []
+    for step in range(number):
+        residual, covariance = solved.leave_out(np.arange(3) + first + 3 * step)
+        statistics.append(float(residual @ np.linalg.solve(covariance, residual)))
+    worst = int(np.argmax(statistics))
+    return worst if statistics[worst] > critical else None

@@ -1,0 +1,265 @@
+"""From misclosures to the corrected trajectory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from mlscorr.collocation.covariance import INTEGRATED
+from mlscorr.correction import Correction
+from mlscorr.estimate.assembly import position_equations, with_fallbacks
+from mlscorr.estimate.equations import NO_TREND, Equations
+from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_warnings
+from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
+from mlscorr.estimate.orders import (
+    Alternative,
+    affordable_order,
+    compare_orders,
+    leave_targets_out,
+)
+from mlscorr.estimate.outages import with_drift_history
+from mlscorr.estimate.posterior import Objective, Posterior
+from mlscorr.estimate.prediction import predict_pose_error, predict_under
+from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate.runs import find_windows, with_windows
+from mlscorr.estimate.screening import Outlier, Screening, screen
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters
+from mlscorr.estimate.support import Support, find_support
+from mlscorr.estimate.target_tests import TargetTest
+from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.estimate.tied import TieResiduals, graduated, screen_with_ties
+from mlscorr.survey import Matched, Pos, Ties, Trajectory
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The estimated POS error.
+
+    Parameters
+    ----------
+    correction : Correction
+        An average over all parameters.
+    equations : Equations
+        Of the used targets, and of the ties that hold.
+    screening : Screening
+    used : (n,) bool array
+        Which observations took part.
+    left_out : (n, 3) array
+        Misclosures that remain at each used one when its target takes no part. Units: m.
+    log_likelihood, sigma0 : float
+    guards : Guards
+    notes : tuple of str
+        Sentences on what was put in.
+    ties : TieResiduals, optional
+        What is left of the ties that were given.
+    untied : str
+        Why there are none, where somebody looked for them.
+    """
+
+    correction: Correction
+    equations: Equations
+    screening: Screening
+    used: np.ndarray
+    left_out: np.ndarray
+    log_likelihood: float
+    sigma0: float
+    guards: Guards
+    notes: tuple[str, ...]
+    ties: TieResiduals | None = None
+    untied: str = ""
+
+    @property
+    def order(self) -> int:
+        """Order of the trend; NO_TREND where no control point held one."""
+        return self.equations.order
+
+    @property
+    def parameters(self) -> SignalParameters:
+        """The most probable ones."""
+        return self.families[0][0]
+
+    @property
+    def families(self) -> tuple[tuple[SignalParameters, float], ...]:
+        """Parameters of each covariance family with its probability."""
+        return self.screening.posterior.modes
+
+    @property
+    def outliers(self) -> tuple[Outlier, ...]:
+        """Targets that the others contradict."""
+        return self.screening.outliers
+
+    @property
+    def tests(self) -> tuple[TargetTest, ...]:
+        """What the others say of each used target."""
+        return self.screening.tests
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last control epoch. Units: s."""
+        return self.equations.span
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that a user should read."""
+        return (
+            *self.notes,
+            *guard_warnings(self.guards, self.equations, self.parameters),
+            *self.screening.warnings,
+            *(() if self.ties is None else self.ties.warnings),
+        )
+
+    @cached_property
+    def support(self) -> Support:
+        """Where control points hold the correction, and where it is extrapolated."""
+        solved = self.equations.solve(self.parameters)
+        return find_support(self.equations, solved, self.parameters, self.correction.corrected)
+
+    @cached_property
+    def alternatives(self) -> tuple[Alternative, ...]:
+        """Other orders of the trend beside the one in use; none without control."""
+        if len(self.equations.names) == 0:
+            return ()
+        with threadpool_limits(limits=1, user_api="blas"):
+            return compare_orders(self.equations, self.families)
+
+
+# The matrices are small: on a busy machine threads would wait longer than they work
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def estimate_correction(
+    trajectory: Trajectory, matched: Matched, pos: Pos | None = None, order: int = SETTINGS.order
+) -> Estimate:
+    """Estimate the POS error from matched targets  (Mao et al. 2015, section 2.4.2).
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        As recorded.
+    matched : Matched
+        Observed control points.
+    pos : Pos, optional
+        Beliefs, used where the trajectory has no sigmas.
+    order : int
+        Of the polynomial trend; lowered where there are too few control points.
+
+    Raises
+    ------
+    ValueError
+        Without any observation, and for sigmas that can't be.
+    """
+    pos = Pos() if pos is None else pos
+    filled, notes = checked_inputs(trajectory, matched, pos, order)
+    equations, screening, windows = _screened(filled, matched, pos, order)
+    kept = equations.without({outlier.name for outlier in screening.outliers})
+    sparse = sparse_warnings(kept, order, equations.order)
+    return _estimate(
+        trajectory, matched.name, kept, screening, (*notes, *map(str, windows), *sparse)
+    )
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estimate:
+    """What is known of the POS error before any control point, by fall-backs and sigmas alone.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        As recorded.
+    pos : Pos, optional
+        Beliefs, used where the trajectory has no sigmas.
+
+    Returns
+    -------
+    Estimate
+        To which ties can be added: then passes come together, and where they are is what the POS
+        says.
+    """
+    pos = Pos() if pos is None else pos
+    filled, notes = filled_sigmas(trajectory)
+    equations = position_equations(filled, Matched.none(), pos, NO_TREND, position_prior)
+    equations = with_fallbacks(equations, equations.stated.history.steps)
+    objective = Objective.of(equations)
+    mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
+    screening = Screening(Posterior(mode, mode), (), (), (), ())
+    return _estimate(trajectory, (), equations, screening, notes)
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def with_ties(estimate: Estimate, ties: Ties) -> Estimate:
+    """The estimate by control points and by what two passes both saw.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        By control points alone.
+    ties : Ties
+    """
+    before = estimate.equations
+    rows = _tie_equations(before, ties)
+    kept, screening, is_used = screen_with_ties(before, estimate.screening, rows)
+    names = np.full(len(estimate.used), "", dtype=object)
+    names[estimate.used] = before.names
+    trajectory = estimate.correction.recorded
+    changed = _estimate(trajectory, names, kept, screening, estimate.notes)
+    return replace(changed, ties=TieResiduals.of(ties, is_used, changed.correction))
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def previewed_correction(estimate: Estimate, ties: Ties) -> Correction:
+    """The correction with ties that were paired so far, under the parameters of control alone.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        By control points alone.
+    ties : Ties
+    """
+    rows = _tie_equations(estimate.equations, ties)
+    tied = graduated(estimate.equations, estimate.parameters, rows)
+    pose = predict_under(tied, estimate.parameters)
+    return Correction.by_pose_error(estimate.correction.recorded, *pose)
+
+
+def _tie_equations(equations, ties):
+    """TieEquations whose drift grows as that of the control points."""
+    return TieEquations.of(equations.trajectory, equations.pos, ties, equations.stated.starts)
+
+
+def _estimate(trajectory, names, kept, screening, notes):
+    """The Estimate by equations and the parameters that were chosen for them."""
+    posterior, used = screening.posterior, np.isin(np.asarray(names, dtype=object), kept.names)
+    parameters = posterior.modes[0][0]
+    solved = kept.solve(parameters)
+    left_out = np.full((len(names), 3), np.nan)
+    left_out[used] = leave_targets_out(kept, solved)
+    correction = Correction.by_pose_error(trajectory, *predict_pose_error(kept, posterior))
+    return Estimate(
+        correction=correction,
+        equations=kept,
+        screening=screening,
+        used=used,
+        left_out=left_out,
+        log_likelihood=solved.log_likelihood,
+        sigma0=solved.sigma0,
+        guards=find_guards(kept, solved, parameters, correction.corrected),
+        notes=notes,
+    )
+
+
+def _screened(trajectory, matched, pos, order):
+    """Equations, their Screening, and the windows of drift that runs of rejected targets show."""
+    windows: tuple = ()
+    for _ in range(SETTINGS.rounds):
+        raised = with_windows(trajectory, windows) if windows else trajectory
+        equations = position_equations(raised, matched, pos, order, position_prior)
+        equations = equations.with_order(affordable_order(order, equations))
+        equations = with_drift_history(equations)
+        screening = screen(equations)
+        more = find_windows(equations, screening)
+        if not more:
+            break
+        windows += more
+    return equations, screening, windows

@@ -1,0 +1,262 @@
+"""The parameters of the signals, and how well the control points know them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+
+import numpy as np
+from scipy.linalg import cholesky
+from scipy.optimize import minimize
+from scipy.stats import norm, qmc
+
+from mlscorr.collocation import Collocation
+from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.prior import NAMES, Prior
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters
+
+IMPROBABLE = -1e12  # log posterior below that of any observations, yet finite for differences
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What control points say of parameters.
+
+    Parameters
+    ----------
+    modes : tuple of (SignalParameters, float)
+        Most probable ones of each family and the family's probability, the most probable first.
+    points : tuple of (SignalParameters, float)
+        Parameters and weights that stand for the whole distribution.
+    """
+
+    modes: tuple[tuple[SignalParameters, float], ...]
+    points: tuple[tuple[SignalParameters, float], ...]
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Restricted likelihood times prior, as a function of the free parameters' logarithms.
+
+    Large surveys are cut into blocks of time whose likelihoods are multiplied: the work then
+    grows with their length, not with its cube.
+
+    Parameters
+    ----------
+    blocks : tuple of Equations
+    prior : Prior
+    """
+
+    blocks: tuple[Equations, ...]
+    prior: Prior
+
+    @classmethod
+    def of(cls, equations: Equations) -> Objective:
+        """The objective of Equations under their own prior."""
+        return cls(_blocks(equations), equations.prior(equations))
+
+    @property
+    def initial(self) -> np.ndarray:
+        """Logarithms of the free parameters at the start."""
+        return self.prior.start[self.prior.free]
+
+    @property
+    def spread(self) -> np.ndarray:
+        """One sigma of the free parameters' logarithms."""
+        return self.prior.spread
+
+    def parameters(self, family: str, logarithms: np.ndarray) -> SignalParameters:
+        """The parameters of a family by their free logarithms.
+
+        Parameters
+        ----------
+        family : str
+        logarithms : (k,) array
+        """
+        full = self.prior.start.copy()
+        full[self.prior.free] = logarithms
+        if self.prior.attitude_follows:
+            full[NAMES.index("attitude_time")] = full[NAMES.index("drift_time")]
+        return SignalParameters(family, *np.exp(full).tolist())
+
+    def logarithms(self, parameters: SignalParameters) -> np.ndarray:
+        """The free logarithms (k,) of parameters.
+
+        Parameters
+        ----------
+        parameters : SignalParameters
+        """
+        return np.log([getattr(parameters, name) for name in NAMES])[self.prior.free]
+
+    def __call__(
+        self, family: str, logarithms: np.ndarray, like: Sequence[Collocation] = ()
+    ) -> float:
+        """The log posterior of a family at free logarithms (k,), but for a constant.
+
+        A search may try scales of which rounding leaves no likelihood: it turns back there.
+
+        Parameters
+        ----------
+        family : str
+        logarithms : (k,) array
+        like : sequence of Collocation
+            Of each block, near by: with their knots differences are smooth, and cost half as much.
+        """
+        try:
+            return self._value(logarithms, self._solve(family, logarithms, like))
+        except np.linalg.LinAlgError:
+            return IMPROBABLE
+
+    def _solve(self, family, logarithms, like=()):
+        """Each block's Collocation."""
+        chosen = self.parameters(family, logarithms)
+        pairs = zip_longest(self.blocks, like)
+        return [block.solve(chosen, near) for block, near in pairs]
+
+    def _value(self, logarithms, solved):
+        """The log posterior by each block's Collocation."""
+        prior = -0.5 * np.sum(((logarithms - self.initial) / self.spread) ** 2)
+        return prior + sum(part.log_likelihood for part in solved)
+
+    def gradient(self, family: str, logarithms: np.ndarray) -> tuple[float, np.ndarray]:
+        """The log posterior and its gradient (k,).
+
+        Parameters
+        ----------
+        family : str
+        logarithms : (k,) array
+        """
+        try:
+            solved = self._solve(family, logarithms)
+        except np.linalg.LinAlgError:
+            return IMPROBABLE, np.zeros(len(logarithms))
+        value = self._value(logarithms, solved)
+        steps = logarithms + SETTINGS.step * np.eye(len(logarithms))
+        ahead = np.array([self(family, step, solved) for step in steps])
+        return value, (ahead - value) / SETTINGS.step
+
+    def maximum(self, family: str, start: np.ndarray) -> tuple[np.ndarray, float]:
+        """The most probable logarithms of a family, and the log posterior there.
+
+        Parameters
+        ----------
+        family : str
+        start : (k,) array
+        """
+
+        def negative(x):
+            value, slope = self.gradient(family, x)
+            return -value, -slope
+
+        limit = SETTINGS.farthest * self.spread
+        best = minimize(
+            negative,
+            np.clip(start, self.initial - limit, self.initial + limit),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=list(zip(self.initial - limit, self.initial + limit, strict=True)),
+            options={"maxiter": 40, "ftol": 1e-4, "gtol": 0.05},
+        )
+        return best.x, -float(best.fun)
+
+    def covariance(self, family: str, mode: np.ndarray, value: float) -> np.ndarray:
+        """Covariance of the logarithms about a mode (Laplace), never wider than the prior.
+
+        Parameters
+        ----------
+        family : str
+        mode : (k,) array
+        value : float
+            The log posterior there.
+        """
+        step = SETTINGS.wide_step * np.eye(len(mode))
+        once = np.array([[self(family, mode + sign * s) for s in step] for sign in (1, -1)])
+        curvature = np.diag(2 * value - once.sum(axis=0)) / SETTINGS.wide_step**2
+        for i in range(len(mode)):
+            for j in range(i):
+                both = self(family, mode + step[i] + step[j]) + value - once[0, i] - once[0, j]
+                curvature[i, j] = curvature[j, i] = -both / SETTINGS.wide_step**2
+        scale = np.outer(self.spread, self.spread)
+        values, vectors = np.linalg.eigh(curvature * scale)
+        return scale * ((vectors / np.maximum(values, 1.0)) @ vectors.T)
+
+
+def most_probable(
+    equations: Equations, start: Sequence[SignalParameters] = ()
+) -> list[tuple[SignalParameters, float]]:
+    """Most probable SignalParameters of each family and its log posterior, the best first.
+
+    Parameters
+    ----------
+    equations : Equations
+    start : sequence of SignalParameters
+        Of each family, near which the maxima are expected.
+    """
+    objective = Objective.of(equations)
+    near = {chosen.family: objective.logarithms(chosen) for chosen in start}
+    modes, at = [], objective.initial
+    for family in (*FAMILIES, INTEGRATED):
+        at, value = objective.maximum(family, near.get(family, at))
+        modes.append((objective.parameters(family, at), value))
+    return sorted(modes, key=lambda row: -row[1])
+
+
+def choose_parameters(
+    equations: Equations, start: Sequence[SignalParameters] = (), points: int = SETTINGS.points
+) -> Posterior:
+    """Posterior of the parameters: restricted likelihood, weakly held to what is stated.
+
+    A family's probability is its share of the posterior at the maximum. Points drawn from the
+    log-normal about a mode (Laplace) in antithetic pairs, always the same, are weighted by the
+    true posterior over it.
+
+    Parameters
+    ----------
+    equations : Equations
+    start : sequence of SignalParameters
+        As in most_probable.
+    points : int
+        Number of parameters over which a prediction will be averaged.
+    """
+    objective = Objective.of(equations)
+    probable = most_probable(equations, start)
+    share = np.exp([value - probable[0][1] for _, value in probable])
+    chosen = zip([row[0] for row in probable], (share / share.sum()).tolist(), strict=True)
+    by_share = tuple(chosen)
+    if len(equations.names) > SETTINGS.block:  # so many know the parameters well
+        return Posterior(by_share, by_share)
+    drawn = []
+    for (parameters, probability), (_, value) in zip(by_share, probable, strict=True):
+        if probability > SETTINGS.smallest_share:
+            mode = objective.logarithms(parameters)
+            covariance = objective.covariance(parameters.family, mode, value)
+            pairs = int(np.ceil(points * probability / 2))
+            spread = mode, covariance, value
+            drawn += _points(objective, parameters.family, *spread, probability, pairs)
+    total = sum(weight for _, weight in drawn)
+    return Posterior(by_share, tuple((chosen, weight / total) for chosen, weight in drawn))
+
+
+def _points(objective, family, mode, covariance, value, probability, pairs):
+    """Parameters and weights, which sum to the family's probability."""
+    half = norm.ppf(qmc.Halton(len(mode), seed=0).random(pairs))
+    normal = np.vstack([half, -half])
+    drawn = mode + normal @ cholesky(covariance, lower=True).T
+    ratio = np.array([objective(family, x) for x in drawn]) - value + 0.5 * (normal**2).sum(axis=1)
+    weights = np.exp(ratio - ratio.max())
+    weights = np.minimum(weights, SETTINGS.heaviest * weights.mean())
+    weights *= probability / weights.sum()
+    chosen = (objective.parameters(family, x) for x in drawn[weights > 0])
+    return list(zip(chosen, weights[weights > 0].tolist(), strict=True))
+
+
+def _blocks(equations):
+    """The equations in blocks of time, each with the trend that its epochs can carry."""
+    number = -(-len(equations.names) // SETTINGS.block)
+    if number <= 1 or equations.ties is not None:  # which may link any two blocks
+        return (equations.affordable(),)
+    parts = np.array_split(np.argsort(equations.observed, kind="stable"), number)
+    return tuple(equations.select(part).without_outer_fallbacks().affordable() for part in parts)

@@ -1,0 +1,122 @@
+"""From an estimate to the POS error at every epoch, and to the corrected trajectory (Eq. 14-15)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.posterior import Posterior
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters, pose_signals
+from mlscorr.pos import Steps
+from mlscorr.survey import Trajectory
+
+
+def predict_pose_error(equations: Equations, posterior: Posterior) -> tuple[np.ndarray, np.ndarray]:
+    """POS error (n, 6) at every epoch, trend plus signals (Eq. 15), with covariance (n, 6, 6).
+
+    Position in m, rotation about the map axes in rad. The most probable parameters predict every
+    epoch. What the average over all parameters makes of that, in units of its sigmas, changes
+    slowly and is worked out at fewer epochs: sigmas may jump where GNSS comes back, these numbers
+    hardly do.
+
+    Parameters
+    ----------
+    equations : Equations
+    posterior : Posterior
+    """
+    trajectory = equations.trajectory
+    pose, covariance = predict_under(equations, posterior.modes[0][0])
+    sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), SETTINGS.smallest_sigma**2))
+    rows = _grid(equations)
+    mean, square = 0.0, 0.0
+    points = [point for point in posterior.points if point[1] > SETTINGS.smallest_weight]
+    total = sum(weight for _, weight in points)
+    for parameters, weight in points:
+        predicted, spread = predict_under(equations, parameters, rows)
+        mean = mean + weight / total * predicted
+        variance = np.einsum("qii->qi", spread)
+        square = square + weight / total * (variance + predicted**2)
+    wider = np.sqrt(np.maximum(square - mean**2, 0.0)) / sigma[rows]
+    moved = (mean - pose[rows]) / sigma[rows]
+    pose += sigma * _interpolated(trajectory.gps_time, rows, moved)
+    wider = _interpolated(trajectory.gps_time, rows, wider)
+    covariance *= wider[:, :, None] * wider[:, None, :]
+    return bridge_steps(trajectory, equations.stated.history.steps, pose, covariance)
+
+
+def bridge_steps(
+    trajectory: Trajectory, steps: Steps, pose: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pose error and covariance with those inside steps replaced by a bridge between their ends.
+
+    Filters and resampling spread a fall-back over epochs at which the error is neither that before
+    nor that after it. There the corrected vehicle drives on: a cubic through the corrected
+    positions and velocities at both ends (Hermite). What its motion leaves open is added to the
+    covariance.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        As recorded.
+    steps : Steps
+    pose : (n, 6) array
+        Position in m, rotation in rad, at every epoch.
+    covariance : (n, 6, 6) array
+    """
+    time, corrected = trajectory.gps_time, trajectory.position + pose[:, :3]
+    pose, covariance = pose.copy(), covariance.copy()
+    for before, after, sigma in zip(steps.before, steps.after, steps.sigma, strict=True):
+        first, last = np.searchsorted(time, [before, after])
+        inside = slice(first + 1, last)
+        if last - first < 2:
+            continue
+        ends = [first, last]
+        beside = np.clip([first - 1, last + 1], 0, len(time) - 1)
+        speed = (corrected[ends] - corrected[beside]) / (time[ends] - time[beside])[:, None]
+        path = CubicHermiteSpline(time[ends], corrected[ends], speed)
+        pose[inside, :3] = path(time[inside]) - trajectory.position[inside]
+        share = ((time[inside] - before) / (after - before))[:, None]
+        pose[inside, 3:] = pose[first, 3:] + share * (pose[last, 3:] - pose[first, 3:])
+        share = share[:, :, None]
+        covariance[inside] = (1.0 - share) * covariance[first] + share * covariance[last]
+        covariance[inside, :3, :3] += (4.0 * share * (1.0 - share) * sigma) ** 2 * np.eye(3)
+    return pose, covariance
+
+
+def _grid(equations):
+    """Numbers of regular epochs, those before and after gaps, and those nearest to control."""
+    trajectory, n = equations.trajectory, len(equations.trajectory)
+    history = equations.stated.history
+    steps = np.concatenate([history.steps.before, history.steps.after, history.restarts])
+    edges = np.searchsorted(trajectory.gps_time, [*trajectory.gaps.ravel(), *steps])
+    control = np.searchsorted(trajectory.gps_time, equations.observed)
+    regular = np.linspace(0, n - 1, min(n, SETTINGS.prediction_epochs)).round().astype(int)
+    return np.unique(np.clip(np.concatenate([regular, edges, control]), 0, n - 1))
+
+
+def _interpolated(gps_time, rows, values):
+    """Values (k, 6) at some epochs, linear in time at all of them."""
+    return np.column_stack([np.interp(gps_time, gps_time[rows], column) for column in values.T])
+
+
+def predict_under(
+    equations: Equations, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pose error (k, 6) and covariance (k, 6, 6) at some epochs under given parameters.
+
+    Parameters
+    ----------
+    equations : Equations
+    parameters : SignalParameters
+    rows : slice or (k,) int array
+        Of the trajectory's epochs; all by default.
+    """
+    gps_time = equations.trajectory.gps_time[rows]
+    partials = np.broadcast_to(np.eye(6), (len(gps_time), 6, 6))
+    signals = pose_signals(equations.stated_epochs.at(rows), parameters, partials)
+    mixings = [signal.mixing for signal in signals]
+    clocks = [signal.clock for signal in signals]
+    design = equations.pose_design(gps_time)
+    return equations.solve(parameters).predict(gps_time, design, mixings, clocks)

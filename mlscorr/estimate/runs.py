@@ -1,0 +1,128 @@
+"""Control points that deviate together: the POS drifts there, and doesn't say so.
+
+A misread control point stands alone. Where neighbours in time are all rejected and deviate the same
+way, the error is the POS's: its sigma is raised there as it grows between two places where
+GNSS holds it, and everything is estimated anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.screening import Screening
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.target_tests import TargetTest
+from mlscorr.pos import SETTINGS as POS_SETTINGS
+from mlscorr.survey import Trajectory
+
+
+@dataclass(frozen=True)
+class DriftWindow:
+    """A stretch of drift that the POS doesn't state.
+
+    Parameters
+    ----------
+    first, last : float
+        Between the control points that hold it; the pass's end where there is none. Units: s.
+    size : float
+        One sigma per axis in its middle. Units: m.
+    is_open : bool
+        Whether nothing holds its end.
+    names : tuple of str
+        The control points in it.
+    """
+
+    first: float
+    last: float
+    size: float
+    is_open: bool
+    names: tuple[str, ...]
+
+    def sigma(self, gps_time: np.ndarray) -> np.ndarray:
+        """One sigma (n,) of an integrated random walk that is held at its ends. Units: m.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        """
+        share = np.clip((gps_time - self.first) / (self.last - self.first), 0.0, 1.0)
+        held = share if self.is_open else 4.0 * share * (1.0 - share)
+        inside = (gps_time >= self.first) & (gps_time <= self.last)
+        return np.where(inside, self.size * held**1.5, 0.0)
+
+    def __str__(self):
+        return (
+            f"{', '.join(self.names)} deviate together by {self.size:.2f} m and more per axis from "
+            f"{self.first:.1f} to {self.last:.1f} s: the POS drifts there by more than it states. "
+            "They were used, and its sigma was raised there."
+        )
+
+
+def find_windows(equations: Equations, screening: Screening) -> tuple[DriftWindow, ...]:
+    """Stretches in which neighbours in time were rejected and deviate the same way.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of all targets.
+    screening : Screening
+        Of these equations.
+    """
+    rejected = {test.name: test for test in screening.rejected}
+    order = np.argsort(equations.observed, kind="stable")
+    names, times = equations.names[order], equations.observed[order]
+    is_out = np.isin(names, list(rejected))
+    starts = np.flatnonzero(is_out & ~np.append(False, is_out[:-1]))
+    ends = np.flatnonzero(is_out & ~np.append(is_out[1:], False))
+    windows = []
+    for start, end in zip(starts, ends, strict=True):
+        run = tuple(dict.fromkeys(names[start : end + 1].tolist()))
+        if _deviate_together([rejected[name] for name in run]):
+            windows.append(_window(equations, times, start, end, run, rejected))
+    return tuple(windows)
+
+
+def _deviate_together(tests: list[TargetTest]):
+    """Whether a run is drift: two that differ, or three and more, of about one direction."""
+    ways = np.array([test.left_out.mean(axis=0) for test in tests])
+    if len(ways) < 2 or not np.isfinite(ways).all():
+        return False
+    if len(ways) == 2:
+        sigma = np.linalg.norm(np.vstack([test.sigma for test in tests]))
+        if np.linalg.norm(ways[1] - ways[0]) < SETTINGS.setup_sigmas * sigma:
+            return False
+    return np.linalg.norm(ways.mean(axis=0)) > 0.5 * np.linalg.norm(ways, axis=1).mean()
+
+
+def _window(equations, times, start, end, run, rejected):
+    trajectory = equations.trajectory
+    inside = (trajectory.passes[:, 0] <= times[start]) & (times[start] <= trajectory.passes[:, 1])
+    begin, finish = trajectory.passes[np.argmax(inside)]
+    last_before = times[start - 1] if start > 0 else -np.inf
+    first_after = times[end + 1] if end + 1 < len(times) else np.inf
+    ways = np.vstack([rejected[name].left_out for name in run])
+    size = float(np.sqrt(np.mean(np.sum(ways**2, axis=1)) / 3))
+    first, last = max(begin, last_before), min(finish, first_after)
+    return DriftWindow(float(first), float(last), size, bool(first_after > finish), run)
+
+
+def with_windows(trajectory: Trajectory, windows: tuple[DriftWindow, ...]) -> Trajectory:
+    """The trajectory with its position's sigma raised in windows of drift.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Without sigmas it is given those of a POS that GNSS holds.
+    windows : tuple of DriftWindow
+    """
+    sigma = trajectory.position_sigma
+    if sigma is None:
+        sigma = np.tile(POS_SETTINGS.gnss, (len(trajectory), 1))
+    variance = sigma**2
+    for window in windows:
+        variance = variance + window.sigma(trajectory.gps_time)[:, None] ** 2
+    return replace(trajectory, position_sigma=np.sqrt(variance))

@@ -1,0 +1,78 @@
+"""Numbers that the estimate of POS error and mounting rests on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Limits, beliefs and the work spent, each with its unit and source."""
+
+    order: int = 1  # of the trend: a datum difference and its slow change; signals carry the rest
+    highest_order: int = 3  # compared; the control intervals of higher ones are the signal's part
+    # With less control points neither the parameters nor a fault can be told; and two don't hold
+    # the rotation of a mounting about the line between them
+    smallest_targets: int = 3
+    neighbours: int = 5  # epochs, whose median holds edges and drops what stands alone
+    lone_jump: float = 3.0  # ratio to it that no filter makes from one epoch to the next and back
+    setup_sigmas: float = 3.0  # two neighbours that differ by less may share a wrong setup
+    resolution: float = 1e-6  # m, rad: less than any file's rounding, and no noise at all
+
+    # Tests
+    significance: float = 0.001  # Baarda's (1968), but over all targets or steps together
+    global_significance: float = 0.05  # of the global test, both sides together
+    undetected: float = 0.2  # share of detectable errors that w misses (Baarda 1968)
+    determined_ratio: float = 0.5  # posterior over prior variance where control told a component
+    faded_times: float = 3.0  # correlation times after which a signal is 5 % of what it was
+
+    # The search for wrong targets
+    screened_targets: int = 5  # four can't tell a wrong one from a POS that is worse than stated
+    breakdown: float = 0.3  # share of wrong targets beyond which a majority means little
+    gross_share: float = 0.02  # of control points, before the data are seen
+    gross_sizes: tuple[float, ...] = (0.1, 0.5, 2.5)  # m, one sigma: misread target to wrong setup
+    scale_factors: tuple[float, ...] = (1.0, 0.5, 0.25, 0.125)  # so that some search isn't masked
+    rounds: int = 3  # of eliminating or moving starts, and estimating; the third seldom changes any
+    strong_evidence: float = 20.0  # Bayes factor (Kass and Raftery 1995)
+    same_direction: float = 0.8  # cosine above which two misclosures agree
+    start_epochs: int = 24  # of control, between which drift's start is sought; more only cost time
+
+    # Ties
+    tie_cut: float = 4.0  # sigmas; of a thousand honest ties one in sixteen surveys is farther off
+    tie_majority: float = 0.5  # of the ties; with fewer nobody knows which of them are right
+    tie_sample: int = 100  # ties that choose parameters: a scale to a tenth
+    sufficient_ratio: float = 1.1  # of a median sigma: a difference that no check point shows
+    tie_points: int = 12  # as points below, each with a solution of all ties
+    tie_freedom: float = 4.0  # degrees of freedom of Student's t (Lange et al. 1989)
+
+    # Prior of the parameters: their start, and one sigma of their logarithms about it as a factor,
+    # fixed by benchmarks/lsc_study.py. What is stated of position is right within a factor of ten,
+    # or in another unit; the paper's rule for correlation times within two.
+    start_ratio: float = 4.0  # correlation time over control interval: 3 to 5, paper 3.1.4
+    attitude_time: float = 120.0  # s, paper's Table 7: gyro biases change over minutes
+    walk_scale: float = 0.1  # of the random walk in an integrated drift
+    precise_factor: float = 2.0  # of drift_time and attitude_scale
+    time_factor: float = 3.0  # of the other times
+    scale_factor: float = 10.0  # of the scales of position
+
+    # The parameters' posterior, by Laplace and importance sampling
+    block: int = 100  # observations; 25 correlation times at the start, so blocks part little
+    step: float = 0.01  # of a logarithm, for gradients
+    wide_step: float = 0.2  # for curvatures, which should tell of a sigma's width, not of a point
+    farthest: float = 4.0  # spreads from the start; there a likelihood is flat
+    points: int = 32  # over which a prediction is averaged: 64 give the same sigmas to 2 %
+    smallest_share: float = 0.02  # probability of a family that is given points
+    heaviest: float = 5.0  # times the mean weight: one point in the tail can't stand for all
+    smallest_weight: float = 1e-3  # of parameters whose prediction is worth the work
+    prediction_epochs: int = 300  # for the parameters' spread, which changes as slowly as sigmas
+    smallest_sigma: float = 1e-12  # m, rad: for what the POS claims to know perfectly
+
+    # The mounting
+    iterations: int = 10  # of Gauss-Newton; a boresight wrong by degrees needs four
+    # One sigma of what is known without any measurement: a vehicle's size, and a drawing
+    unmeasured: tuple[float, float] = (1.0, float(np.radians(5.0)))  # m, rad
+    # A site determines what it tells better than a tape: 2 cm, or as much at a point 10 m away
+    determined_sigma: tuple[float, float] = (0.02, 0.002)  # m, rad
+
+
+SETTINGS = Settings()

@@ -1,0 +1,100 @@
+"""The POS error as random signals, each on a clock and with a sigma of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.collocation import Signal
+from mlscorr.collocation.covariance import INTEGRATED, Covariance
+from mlscorr.pos import StatedSigma
+
+
+@dataclass(frozen=True)
+class SignalParameters:
+    """What is chosen by likelihood: factors on the stated sigmas, and correlation times in s.
+
+    Parameters
+    ----------
+    family : str
+        Covariance family of drift, of bias and of attitude (Matern 3/2 beside integrated drift).
+    drift_scale, drift_time : float
+    walk_scale : float
+        Of the random walk in an integrated drift.
+    jitter_scale, jitter_time : float
+    bias_scale, bias_time : float
+    attitude_scale, attitude_time : float
+    """
+
+    family: str
+    drift_scale: float
+    drift_time: float
+    walk_scale: float
+    jitter_scale: float
+    jitter_time: float
+    bias_scale: float
+    bias_time: float
+    attitude_scale: float
+    attitude_time: float
+
+
+def pose_signals(
+    stated: StatedSigma, parameters: SignalParameters, partials: np.ndarray
+) -> tuple[Signal, ...]:
+    """Signals as they enter three axes of n points: drift first, then jitter, bias, attitude.
+
+    Parameters
+    ----------
+    stated : StatedSigma
+        At the n epochs.
+    parameters : SignalParameters
+    partials : (n, 3, 6) array
+        Of the points by position and rotation.
+    """
+    position, rotation = partials[:, :, :3], partials[:, :, 3:]
+    family = "matern32" if parameters.family == INTEGRATED else parameters.family
+    gnss = position * stated.gnss[:, None]
+    return (
+        *_drift(stated, parameters, position),
+        Signal(parameters.jitter_scale * gnss, Covariance("exponential", parameters.jitter_time)),
+        Signal(parameters.bias_scale * gnss, Covariance(family, parameters.bias_time)),
+        Signal(
+            parameters.attitude_scale * rotation @ stated.attitude,
+            Covariance(family, parameters.attitude_time),
+        ),
+    )
+
+
+def _drift(stated, parameters, position):
+    """Drift with the stated sigma(t), or velocity and position random walk since GNSS went."""
+    if parameters.family != INTEGRATED:
+        drift = parameters.drift_scale * position * stated.drift[:, None]
+        return (Signal(drift, Covariance(parameters.family, parameters.drift_time), stated.clock),)
+    clock = stated.growth_clock
+    velocity = parameters.drift_scale * position * stated.grown(1.5)[:, None]
+    walk = parameters.walk_scale * position * stated.grown(0.5)[:, None]
+    # a random walk over its sigma is exponential on a logarithmic clock, exp(-x / 2)
+    return (
+        Signal(velocity, Covariance(INTEGRATED, 1.0), clock),
+        Signal(walk, Covariance("exponential", 2.0), clock),
+    )
+
+
+def drift_alone(signals: tuple[Signal, ...], rows: int) -> tuple[Signal, ...]:
+    """The signals, of which the last rows show drift only.
+
+    Parameters
+    ----------
+    signals : tuple of Signal
+        As pose_signals gives them: jitter, bias and attitude are the last three.
+    rows : int
+    """
+    if rows == 0:
+        return signals
+    hidden = []
+    for signal in signals[-3:]:
+        mixing = signal.mixing.copy()
+        mixing[-rows:] = 0.0
+        hidden.append(replace(signal, mixing=mixing))
+    return (*signals[:-3], *hidden)

@@ -1,0 +1,200 @@
+"""Where control points hold a correction, and where it is extrapolated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mlscorr.collocation import Collocation
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters, pose_signals
+from mlscorr.survey import SAME_EPOCH, Trajectory
+
+ERROR_SIGNALS = 3  # jitter, bias and attitude, the last of pose_signals; those before are drift
+REASONS = (
+    "control points hold it",
+    "its pass has no control point",
+    "before the first control point of its pass",
+    "past the last control point of its pass",
+    "in a GNSS outage, past its last control point",
+    "control points tell less than half of the drift's variance",
+)
+HELD, NO_CONTROL, BEFORE_FIRST, PAST_LAST, IN_OUTAGE, DRIFT = range(len(REASONS))
+
+
+@dataclass(frozen=True)
+class WeakStretch:
+    """A part of the drive whose correction is extrapolated.
+
+    Parameters
+    ----------
+    start, end : float
+        Units: s.
+    length_m : float
+        Along the path. Units: m.
+    sigma : float
+        The largest 3D sigma of the corrected position: the error to expect. Units: m.
+    why : str
+    """
+
+    start: float
+    end: float
+    length_m: float
+    sigma: float
+    why: str
+
+    @property
+    def seconds(self) -> float:
+        """How long it takes. Units: s."""
+        return self.end - self.start
+
+    def document(self) -> dict[str, object]:
+        """The row of ``weak[]`` in report.json."""
+        row = {"from": self.start, "to": self.end, "length_m": self.length_m}
+        return {**row, "sigma": self.sigma, "why": self.why}
+
+
+@dataclass(frozen=True)
+class Support:
+    """What holds a correction along the drive.
+
+    Parameters
+    ----------
+    weak : tuple of WeakStretch
+        In time; they don't overlap.
+    outages : tuple of (float, float)
+        From where drift began to grow to where it restarts. Units: s.
+    steps : tuple of float
+        When the recorded position falls back. Units: s.
+    """
+
+    weak: tuple[WeakStretch, ...] = ()
+    outages: tuple[tuple[float, float], ...] = ()
+    steps: tuple[float, ...] = ()
+
+    def contains(self, gps_time: np.ndarray) -> np.ndarray:
+        """Which times (n,) lie in a weak stretch.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+
+        Examples
+        --------
+        >>> weak = WeakStretch(0.0, 2.0, 9.0, 0.3, "a"), WeakStretch(2.0, 3.0, 5.0, 0.2, "b")
+        >>> Support(weak).contains(np.array([-1.0, 0.0, 2.0, 3.0, 3.5]))
+        array([False,  True,  True,  True, False])
+        """
+        starts = np.array([stretch.start for stretch in self.weak])
+        ends = np.array([stretch.end for stretch in self.weak])
+        number = np.searchsorted(starts, gps_time, side="right")
+        return gps_time <= np.append(-np.inf, ends)[number]
+
+
+def find_support(
+    equations: Equations, solved: Collocation, parameters: SignalParameters, corrected: Trajectory
+) -> Support:
+    """What holds a correction along the drive.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the control points that took part.
+    solved : Collocation
+        Of them, under the parameters.
+    parameters : SignalParameters
+        The most probable ones.
+    corrected : Trajectory
+        With its sigmas.
+    """
+    codes = _reasons(equations, solved, parameters, corrected)
+    history, starts = equations.stated.history, equations.stated.starts
+    ends_by_step = np.append(np.isin(history.restarts, history.steps.middle), False)
+    shown = np.isfinite(starts) & (ends_by_step | history.is_stated)
+    return Support(
+        tuple(_stretches(codes, corrected)),
+        tuple(
+            (float(start), float(end))
+            for start, end, is_shown in zip(starts, history.edges[1:], shown, strict=True)
+            if is_shown and end > start
+        ),
+        tuple(history.steps.middle.tolist()),
+    )
+
+
+def _reasons(equations, solved, parameters, corrected):
+    """Number of the reason (n,) why each epoch of the trajectory is extrapolated; HELD where not.
+
+    No control holds an epoch before the first or past the last control point of its pass, nor
+    past the last one of an outage, as drift goes on growing there: a fall-back tells how far it
+    had come at its end, and leaves decimetres open before it. Between them, what control tells
+    has faded where the drift's variance is above half of what it is without control: there the
+    correction is closer to the trend than to its neighbours. Drift below the noise of GNSS
+    doesn't count: there is nothing to tell. Within a second an epoch is that of its control. Where
+    ties hold the passes together, a control point holds both, and the variance alone decides.
+    """
+    trajectory, stated = equations.trajectory, equations.stated_epochs
+    time, control = trajectory.gps_time, np.sort(equations.observed)
+    is_open = _is_drift_open(equations, solved, parameters, corrected)
+    codes = np.where(is_open, DRIFT, HELD)
+    if equations.ties is not None:
+        return codes if len(control) else np.full(len(time), NO_CONTROL)
+    for first, last in pairwise(equations.stated.history.edges):
+        rows = (time > first) & (time <= last) & (stated.since > 0)
+        inside = control[(control > first) & (control <= last)]
+        codes[rows & (time > inside.max(initial=-np.inf) + SAME_EPOCH)] = IN_OUTAGE
+    for first, last in trajectory.passes:
+        rows = (time >= first) & (time <= last)
+        inside = control[(control >= first) & (control <= last)]
+        if len(inside) == 0:
+            codes[rows] = NO_CONTROL
+            continue
+        codes[rows & (time < inside[0] - SAME_EPOCH)] = BEFORE_FIRST
+        codes[rows & (time > inside[-1] + SAME_EPOCH)] = PAST_LAST
+    near = np.searchsorted(control, time)
+    gap = np.abs(control[np.clip([near - 1, near], 0, len(control) - 1)] - time).min(axis=0)
+    codes[(codes == DRIFT) & (gap <= SAME_EPOCH)] = HELD
+    return codes
+
+
+def _is_drift_open(equations, solved, parameters, corrected):
+    """Where (n,) control tells less than half of a drift's variance, and GNSS doesn't hold it.
+
+    Nor of the whole position error's: drift and a slow bias may stand for each other, so that
+    neither is known where their sum is.
+    """
+    time, stated = equations.trajectory.gps_time, equations.stated_epochs
+    signals = pose_signals(stated, parameters, np.broadcast_to(np.eye(6), (len(time), 6, 6)))
+    mixings = [signal.mixing for signal in signals]
+    whole = sum((mixing[:, :3] ** 2).sum(axis=(1, 2)) for mixing in mixings)
+    is_open = (corrected.position_sigma**2).sum(axis=1) > SETTINGS.determined_ratio * whole
+    for number in range(len(mixings) - ERROR_SIGNALS, len(mixings)):
+        mixings[number] = np.zeros_like(mixings[number])
+    design = np.zeros_like(equations.pose_design(time))
+    covariance = solved.predict(time, design, mixings, [signal.clock for signal in signals])[1]
+    after = np.einsum("qii->q", covariance[:, :3, :3])
+    before = sum((mixing[:, :3] ** 2).sum(axis=(1, 2)) for mixing in mixings)
+    is_open &= after > SETTINGS.determined_ratio * before
+    return is_open & (before > (stated.gnss**2).sum(axis=1))
+
+
+def _stretches(codes, trajectory):
+    """A WeakStretch for each run of epochs with one reason, parted at the trajectory's gaps."""
+    time, part = trajectory.gps_time, trajectory.segment(trajectory.gps_time)
+    size = np.linalg.norm(trajectory.position_sigma, axis=1)
+    way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+    cuts = np.flatnonzero(np.diff(codes) | np.diff(part)) + 1
+    for first, end in pairwise([0, *cuts.tolist(), len(time)]):
+        if codes[first] != HELD and end - first > 1:
+            rows = slice(first, end)
+            yield WeakStretch(
+                float(time[first]),
+                float(time[end - 1]),
+                float(way[first : end - 1].sum()),
+                float(size[rows].max()),
+                REASONS[codes[first]],
+            )

@@ -1,0 +1,106 @@
+"""What the other targets say of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.posterior import Objective, Posterior
+from mlscorr.estimate.settings import SETTINGS
+
+
+@dataclass(frozen=True)
+class TargetTest:
+    """What the other targets say of one, of k passes; NaN where they don't determine the trend.
+
+    Parameters
+    ----------
+    name : str
+    statistic, critical : float
+        Chi-squared, and its critical value.
+    left_out, sigma : (k, 3) array
+        Its misclosures once the others have corrected them, and their sigmas. Units: m.
+    redundancy : (k, 3) array
+        The share of an error that its residual shows.
+    """
+
+    name: str
+    statistic: float
+    critical: float
+    left_out: np.ndarray
+    sigma: np.ndarray
+    redundancy: np.ndarray
+
+    @property
+    def w(self) -> np.ndarray:
+        """Data snooping's w (k, 3): standard normal without a gross error."""
+        return self.left_out / self.sigma
+
+    @property
+    def detectable(self) -> np.ndarray:
+        """Least error (k, 3) that w finds in 4 of 5 cases. Units: m."""
+        factor = norm.isf(SETTINGS.significance / 2) + norm.isf(SETTINGS.undetected)
+        return factor * self.sigma  # Baarda's usual 4.13
+
+    @property
+    def excess(self) -> float:
+        """Statistic over critical value; zero where there is none."""
+        return self.statistic / self.critical if np.isfinite(self.statistic) else 0.0
+
+
+def all_tests(equations: Equations, posterior: Posterior) -> list[TargetTest]:
+    """TargetTest of each target by all others.
+
+    Parameters
+    ----------
+    equations : Equations
+    posterior : Posterior
+        Of the parameters, by these equations.
+    """
+    tests = []
+    for block in Objective.of(equations).blocks:
+        solved = [(block.solve(chosen), weight) for chosen, weight in posterior.points]
+        targets = len(equations.target_rows)
+        tests += [_test(block, *target, solved, targets) for target in block.target_rows.items()]
+    return tests
+
+
+def single_test(equations: Equations, name: str, posterior: Posterior) -> TargetTest:
+    """TargetTest of one target by all others.
+
+    Parameters
+    ----------
+    equations : Equations
+        This target's among them.
+    name : str
+    posterior : Posterior
+        Of the parameters, by the others.
+    """
+    block = next(block for block in Objective.of(equations).blocks if name in block.names)
+    solved = [(block.solve(chosen), weight) for chosen, weight in posterior.points]
+    return _test(block, name, block.target_rows[name], solved, len(equations.target_rows))
+
+
+def _test(equations, name, rows, solved, targets):
+    """TargetTest by the left-out misclosure, averaged over the parameters.
+
+    What the parameters leave open is a part of its covariance, so that neither a mode that is too
+    sure of itself decides nor one that the target itself has raised.
+    """
+    critical = float(chi2.isf(SETTINGS.significance / targets, len(rows)))
+    if not solved[0][0].determined_without(rows):
+        nothing = np.full((len(rows) // 3, 3), np.nan)
+        return TargetTest(name, float("nan"), critical, nothing, nothing, nothing)
+    mean, square = 0.0, 0.0
+    for collocation, weight in solved:
+        residual, covariance = collocation.leave_out(rows)
+        mean = mean + weight * residual
+        square = square + weight * (covariance + np.outer(residual, residual))
+    covariance = square - np.outer(mean, mean)
+    redundancy = np.diag(equations.noise.block(rows) @ np.linalg.inv(covariance))
+    statistic = float(mean @ np.linalg.solve(covariance, mean))
+    parts = (mean, np.sqrt(np.diag(covariance)), redundancy)
+    return TargetTest(name, statistic, critical, *(part.reshape(-1, 3) for part in parts))

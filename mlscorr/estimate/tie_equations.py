@@ -1,0 +1,150 @@
+"""Ties as observation equations: one row, seen at two epochs.
+
+n . (c(t1) - c(t2)) at the places of both views is the misclosure, with c = P (trend + signals); a
+control target is the case in which one of both sides is surveyed. A mounting is the same at both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.collocation import Noise, SparseRows
+from mlscorr.estimate.signals import SignalParameters, pose_signals
+from mlscorr.frames import mounting_partials, pose_partials
+from mlscorr.pos import StatedSigma, stated_sigma
+from mlscorr.survey import Mounting, Pos, Ties, Trajectory
+
+SIGNS = np.array([1.0, -1.0])  # of the corrections at the first and the second view
+
+
+@dataclass(frozen=True)
+class TieEquations:
+    """The equations of n ties.
+
+    Parameters
+    ----------
+    gps_time : (n, 2) array
+        Units: s.
+    misclosure, variance : (n,) array
+        Units: m, m^2.
+    partials : (n, 2, 6) array
+        n^T P of the first view, -n^T P of the second.
+    stated : StatedSigma
+        At the 2 n views.
+    weight : (n,) array
+        By which the variance is divided: what robust estimation makes of each.
+    mounting : (n, 6) array, optional
+        n^T (M of the first view - M of the second): partial derivatives by the mounting, where it
+        is the trend (Eq. 16-18).
+    """
+
+    gps_time: np.ndarray
+    misclosure: np.ndarray
+    variance: np.ndarray
+    partials: np.ndarray
+    stated: StatedSigma
+    weight: np.ndarray
+    mounting: np.ndarray | None = None
+
+    @classmethod
+    def of(
+        cls,
+        trajectory: Trajectory,
+        pos: Pos,
+        ties: Ties,
+        starts: np.ndarray,
+        mounting: Mounting | None = None,
+    ) -> TieEquations:
+        """The equations of ties.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            As recorded.
+        pos : Pos
+        ties : Ties
+        starts : (k,) array
+            When drift begins to grow in each segment. Units: s.
+        mounting : Mounting, optional
+            With which the ties were georeferenced, where the equations are those of its error.
+        """
+        times, places = ties.gps_time.ravel(), ties.place.reshape(-1, 3)
+        along = _along(ties.direction, pose_partials(trajectory, places, times))
+        of_mounting = None
+        if mounting is not None:
+            partials = mounting_partials(trajectory, mounting, places, times)
+            of_mounting = _along(ties.direction, partials).sum(axis=1)
+        return cls(
+            gps_time=ties.gps_time,
+            misclosure=ties.misclosure,
+            variance=ties.variance,
+            partials=along,
+            stated=stated_sigma(trajectory, pos, times, starts),
+            weight=np.ones(len(ties)),
+            mounting=of_mounting,
+        )
+
+    def __len__(self) -> int:
+        return len(self.misclosure)
+
+    def select(self, rows: np.ndarray | slice) -> TieEquations:
+        """The equations of some ties.
+
+        Parameters
+        ----------
+        rows : (n,) bool or (k,) int array, or slice
+        """
+        views = np.arange(2 * len(self)).reshape(-1, 2)[rows].ravel()
+        return replace(
+            self,
+            gps_time=self.gps_time[rows],
+            misclosure=self.misclosure[rows],
+            variance=self.variance[rows],
+            partials=self.partials[rows],
+            stated=self.stated.at(views),
+            weight=self.weight[rows],
+            mounting=None if self.mounting is None else self.mounting[rows],
+        )
+
+    def with_starts(self, starts: np.ndarray) -> TieEquations:
+        """The same with drift that grows from other times on.
+
+        Parameters
+        ----------
+        starts : (k,) array
+            Units: s.
+        """
+        return replace(self, stated=replace(self.stated, starts=starts))
+
+    def rows(self, parameters: SignalParameters, pose_design: Callable) -> SparseRows:
+        """Rows for the solver.
+
+        Parameters
+        ----------
+        parameters : SignalParameters
+        pose_design : function of times
+            A (q, 6, p) of position and rotation; zero where the trend is the mounting's, whose
+            columns beyond the sixth no tie sees.
+        """
+        n, times = len(self), self.gps_time.ravel()
+        views = self.partials.reshape(2 * n, 1, 6)
+        pose = pose_design(times)
+        design = (views @ pose).reshape(n, 2, 1, pose.shape[2]).sum(axis=1)
+        if self.mounting is not None:
+            design[:, 0, : self.mounting.shape[1]] += self.mounting
+        return SparseRows(
+            gps_time=self.gps_time,
+            misclosure=self.misclosure[:, None],
+            noise=Noise((self.variance / self.weight)[:, None, None]),
+            design=design,
+            signals=pose_signals(self.stated, parameters, views),
+        )
+
+
+def _along(direction, partials):
+    """n^T of partial derivatives (n, 2, j) at both views (2 n, 3, j), the second with minus."""
+    by_view = partials.reshape(len(direction), 2, 3, partials.shape[2])
+    return SIGNS[:, None] * np.einsum("ni,nvij->nvj", direction, by_view)

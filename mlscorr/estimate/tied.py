@@ -1,0 +1,228 @@
+"""Ties beside control points: which of them hold, and the parameters that both choose.
+
+Of a thousand ties some are wrong: a car has gone, a row of windows was taken for the next. Robust
+weights come before parameters, since a likelihood that believes all ties prefers noise to drift:
+graduated ones under the control points' parameters (Geman-McClure, whose scale shrinks: Black and
+Rangarajan 1996), then Student's t in turn with the restricted likelihood, at last a cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm
+
+from mlscorr.collocation import reweight
+from mlscorr.correction import Correction
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters
+from mlscorr.estimate.screening import Outlier, Screening, may_go
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters
+from mlscorr.estimate.target_tests import all_tests
+from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.survey import Ties
+
+WRONG_BUT_USED = "It is used, as too few are left to tell which point is wrong"
+MEDIAN = float(norm.ppf(0.75))  # of the absolute value of a standard normal variable
+
+
+@dataclass(frozen=True)
+class TieResiduals:
+    """What a correction leaves of n ties.
+
+    Parameters
+    ----------
+    ties : Ties
+    used : (n,) bool array
+        Those that hold.
+    after : (n,) array
+        Misclosures that remain. Units: m.
+    """
+
+    ties: Ties
+    used: np.ndarray
+    after: np.ndarray
+
+    @classmethod
+    def of(cls, ties: Ties, used: np.ndarray, correction: Correction) -> TieResiduals:
+        """The residuals of ties after a correction.
+
+        Parameters
+        ----------
+        ties : Ties
+        used : (n,) bool array
+        correction : Correction
+        """
+        moved = [
+            correction.increments(ties.place[:, view], ties.gps_time[:, view])[0]
+            for view in range(2)
+        ]
+        change = np.einsum("ni,ni->n", ties.direction, moved[0] - moved[1])
+        return cls(ties, used, ties.misclosure - change)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence where no tie was used."""
+        if self.used.any():
+            return ()
+        return (
+            f"None of the {len(self.ties)} ties between passes was used: more than half of them "
+            "contradict the others. Did the street change between the passes, or is the mounting "
+            "wrong (mlscorr calibrate)?",
+        )
+
+
+@dataclass(frozen=True)
+class Tied:
+    """An estimate's equations with the ties that hold.
+
+    Parameters
+    ----------
+    equations : Equations
+    posterior : Posterior
+        Of the parameters, by both.
+    used : (n,) bool array
+        Which of the ties hold.
+    """
+
+    equations: Equations
+    posterior: Posterior
+    used: np.ndarray
+
+
+def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquations) -> Tied:
+    """The equations with the ties that hold, and the parameters that both choose.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the control points.
+    parameters : SignalParameters
+        That these chose.
+    ties : TieEquations
+    """
+    tied = graduated(equations, parameters, ties)
+    rows = tied.ties
+    parameters = _most_probable(tied, parameters)
+    tied = _weighted(tied, parameters, (_student,))
+    ratio = np.abs(_ratio(tied, parameters))
+    factor = float(np.clip(np.median(ratio) / MEDIAN, 1.0, SETTINGS.tie_cut))
+    used = ratio <= SETTINGS.tie_cut * factor
+    kept = replace(rows, variance=factor**2 * rows.variance, weight=np.ones(len(rows)))
+    kept = kept.select(used)
+    tied = replace(tied, ties=kept)
+    return Tied(tied, choose_parameters(_sample(tied), (parameters,), SETTINGS.tie_points), used)
+
+
+def screen_with_ties(
+    equations: Equations, screening: Screening, ties: TieEquations
+) -> tuple[Equations, Screening, np.ndarray]:
+    """The equations with ties, what both say of the control points, and which ties hold (n,).
+
+    A control point that few others could test is tested again, now that ties hold the drive.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the control points that the others don't contradict.
+    screening : Screening
+        Of these.
+    ties : TieEquations
+    """
+    parameters, kept, rejected = screening.posterior.modes[0][0], equations, []
+    while True:
+        tied = add_ties(kept, parameters, ties)
+        if tied.used.mean() < SETTINGS.tie_majority:
+            return equations, screening, np.zeros(len(ties), dtype=bool)
+        tests = all_tests(tied.equations, tied.posterior)
+        doubtful = sorted((t for t in tests if t.excess > 1.0), key=lambda t: -t.excess)
+        if not doubtful or not may_go(kept, {doubtful[0].name}):
+            break
+        rejected.append(doubtful[0])
+        kept = kept.without({doubtful[0].name})
+    changed = replace(
+        screening,
+        posterior=tied.posterior,
+        tests=tuple(tests),
+        outliers=(
+            *screening.outliers,
+            *(Outlier(test.name, test.statistic, test.critical) for test in rejected),
+        ),
+        warnings=(
+            *screening.warnings,
+            *(_contradiction(test, "It takes no part") for test in rejected),
+            *(_contradiction(test, WRONG_BUT_USED) for test in doubtful),
+        ),
+    )
+    return tied.equations, changed, tied.used
+
+
+def _contradiction(test, what):
+    """A sentence on a control point that ties and the other points contradict."""
+    worst = test.left_out[np.linalg.norm(test.left_out, axis=1).argmax()]
+    off = "/".join(f"{value:.3f}" for value in worst)
+    return (
+        f"Control point {test.name} contradicts what ties carry to it from the other control "
+        f"points: it is {off} m (E/N/H) off that, statistic {test.statistic:.1f} against "
+        f"{test.critical:.1f}. {what}: survey it again, or see by --no-ties whether ties are wrong."
+    )
+
+
+def _most_probable(tied, parameters):
+    """The most probable parameters of their family near some; the weights of the ties stay."""
+    objective = Objective.of(_sample(tied))
+    at, _ = objective.maximum(parameters.family, objective.logarithms(parameters))
+    return objective.parameters(parameters.family, at)
+
+
+def _sample(tied):
+    """The equations with as many of the ties as are needed to choose parameters."""
+    step = -(-len(tied.ties) // SETTINGS.tie_sample)
+    return replace(tied, ties=tied.ties.select(slice(None, None, step)))
+
+
+def _ratio(tied, parameters, solved=None):
+    """Residuals (n,) of the ties over their sigmas."""
+    solved = tied.solve(parameters) if solved is None else solved
+    variance = tied.ties.variance / tied.ties.weight
+    residual = variance * solved.weights[-len(tied.ties) :]  # N V^-1 (l - A x)
+    return residual / np.sqrt(tied.ties.variance)
+
+
+def graduated(equations: Equations, parameters: SignalParameters, ties: TieEquations) -> Equations:
+    """The equations with ties, whose weights' scale has shrunk from all to the honest ones.
+
+    Parameters
+    ----------
+    equations : Equations
+        Without ties.
+    parameters : SignalParameters
+    ties : TieEquations
+    """
+    tied = replace(equations, ties=ties)
+    largest = float(np.abs(_ratio(tied, parameters)).max(initial=0.0))
+    steps = max(int(np.ceil(np.log2(max(largest, 1.0) / SETTINGS.tie_cut))), 1)
+    scales = SETTINGS.tie_cut * 2.0 ** np.arange(steps)[::-1]
+    return _weighted(tied, parameters, [_geman_mcclure(scale) for scale in scales])
+
+
+def _geman_mcclure(scale: float) -> Callable:
+    return lambda ratio: (1.0 + (ratio / scale) ** 2) ** -2.0
+
+
+def _student(ratio):
+    freedom = SETTINGS.tie_freedom
+    return (freedom + 1.0) / (freedom + ratio**2)
+
+
+def _weighted(tied, parameters, functions):
+    """The equations with weights by each function of the residuals in turn."""
+    solved = tied.solve(parameters)
+    for function in functions:
+        weight = np.maximum(function(_ratio(tied, parameters, solved)), SETTINGS.resolution)
+        tied = replace(tied, ties=replace(tied.ties, weight=weight))
+        solved = reweight(solved, [np.ones(len(tied.gps_time)), weight])
+    return tied
