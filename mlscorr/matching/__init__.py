@@ -1,7 +1,7 @@
 """Which observation is which surveyed target: all of them decided together."""
 
-from mlscorr.matching.joint import Matches, match
-from mlscorr.matching.pairs import LARGEST_GATE, LEAST_GATE
+from mlscorr.matching.association import Matches, match
 from mlscorr.matching.reasons import Refusal
+from mlscorr.matching.settings import SETTINGS
 
-__all__ = ["LARGEST_GATE", "LEAST_GATE", "Matches", "Refusal", "match"]
+__all__ = ["SETTINGS", "Matches", "Refusal", "match"]

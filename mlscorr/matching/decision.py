@@ -3,15 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit, logit
 
-from mlscorr.matching.hypotheses import MOVED
 from mlscorr.matching.marginals import Marginals
-
-SURE = 0.99  # probability of a match, given all others, from which it is used
-SOUND = 0.9  # probability that its surveyed point isn't elsewhere; the outlier test follows
-LEAST_SOUND = 0.01  # the same by one pass alone, whatever the others say
-CLAIMED = 0.5  # probability of a pair from which it tells of its surveyed point
-TINY = 1e-12  # of probability, against division by zero
+from mlscorr.matching.pairs import CandidatePairs
+from mlscorr.matching.settings import SETTINGS
 
 
 @dataclass(frozen=True)
@@ -37,23 +33,71 @@ class Decision:
     passes: np.ndarray
     marginals: Marginals
 
+    def moved(self, pairs: CandidatePairs) -> np.ndarray:
+        """Surveyed point (n,) that each unnamed observation shows to be wrong, -1 for none.
 
-def decide(pairs, found, k):
-    """Decision on all pairs by their Marginals.
+        Parameters
+        ----------
+        pairs : CandidatePairs
+            Those that were decided on.
+        """
+        column = np.full(len(self.column), -1)
+        probable = pairs.same & (self.marginals.sound + self.marginals.moved >= 0.5)
+        probable &= self.wrong[pairs.control] > 0.5
+        row = np.repeat(np.arange(len(column)), np.diff(pairs.first))
+        column[row[probable]] = pairs.control[probable]
+        return np.where(self.column < 0, column, -1)
 
-    Whether a surveyed point lies where its target is, all observations of it decide together.
+
+def decide(pairs: CandidatePairs, marginals: Marginals, count: int, share: np.ndarray) -> Decision:
+    """Decide on all pairs: of a surveyed point's place, all observations of it decide jointly.
+
+    Parameters
+    ----------
+    pairs : CandidatePairs
+    marginals : Marginals
+    count : int
+        Of control points.
+    share : (p,) array
+        Probabilities that the surveyed points lie elsewhere which the marginals hold already.
     """
-    rest = np.clip(1.0 - found.sound - found.moved, TINY, None)
-    seen = pairs.alike & (found.sound + found.moved >= CLAIMED)
-    odds = np.log(found.moved / MOVED + rest) - np.log(found.sound / (1.0 - MOVED) + rest)
-    odds = np.log(MOVED / (1.0 - MOVED)) + np.bincount(pairs.control[seen], odds[seen], k)
-    wrong = 1.0 / (1.0 + np.exp(-np.clip(odds, -100.0, 100.0)))
-    certainty = found.sound / (found.sound + rest)
-    used = pairs.alike & (certainty >= SURE) & (found.sound >= LEAST_SOUND)
-    used = np.flatnonzero(used & (wrong[pairs.control] <= 1.0 - SOUND))
+    sound, moved = marginals.sound, marginals.moved
+    rest = np.clip(1.0 - sound - moved, np.finfo(float).eps, None)
+    probable = pairs.same & (sound + moved >= 0.5)
+    odds = _odds(marginals, share)
+    total = np.bincount(pairs.control[probable], odds[probable], count)
+    wrong = expit(logit(SETTINGS.moved_share) + total)
+    certainty = sound / (sound + rest)
+    used = pairs.same & (certainty >= SETTINGS.smallest_probability)
+    used = np.flatnonzero(used & (wrong[pairs.control] <= 1.0 - SETTINGS.smallest_sound))
     n = len(pairs.first) - 1
     row = np.repeat(np.arange(n), np.diff(pairs.first))[used]
     column, probability = np.full(n, -1), np.zeros(n)
     column[row], probability[row] = pairs.control[used], certainty[used]
-    passes = np.bincount(pairs.control[seen], minlength=k)
-    return Decision(column, probability, wrong, passes, found)
+    passes = np.bincount(pairs.control[probable], minlength=count)
+    return Decision(column, probability, wrong, passes, marginals)
+
+
+def moved_share_by_others(
+    pairs: CandidatePairs, marginals: Marginals, count: int, share: np.ndarray
+) -> np.ndarray:
+    """Probability (p,) that each pair's surveyed point lies elsewhere, by its other observations.
+
+    Parameters
+    ----------
+    pairs, marginals, count, share
+        As of ``decide``.
+    """
+    probable = pairs.same & (marginals.sound + marginals.moved >= 0.5)
+    odds = np.where(probable, _odds(marginals, share), 0.0)
+    others = np.bincount(pairs.control, odds, count)[pairs.control] - odds
+    certain = 1.0 - SETTINGS.smallest_probability
+    by_others = expit(logit(SETTINGS.moved_share) + others)
+    return np.clip(by_others, SETTINGS.moved_share * certain, 1.0 - certain)
+
+
+def _odds(marginals, share):
+    """Log likelihood ratios (p,) of a surveyed point's lying elsewhere."""
+    sound, moved = marginals.sound, marginals.moved
+    rest = np.clip(1.0 - sound - moved, np.finfo(float).eps, None)
+    return np.log(moved / share + rest) - np.log(sound / (1.0 - share) + rest)

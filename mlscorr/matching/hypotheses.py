@@ -6,26 +6,15 @@ are dropped, and those that differ only long ago are merged (multiple hypothesis
 1979).
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
-VISIT = 2.0  # s: one control point is seen once within it, as the extraction splits visits
-MOVED = 0.05  # of the surveyed points lie elsewhere than their targets: marks kicked, numbers mixed
-MOVED_BY = 1.0  # m, one sigma per axis of that
-EXCHANGED = 0.03  # of them have another's kind or size: names exchanged, or taken down wrong
-MOST = 40  # hypotheses per belief
-LEAST = -16.0  # log weight against the best: 1e-7
-REMEMBERED = 4  # matches back; hypotheses that agree in them are merged
-RESTARTS = 200.0  # s from one to the next: outages of GNSS end and signals are lost minutes apart
-LEAST_STEP = 0.1  # s, so that every belief stays among the hypotheses
-RESTARTED = 3  # hypotheses, the best ones, for which a restart is followed
-KEPT = 12  # of each side, when past and future are joined
-HASH = np.random.default_rng(0).integers(1, 2**62, 64)  # to compare rows of numbers at once
+from mlscorr.matching.beliefs import Chain, transition
 
 
-@dataclass(frozen=True)
-class Hypotheses:
+class Hypotheses(NamedTuple):
     """b hypotheses of several beliefs at one observation, before it is used.
 
     Parameters
@@ -34,14 +23,14 @@ class Hypotheses:
     weight : (b,) array
         Logarithms.
     mean : (b, 3, 3) array
-        Of c, s and its rate (last axis) per map axis.
+        Of c, s and its rate (last axis) per map axis, over their sigmas before any observation.
     covariance : (b, 3, 3, 3) array
         Of these per map axis.
     used : (b, w) int array
         Control points of the observations in ``window`` (w,), those of the last two seconds; -1
         for none.
-    history : (b, REMEMBERED) int array
-        The last pairs.
+    history : (b, h) int array
+        The last pairs of the memory.
     """
 
     belief: np.ndarray
@@ -52,199 +41,165 @@ class Hypotheses:
     window: np.ndarray
     history: np.ndarray
 
-    def __len__(self):
-        return len(self.weight)
 
-    def __getitem__(self, rows):
-        return Hypotheses(
-            self.belief[rows],
-            self.weight[rows],
-            self.mean[rows],
-            self.covariance[rows],
-            self.used[rows],
-            self.window,
-            self.history[rows],
-        )
+@njit(cache=True, nogil=True)
+def select(now: Hypotheses, rows: np.ndarray) -> Hypotheses:
+    """Some of the hypotheses.
 
-
-def walk(chain, order):
-    """Hypotheses before each observation in an order of rows.
-
-    Yields (row, Hypotheses) for each, and at last (None, Hypotheses) after all of them.
+    Parameters
+    ----------
+    now : Hypotheses
+    rows : (r,) int array
     """
-    now = _start(chain)
-    last = None
-    for row in order:
-        if last is not None:
-            now = _predict(now, chain, last, row)
-        yield row, now
-        now = _use(now, chain, row)
-        last = row
-    yield None, now
+    mean, covariance, used = now.mean[rows], now.covariance[rows], now.used[rows]
+    return Hypotheses(
+        now.belief[rows], now.weight[rows], mean, covariance, used, now.window, now.history[rows]
+    )
 
 
-def log_likelihoods(now, chain, row):
+@njit(cache=True, nogil=True)
+def start(chain: Chain) -> Hypotheses:
+    """One hypothesis of each belief, before any observation.
+
+    Parameters
+    ----------
+    chain : Chain
+    """
+    m = len(chain.rate)
+    covariance = np.zeros((m, 3, 3, 3)) + np.eye(3)
+    belief, weight, mean = np.arange(m), np.zeros(m), np.zeros((m, 3, 3))
+    used, window = np.empty((m, 0), np.int64), np.empty(0, np.int64)
+    history = np.full((m, chain.settings.memory), -1)
+    return Hypotheses(belief, weight, mean, covariance, used, window, history)
+
+
+@njit(cache=True, nogil=True)
+def predict(now: Hypotheses, chain: Chain, last: int, row: int) -> Hypotheses:
+    """The hypotheses at the next observation: the drift went on, or started anew in any belief.
+
+    Parameters
+    ----------
+    now : Hypotheses
+        After the last observation.
+    chain : Chain
+    last, row : int
+        Rows of the last observation and the next one, later or earlier.
+    """
+    time = abs(chain.gps_time[row] - chain.gps_time[last]) / chain.settings.restart_time
+    stays = np.exp(-max(time, np.exp(chain.settings.smallest_weight)))
+    best = np.argsort(-now.weight, kind="mergesort")[: chain.settings.joined_hypotheses // 4]
+    b, m = len(now.weight), len(chain.rate)
+    after = select(now, np.append(np.arange(b), np.repeat(best, m)))
+    after.weight[:b] += np.log(stays)
+    after.weight[b:] += np.log((1.0 - stays) / m)
+    after.history[b:] = -2  # as of no other hypothesis
+    matrix = transition(chain, last, row)
+    for hypothesis in range(len(after.weight)):
+        _carry(matrix[after.belief[hypothesis] if hypothesis < b else m], after, hypothesis)
+        if hypothesis >= b:
+            after.belief[hypothesis] = (hypothesis - b) % m
+    recent = np.abs(chain.gps_time[now.window] - chain.gps_time[row]) <= chain.settings.pause
+    kept = np.flatnonzero(recent)
+    mean, covariance, used = after.mean, after.covariance, after.used[:, kept]
+    window = now.window[kept]
+    return Hypotheses(after.belief, after.weight, mean, covariance, used, window, after.history)
+
+
+@njit(cache=True, nogil=True)
+def _carry(f, now, hypothesis):
+    """Kalman prediction, in place: x = F x, P = I + F (P - I) F^T per axis."""
+    half = np.empty((3, 3))  # F (P - I)
+    for axis in range(3):
+        x, p = now.mean[hypothesis, axis], now.covariance[hypothesis, axis]
+        x[0] *= f[0, 0]
+        x[1], x[2] = f[1, 1] * x[1] + f[1, 2] * x[2], f[2, 1] * x[1] + f[2, 2] * x[2]
+        for i in range(3):
+            p[i, i] -= 1.0
+        for i in range(3):
+            for j in range(3):
+                half[i, j] = f[i, 0] * p[0, j] + f[i, 1] * p[1, j] + f[i, 2] * p[2, j]
+        for i in range(3):
+            for j in range(3):
+                p[i, j] = half[i, 0] * f[j, 0] + half[i, 1] * f[j, 1] + half[i, 2] * f[j, 2]
+            p[i, i] += 1.0
+
+
+@njit(cache=True, nogil=True)
+def log_likelihoods(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
     """Log densities (b, 2 k + 1) of what an observation is, by the misclosures of its k pairs.
 
     First its being each pair's target, then its being a target whose surveyed point lies elsewhere,
-    at last its being none of them. A pair that isn't alike may be a target taken down wrong.
+    at last its being none of them. A pair of two appearances may be a target taken down wrong.
+
+    Parameters
+    ----------
+    now : Hypotheses
+    chain : Chain
+    row : int
     """
-    pairs = chain.pairs.of(row)
-    gain = chain.gain[now.belief, row]
-    value, variance = displacement(now.mean, now.covariance, gain)
-    variance = (variance + chain.noise[now.belief, row])[:, None] + chain.pair_variance[pairs]
-    square = (chain.pairs.misclosure[pairs] - value[:, None]) ** 2
-    alike = chain.pairs.alike[pairs]
-    share = np.where(alike, 1.0 - MOVED - EXCHANGED, EXCHANGED)
-    sound = _log_normal(square, variance) + np.log(share)
-    moved = _log_normal(square, variance + MOVED_BY**2) + np.log(MOVED)
-    moved[:, ~alike] = -np.inf
-    used = taken(now, chain, row)
-    sound[used], moved[used] = -np.inf, -np.inf
-    return np.column_stack([sound, moved, np.full(len(now), chain.otherwise[row])])
+    first, k = chain.pairs.first[row], chain.pairs.first[row + 1] - chain.pairs.first[row]
+    density = np.full((len(now.weight), 2 * k + 1), -np.inf)
+    density[:, 2 * k] = chain.otherwise[row]
+    value, variance = displacement(now, chain, row)
+    used, exchanged = in_use(now, chain, row), chain.settings.exchanged_share
+    square, spread = np.empty(3), np.empty(3)
+    for hypothesis in range(len(now.weight)):
+        for choice in range(k):
+            if used[hypothesis, choice]:
+                continue
+            pair = first + choice
+            for axis in range(3):
+                spread[axis] = variance[hypothesis, axis] + chain.pair_variance[pair, axis]
+                square[axis] = (chain.pairs.misclosure[pair, axis] - value[hypothesis, axis]) ** 2
+            moved = chain.moved_share[pair]
+            same = chain.pairs.same[pair]
+            share = (1.0 - moved) * (1.0 - exchanged) if same else exchanged
+            density[hypothesis, choice] = _log_normal(square, spread, 0.0) + np.log(share)
+            if same:
+                elsewhere = _log_normal(square, spread, chain.settings.moved_sigma**2)
+                density[hypothesis, k + choice] = elsewhere + np.log(moved)
+    return density
 
 
-def _log_normal(square, variance):
-    return -0.5 * (square / variance + np.log(2 * np.pi * variance)).sum(axis=2)
+@njit(cache=True, nogil=True)
+def displacement(now: Hypotheses, chain: Chain, row: int) -> tuple[np.ndarray, np.ndarray]:
+    """Misclosure (b, 3) by the states, and its variance without survey's. Units: m, m^2.
+
+    Parameters
+    ----------
+    now : Hypotheses
+    chain : Chain
+    row : int
+    """
+    sigma, p = chain.settings.constant_sigma, now.covariance
+    gain, noise = chain.gain[:, row][now.belief], chain.noise[:, row][now.belief]
+    value = sigma * now.mean[..., 0] + gain * now.mean[..., 1]
+    variance = sigma**2 * p[..., 0, 0] + 2.0 * sigma * gain * p[..., 0, 1]
+    return value, variance + gain**2 * p[..., 1, 1] + noise
 
 
-def displacement(mean, covariance, gain):
-    """Misclosure (b, 3) by the states, and its variance without noise. Units: m, m^2."""
-    value = mean[..., 0] + gain * mean[..., 1]
-    both = covariance[..., 0, 0] + 2 * gain * covariance[..., 0, 1]
-    return value, both + gain**2 * covariance[..., 1, 1]
+@njit(cache=True, nogil=True)
+def in_use(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
+    """Which pairs of an observation name a point that its hypothesis uses already: (b, k).
+
+    Parameters
+    ----------
+    now : Hypotheses
+    chain : Chain
+    row : int
+    """
+    control = chain.pairs.control[chain.pairs.first[row] : chain.pairs.first[row + 1]]
+    used = np.zeros((len(now.weight), len(control)), np.bool_)
+    for place, other in enumerate(now.window):
+        if chain.pass_number[other] == chain.pass_number[row]:
+            used |= control == now.used[:, place].copy().reshape(-1, 1)
+    return used
 
 
-def taken(now, chain, row):
-    """Which pairs of an observation name a point that its hypothesis uses already: (b, k)."""
-    control = chain.pairs.control[chain.pairs.of(row)]
-    same_pass = chain.pass_number[now.window] == chain.pass_number[row]
-    used = now.used[:, same_pass]
-    return (used[:, None, :] == control[:, None]).any(axis=2)
-
-
-def best_of_each(belief, weight, most):
-    """Rows with the largest weights of each belief, at most so many, that aren't negligible."""
-    order = np.lexsort((-weight, belief))
-    first = np.searchsorted(belief[order], belief[order])
-    rank = np.arange(len(order)) - first
-    near = weight[order] - weight.max() >= LEAST
-    return order[(rank < most) & near]
-
-
-def _start(chain):
-    b = len(chain.rate)
-    return Hypotheses(
-        belief=np.arange(b),
-        weight=np.zeros(b),
-        mean=np.zeros((b, 3, 3)),
-        covariance=np.tile((chain.prior[:, :, None] * np.eye(3))[:, None], (1, 3, 1, 1)),
-        used=np.empty((b, 0), int),
-        window=np.empty(0, int),
-        history=np.full((b, REMEMBERED), -1),
-    )
-
-
-def _predict(now, chain, last, row):
-    """The hypotheses at the next observation: the drift went on, or started anew in any belief."""
-    dt = max(abs(chain.gps_time[row] - chain.gps_time[last]), LEAST_STEP)
-    stays = np.exp(-dt / RESTARTS)
-    on = _go_on(now, chain, last, row)
-    best = np.argsort(-on.weight)[:RESTARTED]
-    m = len(chain.rate)
-    parent, belief = np.repeat(best, m), np.tile(np.arange(m), len(best))
-    mean, covariance = np.zeros((len(parent), 3, 3)), np.zeros((len(parent), 3, 3, 3))
-    mean[..., 0] = on.mean[parent, :, 0]
-    covariance[..., 0, 0] = on.covariance[parent, :, 0, 0]
-    covariance[..., 1:, 1:] = (chain.prior[belief, :, None] * np.eye(3))[:, None, 1:, 1:]
-    anew = on.weight[parent] + np.log((1.0 - stays) / m)
-    return Hypotheses(
-        np.append(on.belief, belief),
-        np.append(on.weight + np.log(stays), anew),
-        np.concatenate([on.mean, mean]),
-        np.concatenate([on.covariance, covariance]),
-        np.vstack([on.used, on.used[parent]]),
-        on.window,
-        np.vstack([on.history, np.full((len(parent), REMEMBERED), -2)]),
-    )
-
-
-def _go_on(now, chain, last, row):
-    matrix, noise = (part[now.belief][:, None] for part in chain.transition(last, row))
-    recent = np.abs(chain.gps_time[now.window] - chain.gps_time[row]) <= VISIT
-    return Hypotheses(
-        now.belief,
-        now.weight,
-        (matrix @ now.mean[..., None])[..., 0],
-        matrix @ now.covariance @ matrix.swapaxes(-1, -2) + noise,
-        now.used[:, recent],
-        now.window[recent],
-        now.history,
-    )
-
-
-def _use(now, chain, row):
-    """The hypotheses after an observation: each branches into its pairs and none."""
-    pairs = chain.pairs.of(row)
-    k = pairs.stop - pairs.start
-    weight = now.weight[:, None] + log_likelihoods(now, chain, row)
-    kept = best_of_each(np.repeat(now.belief, 2 * k + 1), weight.ravel(), 4 * MOST)
-    parent, choice = np.divmod(kept, 2 * k + 1)
-    known = choice < 2 * k
-    pair = np.where(known, pairs.start + choice % max(k, 1), -1)
-    control = np.append(chain.pairs.control, -1)[pair]
-    before = now[parent]
-    mean, covariance = before.mean.copy(), before.covariance.copy()
-    extra = np.where(choice < k, 0.0, MOVED_BY**2)[known]
-    mean[known], covariance[known] = _update(before[known], chain, row, pair[known], extra)
-    shifted = np.column_stack([before.history[:, 1:], pair])
-    after = Hypotheses(
-        before.belief,
-        weight.ravel()[kept],
-        mean,
-        covariance,
-        np.column_stack([before.used, control]),
-        np.append(before.window, row),
-        np.where((choice < k)[:, None], shifted, before.history),
-    )
-    merged = _merge(after)
-    return merged[best_of_each(merged.belief, merged.weight, MOST)]
-
-
-def _update(before, chain, row, pair, extra):
-    """States after their hypotheses' pairs were used, with extra variances (m^2)."""
-    gain = chain.gain[before.belief, row]
-    value, variance = displacement(before.mean, before.covariance, gain)
-    variance = variance + chain.noise[before.belief, row] + chain.pair_variance[pair]
-    variance = variance + extra[:, None]
-    cross = before.covariance[..., 0] + gain[..., None] * before.covariance[..., 1]
-    weight = cross / variance[..., None]
-    away = chain.pairs.misclosure[pair] - value
-    covariance = before.covariance - weight[..., :, None] * cross[..., None, :]
-    return before.mean + weight * away[..., None], covariance
-
-
-def _merge(after):
-    """One of those that agree in the last pairs and the last seconds, with their weights' sum."""
-    if len(after) < 2:
-        return after
-    key = np.column_stack([after.belief, after.history, after.used])
-    numbers = np.resize(HASH, key.shape[1]) * np.arange(1, key.shape[1] + 1)
-    _, first, of = np.unique((key + 3) @ numbers, return_index=True, return_inverse=True)
-    if len(first) == len(after):
-        return after
-    best = np.full(len(first), -np.inf)
-    np.maximum.at(best, of, after.weight)
-    total = best + np.log(np.bincount(of, np.exp(after.weight - best[of])))
-    order = np.lexsort((-after.weight, of))
-    heaviest = order[np.searchsorted(of[order], np.arange(len(first)))]
-    merged = after[heaviest]
-    return Hypotheses(
-        merged.belief,
-        total,
-        merged.mean,
-        merged.covariance,
-        merged.used,
-        merged.window,
-        merged.history,
-    )
+@njit(cache=True, nogil=True)
+def _log_normal(square, variance, extra):
+    total, size = 0.0, 1.0
+    for axis in range(3):
+        total += square[axis] / (variance[axis] + extra)
+        size *= 2.0 * np.pi * (variance[axis] + extra)
+    return -0.5 * (total + np.log(size))

@@ -1,34 +1,33 @@
-"""How probable each pair is, given all other observations before and after it."""
+"""How probable each pair is, given all other observations before and after it.
 
-from dataclasses import dataclass
+Both sides are what Kalman filters know, one from the drive's start and one from its end: their
+product, over the prior that both hold, is what all other observations say (two-filter smoother,
+Fraser and Potter 1969).
+"""
+
+from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp
+from numba import njit
 
-from mlscorr.matching.hypotheses import (
-    KEPT,
-    VISIT,
-    Hypotheses,
-    best_of_each,
-    displacement,
-    log_likelihoods,
-    taken,
-    walk,
-)
-
-CLASH = -40.0  # log weight of a past and a future that use a point twice in one visit
-REVERSED = np.array([1.0, 1.0, -1.0])  # the rate changes its sign when time runs backwards
+from mlscorr.matching.beliefs import Chain
+from mlscorr.matching.branching import heaviest, use
+from mlscorr.matching.hypotheses import Hypotheses, displacement, log_likelihoods, predict, start
 
 
-@dataclass(frozen=True)
-class Marginals:
-    """Probabilities (p,) of each pair, and what all others make of each observation.
+class Marginals(NamedTuple):
+    """How probable pairs are, and what all others make of each observation.
 
-    sound is that of a pair's being right and its surveyed point where the target is, moved that
-    of its being right and the surveyed point elsewhere.
-
-    expected (n, 3) is the misclosure by the other observations, sigma (n, 3) that of the
-    difference to it. Units: m.
+    Parameters
+    ----------
+    sound : (p,) array
+        Probability of a pair's being right and its surveyed point where the target is.
+    moved : (p,) array
+        Of its being right and the surveyed point elsewhere.
+    expected : (n, 3) array
+        Misclosure by the other observations. Units: m.
+    sigma : (n, 3) array
+        Of the difference to it. Units: m.
     """
 
     sound: np.ndarray
@@ -37,91 +36,145 @@ class Marginals:
     sigma: np.ndarray
 
 
-def marginals(chain):
-    """Marginals of a Chain: hypotheses from its start joined with those from its end."""
-    n, p = len(chain), len(chain.pairs.control)
-    rows = np.arange(n)
-    forward = [_light(now) for _, now in walk(chain, rows)][:-1]
-    found = Marginals(np.zeros(p), np.zeros(p), np.zeros((n, 3)), np.zeros((n, 3)))
-    for row, backward in walk(chain, rows[::-1]):
-        if row is None:
-            break
-        _join(forward.pop(), _light(backward), chain, row, found)
-    return found
+def marginals(chain: Chain) -> Marginals:
+    """Join hypotheses from the start of a drive with those from its end.
+
+    Parameters
+    ----------
+    chain : Chain
+    """
+    n, p = len(chain.gps_time), len(chain.pairs.control)
+    result = Marginals(np.zeros(p), np.zeros(p), np.zeros((n, 3)), np.zeros((n, 3)))
+    if p > 0:
+        _smooth(chain, result)
+    return result
 
 
-def _light(now):
-    return now[best_of_each(now.belief, now.weight, KEPT)]
+@njit(cache=True, nogil=True)
+def _smooth(chain, result):
+    """Fill in the marginals of all observations.
+
+    Of the past's hypotheses only every sqrt(n)-th are kept, and the stretch from there is walked
+    again where the future comes to it: memory grows with sqrt(n).
+    """
+    n = len(chain.gps_time)
+    length = int(np.ceil(np.sqrt(n)))
+    now = start(chain)
+    begins = [now]
+    for row in range(1, n):
+        now = predict(use(now, chain, row - 1), chain, row - 1, row)
+        if row % length == 0:
+            begins.append(now)
+    future = start(chain)
+    for part in range(len(begins) - 1, -1, -1):
+        first, last = part * length, min((part + 1) * length, n) - 1
+        past = [heaviest(begins[part], chain)]
+        now = begins[part]
+        for row in range(first + 1, last + 1):
+            now = predict(use(now, chain, row - 1), chain, row - 1, row)
+            past.append(heaviest(now, chain))
+        for row in range(last, first - 1, -1):
+            if row + 1 < n:
+                future = predict(use(future, chain, row + 1), chain, row + 1, row)
+            _fill(past[row - first], heaviest(future, chain), chain, row, result)
 
 
-def _join(before, after, chain, row, found):
-    """Fill in the marginals of one observation."""
-    one, other = np.nonzero(before.belief[:, None] == after.belief)
-    both = _product(before, after, one, other, chain)
+@njit(cache=True, nogil=True)
+def _fill(before, after, chain, row, result):
+    """Fill in the marginals of an observation."""
+    both = join(before, after, chain)
+    if len(both.weight) == 0:
+        return  # past and future agree in no belief: nothing is said
     density = log_likelihoods(both, chain, row)
-    density[:, :-1][np.tile(taken(after, chain, row), 2)[other]] = -np.inf
-    prior = both.weight + np.where(_clash(before, after, chain)[one, other], CLASH, 0.0)
-    weight = prior[:, None] + density
-    probability = np.exp(weight - logsumexp(weight)).sum(axis=0)
-    pairs = chain.pairs.of(row)
-    found.sound[pairs], found.moved[pairs] = probability[:-1].reshape(2, -1)
-    share = np.exp(prior - logsumexp(prior))
-    value, variance = displacement(both.mean, both.covariance, chain.gain[both.belief, row])
-    found.expected[row] = share @ value
-    spread = variance + chain.noise[both.belief, row] + (value - found.expected[row]) ** 2
-    found.sigma[row] = np.sqrt(share @ spread)
+    k = density.shape[1] // 2
+    weight = both.weight.reshape(-1, 1) + density
+    probability = np.exp(weight - weight.max())
+    probability /= probability.sum()
+    first = chain.pairs.first[row]
+    result.sound[first : first + k] = probability[:, :k].sum(axis=0)
+    result.moved[first : first + k] = probability[:, k : 2 * k].sum(axis=0)
+    share = np.exp(both.weight - both.weight.max())
+    share /= share.sum()
+    value, variance = displacement(both, chain, row)
+    result.expected[row] = share @ value
+    result.sigma[row] = np.sqrt(share @ (variance + (value - result.expected[row]) ** 2))
 
 
+@njit(cache=True, nogil=True)
+def join(before: Hypotheses, after: Hypotheses, chain: Chain) -> Hypotheses:
+    """Pairs (past, future) of hypotheses of one belief, joined; their prior counts once.
+
+    With precisions L and means m, L = L1 + L2 - I and L m = L1 m1 + L2 m2. Both windows are
+    joined, and the histories are those of the past.
+
+    Parameters
+    ----------
+    before, after : Hypotheses
+        At an observation, by those before it and by those after it.
+    chain : Chain
+    """
+    past, future = np.nonzero(before.belief.reshape(-1, 1) == after.belief)
+    precisions, vectors, weights = _information(before)
+    later_precisions, later_vectors, later_weights = _information(after)
+    weights = (before.weight + weights).reshape(-1, 1) + after.weight + later_weights
+    weights += 2.0 * chain.settings.smallest_weight * _clash(before, after, chain)
+    weight, mean = np.empty(len(past)), np.empty((len(past), 3, 3))
+    covariance = np.empty((len(past), 3, 3, 3))
+    for pair, (i, j) in enumerate(zip(past, future)):  # noqa: B905 - numba knows no strict
+        weight[pair] = weights[i, j]
+        for axis in range(3):
+            x, p = mean[pair, axis], covariance[pair, axis]
+            precision = precisions[i, axis] + later_precisions[j, axis] - np.eye(3)
+            vector = vectors[i, axis] + later_vectors[j, axis]
+            determinant, square = _invert(precision, p), 0.0
+            for row in range(3):
+                x[row] = p[row, 0] * vector[0] + p[row, 1] * vector[1] + p[row, 2] * vector[2]
+                square += vector[row] * x[row]
+            weight[pair] += 0.5 * (square - np.log(determinant))
+    used = np.column_stack((before.used[past], after.used[future]))
+    window, history = np.append(before.window, after.window), before.history[past]
+    return Hypotheses(before.belief[past], weight, mean, covariance, used, window, history)
+
+
+@njit(cache=True, nogil=True)
+def _information(now):
+    """Precisions L, vectors L m and weights (log |L| - m L m) / 2, over all axes."""
+    precision, vector = np.empty(now.covariance.shape), np.zeros(now.mean.shape)
+    weight = np.zeros(len(now.weight))
+    for hypothesis in range(len(weight)):
+        for axis in range(3):
+            matrix, x = precision[hypothesis, axis], now.mean[hypothesis, axis]
+            square = np.log(_invert(now.covariance[hypothesis, axis], matrix))
+            for i in range(3):
+                for j in range(3):
+                    vector[hypothesis, axis, i] += matrix[i, j] * x[j]
+                square += vector[hypothesis, axis, i] * x[i]
+            weight[hypothesis] -= 0.5 * square
+    return precision, vector, weight
+
+
+@njit(cache=True, nogil=True)
+def _invert(matrix, out):
+    """Inverse of a symmetric 3 x 3 matrix by its cofactors, and its determinant."""
+    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
+    d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
+    out[0, 0], out[1, 1], out[2, 2] = d * f - e * e, a * f - c * c, a * d - b * b
+    out[0, 1] = out[1, 0] = c * e - b * f
+    out[0, 2] = out[2, 0] = b * e - c * d
+    out[1, 2] = out[2, 1] = b * c - a * e
+    determinant = a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
+    out /= determinant
+    return determinant
+
+
+@njit(cache=True, nogil=True)
 def _clash(before, after, chain):
     """Which hypotheses of past and future (b, a) use one control point twice in one visit."""
-    past, future = before.window, after.window
-    near = np.abs(chain.gps_time[past][:, None] - chain.gps_time[future]) <= VISIT
-    near &= chain.pass_number[past][:, None] == chain.pass_number[future]
-    clash = np.zeros((len(before), len(after)), bool)
-    for i, j in zip(*np.nonzero(near), strict=True):
-        mine, theirs = before.used[:, i, None], after.used[:, j]
-        clash |= (mine == theirs) & (mine >= 0)
+    clash = np.zeros((len(before.weight), len(after.weight)), np.bool_)
+    for i, row in enumerate(before.window):
+        for j, other in enumerate(after.window):
+            near = abs(chain.gps_time[row] - chain.gps_time[other]) <= chain.settings.pause
+            if near and chain.pass_number[row] == chain.pass_number[other]:
+                control = before.used[:, i].copy().reshape(-1, 1)
+                clash |= (control == after.used[:, j]) & (control >= 0)
     return clash
-
-
-def _product(before, after, one, other, chain):
-    """Pairs (one, other) of hypotheses of past and future, joined; their prior counts once.
-
-    With precisions L and means m, L = L1 + L2 - L0 and L m = L1 m1 + L2 m2.
-    """
-    past, eta_past, square_past, size_past = _information(before.mean, before.covariance)
-    turned = after.covariance * (REVERSED[:, None] * REVERSED)
-    future, eta_future, square_future, size_future = _information(after.mean * REVERSED, turned)
-    prior = chain.prior[before.belief[one]][:, None]
-    precision = past[one] + future[other] - (1.0 / prior)[..., None] * np.eye(3)
-    covariance, size = _inverse(precision)
-    eta = eta_past[one] + eta_future[other]
-    mean = (covariance @ eta[..., None])[..., 0]
-    square = (eta * mean).sum(axis=(1, 2)) - square_past[one] - square_future[other]
-    size = (np.log(prior).sum(axis=-1) - np.log(size)).sum(axis=1)
-    size = size + size_past[one] + size_future[other]
-    weight = before.weight[one] + after.weight[other] + 0.5 * (square + size)
-    return Hypotheses(
-        before.belief[one], weight, mean, covariance, before.used[one], before.window,
-        before.history[one],
-    )  # fmt: skip
-
-
-def _information(mean, covariance):
-    """Precision, precision times mean, mean times that, and log determinant of the precision."""
-    precision, size = _inverse(covariance)
-    eta = (precision @ mean[..., None])[..., 0]
-    return precision, eta, (eta * mean).sum(axis=(1, 2)), -np.log(size).sum(axis=1)
-
-
-def _inverse(matrix):
-    """Inverse and determinant of symmetric (..., 3, 3) matrices, by cofactors: LAPACK is slow on
-    many small ones."""
-    a, b, c = matrix[..., 0, 0], matrix[..., 0, 1], matrix[..., 0, 2]
-    d, e, f = matrix[..., 1, 1], matrix[..., 1, 2], matrix[..., 2, 2]
-    cofactors = [d * f - e * e, c * e - b * f, b * e - c * d]
-    cofactors += [a * f - c * c, b * c - a * e, a * d - b * b]
-    size = a * cofactors[0] + b * cofactors[1] + c * cofactors[2]
-    rows = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
-    inverse = np.stack([np.stack([cofactors[i] for i in row], axis=-1) for row in rows], axis=-2)
-    return inverse / size[..., None, None], size

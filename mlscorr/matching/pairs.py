@@ -1,61 +1,87 @@
 """Which observations and surveyed points could belong together, each pair by itself."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-SIGMAS = 4.0  # of the stated position sigma
-LEAST_GATE = 1.0  # m: datum and mounting errors are not in the POS's sigma
-LARGEST_GATE = 10.0  # m: a lone GNSS receiver errs by 8 m (GPS SPS 2020, 95 %); a POS, no more
-SIZE_TOLERANCE = 0.01  # m
+from mlscorr.matching.settings import SETTINGS
+from mlscorr.survey import ControlPoints, TargetObservations
 
 
-@dataclass(frozen=True)
-class Pairs:
-    """Pairs of observation and control point within the gate.
+class CandidatePairs(NamedTuple):
+    """Pairs of observation and control point within the search radius.
 
-    Pairs first[i] to first[i + 1] are those of observation i. control (p,) are rows of the
-    control points, misclosure (p, 3) is surveyed - observed in m; alike (p,) tells those that
-    agree in kind and size.
+    Parameters
+    ----------
+    first : (n + 1,) int array
+        Pairs first[i] to first[i + 1] are those of observation i.
+    control : (p,) int array
+        Rows of the control points.
+    misclosure : (p, 3) array
+        Surveyed - observed. Units: m.
+    same : (p,) bool array
+        Which agree in kind and size.
     """
 
     first: np.ndarray
     control: np.ndarray
     misclosure: np.ndarray
-    alike: np.ndarray
+    same: np.ndarray
 
-    def of(self, row):
-        """Slice of an observation's pairs."""
+    def of(self, row: int) -> slice:
+        """Slice of an observation's pairs.
+
+        Parameters
+        ----------
+        row : int
+        """
         return slice(self.first[row], self.first[row + 1])
 
 
-def gates(sigma, n):
-    """Largest credible misclosure (n,) by stated sigmas (n, 3), or None of them. Units: m."""
-    if sigma is None:
-        return np.full(n, LEAST_GATE)
-    return np.clip(SIGMAS * np.linalg.norm(sigma, axis=1), LEAST_GATE, LARGEST_GATE)
+def same_appearance(
+    observations: TargetObservations, rows: np.ndarray, control: ControlPoints, columns: np.ndarray
+) -> np.ndarray:
+    """Whether observations have the kinds and sizes of control points: bool (k,).
+
+    Parameters
+    ----------
+    observations : TargetObservations
+    rows : (k,) int array
+        Of the observations.
+    control : ControlPoints
+    columns : (k,) int array
+        Of the control points.
+    """
+    kinds = (np.array(part.kind, dtype=object) for part in (observations, control))
+    same_kind = np.equal(next(kinds)[rows], next(kinds)[columns]).astype(bool)
+    difference = np.abs(control.size[columns] - observations.size[rows])
+    return same_kind & (difference <= SETTINGS.size_tolerance)
 
 
-def same_appearance(observations, row, control, columns):
-    """Whether an observation has the kind and size of control points (k,): bool (k,)."""
-    kinds = np.array([control.kind[column] == observations.kind[row] for column in columns], bool)
-    return kinds & (np.abs(control.size[columns] - observations.size[row]) <= SIZE_TOLERANCE)
+def find_pairs(
+    observations: TargetObservations, control: ControlPoints, search_radius: float
+) -> CandidatePairs:
+    """Pairs within the search radius, with the observations' rows in order.
 
-
-def find_pairs(observations, control, gate):
-    """Pairs within the gates (n,), with the observations' rows in order."""
-    if len(observations) == 0 or len(control) == 0:
-        first = np.zeros(len(observations) + 1, int)
-        return Pairs(first, np.empty(0, int), np.empty((0, 3)), np.empty(0, bool))
-    near = cKDTree(control.position).query_ball_point(observations.position, gate)
-    near = [np.sort(np.array(several, dtype=int)) for several in near]
-    alike = [same_appearance(observations, row, control, c) for row, c in enumerate(near)]
-    column = np.concatenate(near)
-    row = np.repeat(np.arange(len(near)), [len(several) for several in near])
-    return Pairs(
-        first=np.searchsorted(row, np.arange(len(near) + 1)),
+    Parameters
+    ----------
+    observations : TargetObservations
+    control : ControlPoints
+    search_radius : float
+        Units: m.
+    """
+    n = len(observations)
+    if n == 0 or len(control) == 0:
+        first = np.zeros(n + 1, int)
+        return CandidatePairs(first, np.empty(0, int), np.empty((0, 3)), np.empty(0, bool))
+    tree = cKDTree(control.position)
+    near = tree.query_ball_point(observations.position, search_radius, return_sorted=True)
+    count = [len(columns) for columns in near]
+    column, row = np.concatenate(near).astype(int), np.repeat(range(n), count)
+    return CandidatePairs(
+        first=np.append(0, np.cumsum(count)),
         control=column,
         misclosure=control.position[column] - observations.position[row],
-        alike=np.concatenate(alike),
+        same=same_appearance(observations, row, control, column),
     )

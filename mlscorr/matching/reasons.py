@@ -1,58 +1,86 @@
 """Why an observation has no name, and a surveyed point no observation."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlscorr.matching.pairs import LARGEST_GATE, same_appearance
-
-NEAR = 3.0  # m; what is farther from the place that its neighbours tell is another object
-POSSIBLE = 0.001  # probability from which a rival is named
-DOUBTFUL = 0.02  # probability of a pair from which an observation isn't surely another object
+from mlscorr.matching.decision import Decision
+from mlscorr.matching.pairs import CandidatePairs, same_appearance
+from mlscorr.matching.settings import SETTINGS
+from mlscorr.survey import ControlPoints, TargetObservations
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A control point that stays without observation in a pass, and why; pass None = in all."""
+    """A control point that stays without observation.
+
+    Parameters
+    ----------
+    name : str
+    pass_number : int or None
+        None where it is so in all passes.
+    reason : str
+        A sentence.
+    gps_time : float, optional
+        Of the observation that was refused. Units: s.
+    """
 
     name: str
     pass_number: int | None
     reason: str
+    gps_time: float | None = None
 
 
 @dataclass(frozen=True)
 class _Case:
     """What the sentences are made of: observations in order of time, and what was decided."""
 
-    observations: object
-    control: object
-    pairs: object
-    decision: object
-    gate: np.ndarray
+    observations: TargetObservations
+    control: ControlPoints
+    pairs: CandidatePairs
+    decision: Decision
+    search_radius: float
 
     def free(self, row, columns):
         """Which control points (k,) have no match in the pass of an observation."""
-        same = self.observations.pass_number == self.observations.pass_number[row]
-        return ~np.isin(columns, self.decision.column[same])
+        number = self.observations.pass_number[row]
+        return np.array([(number, column) not in self.in_passes for column in columns], bool)
+
+    @cached_property
+    def in_passes(self):
+        """(pass number, control point) of all matches."""
+        matches = self.observations.pass_number[self.matched], self.decision.column[self.matched]
+        return frozenset(zip(*matches, strict=True))
+
+    @cached_property
+    def matched(self):
+        """Rows of the observations with a name."""
+        return np.flatnonzero(self.decision.column >= 0)
+
+    @cached_property
+    def by_control(self):
+        """The pairs in order of their control points."""
+        return np.argsort(self.pairs.control, kind="stable")
 
     def when(self, row):
         return f"{self.observations.gps_time[row]:.1f} s"
 
-    def limit(self, row):
-        """The gate of an observation, in words."""
-        at_most = ", the largest however much the POS states"
-        return f"gate {self.gate[row]:.2f} m{at_most if self.gate[row] >= LARGEST_GATE else ''}"
+    @property
+    def limit(self):
+        """How far was searched, in words."""
+        return f"search radius {self.search_radius:.2f} m"
 
     def name(self, column):
         return self.control.name[column]
 
     def of_pairs(self, row):
         """Control points (k,) of an observation's pairs, most probable first, and probabilities."""
-        pairs, found = self.pairs.of(row), self.decision.marginals
-        probability = found.sound[pairs] + found.moved[pairs]
+        pairs, marginals = self.pairs.of(row), self.decision.marginals
+        probability = marginals.sound[pairs] + marginals.moved[pairs]
         order = np.argsort(-probability)
-        return self.pairs.control[pairs][order], probability[order], self.pairs.alike[pairs][order]
+        return self.pairs.control[pairs][order], probability[order], self.pairs.same[pairs][order]
 
     def misclosure(self, row, column):
         return self.control.position[column] - self.observations.position[row]
@@ -64,8 +92,7 @@ class _Case:
 
     def corrected(self, row):
         """By which neighbours an observation was corrected, and how well, in words."""
-        time, column = self.observations.gps_time, self.decision.column
-        matched = np.flatnonzero(column >= 0)
+        time, column, matched = self.observations.gps_time, self.decision.column, self.matched
         at = np.searchsorted(matched, row)
         near = [matched[i] for i in (at - 1, at) if 0 <= i < len(matched)]
         sigma = np.linalg.norm(self.decision.marginals.sigma[row])
@@ -75,59 +102,78 @@ class _Case:
         return f"its neighbours {' and '.join(words)} tell it to {sigma:.2f} m (one sigma)"
 
 
-def explain(observations, control, pairs, decision, gate):
-    """Refusals of control points, and the reason (n,) of each observation without a name.
+def explain(
+    observations: TargetObservations,
+    control: ControlPoints,
+    pairs: CandidatePairs,
+    decision: Decision,
+    search_radius: float,
+) -> tuple[tuple[Refusal, ...], list[str | None]]:
+    """Say why control points have no observation, and observations no name.
 
-    observations are in order of time.
+    Parameters
+    ----------
+    observations : TargetObservations
+        In order of time.
+    control : ControlPoints
+    pairs : CandidatePairs
+    decision : Decision
+    search_radius : float
+        Units: m.
+
+    Returns
+    -------
+    refusals : tuple of Refusal
+    reasons : list of n str
+        None for an observation with a name.
     """
-    case = _Case(observations, control, pairs, decision, gate)
+    case = _Case(observations, control, pairs, decision, search_radius)
     tree = cKDTree(control.position) if len(control) else None
-    reasons, claims = [None] * len(observations), []
+    reasons: list[str | None] = [None] * len(observations)
+    claims = []
     unnamed = np.flatnonzero(decision.column < 0)
-    other_kind = {row: one for row in unnamed if (one := _of_another_kind(case, row)) is not None}
+    kinds = {row: _of_another_kind(case, row) for row in unnamed}
+    other_kind = {row: column for row, column in kinds.items() if column is not None}
     for row in unnamed:
         if row in other_kind:
-            claimed = [other_kind[row]]
-            reasons[row] = _exchanged(case, row, other_kind)
+            columns, reasons[row] = [other_kind[row]], _exchanged(case, row, other_kind)
         else:
-            claimed, reasons[row] = (
+            columns, reasons[row] = (
                 _wrong_place(case, row)
                 or _doubt(case, row)
                 or _not_there(case, row)
-                or ([], _alone(case, row, tree))
+                or ([], _without_point(case, row, tree))
             )
-        claims += [(one, row) for one in claimed if case.free(row, [one])[0]]
+        claims += [(column, row) for column in columns if case.free(row, [column])[0]]
     refusals = {}
-    for one, row in claims:
-        key = control.name[one], int(observations.pass_number[row])
-        refusals.setdefault(key, reasons[row])
-    refused = [Refusal(*key, reason) for key, reason in refusals.items()]
-    return (*refused, *_unseen(case, refused)), reasons
+    for column, row in claims:
+        key = control.name[column], int(observations.pass_number[row])
+        refusals.setdefault(key, (reasons[row], float(observations.gps_time[row])))
+    refused = [Refusal(*key, *refusal) for key, refusal in refusals.items()]
+    return (*refused, *_without_observation(case, refused)), reasons
 
 
 def _of_another_kind(case, row):
     """The control point of another kind or size that an observation probably is, or None."""
-    column, probability, alike = case.of_pairs(row)
-    if len(column) == 0 or alike[0] or probability[0] < 0.5:
+    column, probability, same = case.of_pairs(row)
+    if len(column) == 0 or same[0] or probability[0] < 0.5:
         return None
     return int(column[0])
 
 
 def _exchanged(case, row, other_kind):
     """The sentence for a position that fits and a kind or size that doesn't."""
-    seen, surveyed, column = case.observations, case.control, other_kind[row]
+    observed, surveyed, column = case.observations, case.control, other_kind[row]
+    kind, size = observed.kind[row], observed.size[row]
     sentence = (
-        f"The observation at {case.when(row)} is a {seen.kind[row]} of {seen.size[row]:.2f} m and "
+        f"The observation at {case.when(row)} is a {kind} of {size:.2f} m and "
         f"{case.name(column)} a {surveyed.kind[column]} of {surveyed.size[column]:.2f} m, but they "
         f"lie {case.off(row, column):.2f} m apart once corrected; {case.corrected(row)}"
     )
-    partners = {
-        case.name(one)
-        for other, one in other_kind.items()
-        if one != column
-        and same_appearance(seen, row, surveyed, np.array([one]))[0]
-        and same_appearance(seen, other, surveyed, np.array([column]))[0]
-    }
+    others, columns = np.array(list(other_kind.items())).T
+    crossed = same_appearance(observed[[row]], 0, surveyed[columns], ...) & (columns != column)
+    crossed &= same_appearance(observed[others], ..., surveyed[[column]], 0)
+    partners = {case.name(partner) for partner in columns[crossed]}
     if not partners:
         return sentence + ". Kind or size is wrong in the survey or in the extraction."
     return sentence + f". {case.name(column)} and {' or '.join(sorted(partners))} look exchanged."
@@ -139,97 +185,103 @@ def _wrong_place(case, row):
     wrong = case.decision.wrong
     if len(column) == 0 or probability[0] < 0.5 or wrong[column[0]] <= 0.5:
         return None
-    one = column[0]
-    misclosure, passes = np.linalg.norm(case.misclosure(row, one)), case.decision.passes[one]
-    return [one], (
-        f"{case.name(one)} lies {case.off(row, one):.2f} m from where the observation at "
+    point = column[0]
+    misclosure, passes = np.linalg.norm(case.misclosure(row, point)), case.decision.passes[point]
+    return [point], (
+        f"{case.name(point)} lies {case.off(row, point):.2f} m from where the observation at "
         f"{case.when(row)} says once corrected; {case.corrected(row)}. Its surveyed point is "
-        f"wrong, or this is another object (probability {wrong[one]:.3f} by {passes} "
-        f"observations; misclosure {misclosure:.2f} m, {case.limit(row)})."
+        f"wrong, or this is another object (probability {wrong[point]:.3f} by {passes} "
+        f"observations; misclosure {misclosure:.2f} m, {case.limit})."
     )
 
 
 def _doubt(case, row):
     """(control points, sentence) where an observation may be one of them, but isn't surely."""
     column, probability, _ = case.of_pairs(row)
-    if probability.max(initial=0.0) < DOUBTFUL:
+    if probability.max(initial=0.0) < 2 * (1.0 - SETTINGS.smallest_probability):
         return None
-    one, chance = column[0], probability[0]
-    end = f"({case.limit(row)}, probability {chance:.3f}"
-    if len(column) > 1 and probability[1] >= POSSIBLE:
-        apart = np.linalg.norm(case.control.position[one] - case.control.position[column[1]])
+    point, chance = column[0], probability[0]
+    end = f"({case.limit}, probability {chance:.3f}"
+    if len(column) > 1 and probability[1] >= SETTINGS.smallest_rival:
+        apart = np.linalg.norm(case.control.position[point] - case.control.position[column[1]])
         return column[:2], (
-            f"{case.name(one)} and {case.name(column[1])} lie {apart:.2f} m apart and both claim "
+            f"{case.name(point)} and {case.name(column[1])} lie {apart:.2f} m apart and both claim "
             f"the observation at {case.when(row)} {end} and {probability[1]:.3f}); "
             f"{case.corrected(row)}."
         )
-    rival = _rival(case, row, one)
+    rival = _rival(case, row, point)
     if rival is not None:
         apart = np.linalg.norm(np.diff(case.observations.position[[row, rival]], axis=0))
-        return [one], (
+        return [point], (
             f"Two observations {apart:.2f} m apart, at {case.when(row)} and {case.when(rival)}, "
-            f"both claim {case.name(one)} {end} of the first); {case.corrected(row)}."
+            f"both claim {case.name(point)} {end} of the first); {case.corrected(row)}."
         )
-    return [one], (
-        f"{case.name(one)}, {np.linalg.norm(case.misclosure(row, one)):.2f} m from the observation "
-        f"at {case.when(row)}, isn't surely its target {end}, and "
-        f"{case.decision.wrong[one]:.3f} that the surveyed point is wrong); {case.corrected(row)}."
+    misclosure, wrong = np.linalg.norm(case.misclosure(row, point)), case.decision.wrong[point]
+    return [point], (
+        f"{case.name(point)}, {misclosure:.2f} m from the observation at {case.when(row)}, isn't "
+        f"surely its target {end}, and {wrong:.3f} that the surveyed point is wrong); "
+        f"{case.corrected(row)}."
     )
 
 
 def _rival(case, row, column):
     """The other observation of the pass that most probably is this control point, or None."""
-    number, found = case.observations.pass_number, case.decision.marginals
-    others = np.flatnonzero(case.pairs.control == column)
+    number, marginals = case.observations.pass_number, case.decision.marginals
+    span = np.searchsorted(case.pairs.control, [column, column + 1], sorter=case.by_control)
+    others = case.by_control[slice(*span)]
     rows = np.searchsorted(case.pairs.first, others, side="right") - 1
-    chance = found.sound[others] + found.moved[others]
-    near = (rows != row) & (number[rows] == number[row]) & (chance >= POSSIBLE)
+    chance = marginals.sound[others] + marginals.moved[others]
+    near = (rows != row) & (number[rows] == number[row]) & (chance >= SETTINGS.smallest_rival)
     return int(rows[near][np.argmax(chance[near])]) if near.any() else None
 
 
 def _not_there(case, row):
     """(control points, sentence) where a free one is near, but not where the neighbours say."""
-    column, _, alike = case.of_pairs(row)
-    near = [c for c in column[alike] if case.free(row, [c])[0] and case.off(row, c) <= NEAR]
+    column, _, same = case.of_pairs(row)
+    near = [
+        c
+        for c in column[same]
+        if case.free(row, [c])[0] and case.off(row, c) <= 3 * SETTINGS.moved_sigma
+    ]
     if not near:
         return None
-    one = min(near, key=lambda c: case.off(row, c))
-    return [one], (
-        f"{case.name(one)} lies {case.off(row, one):.2f} m from where the observation at "
+    point = min(near, key=lambda c: case.off(row, c))
+    return [point], (
+        f"{case.name(point)} lies {case.off(row, point):.2f} m from where the observation at "
         f"{case.when(row)} says once corrected; {case.corrected(row)}. This is another object "
-        f"(misclosure {np.linalg.norm(case.misclosure(row, one)):.2f} m, "
-        f"{case.limit(row)})."
+        f"(misclosure {np.linalg.norm(case.misclosure(row, point)):.2f} m, "
+        f"{case.limit})."
     )
 
 
-def _alone(case, row, tree):
+def _without_point(case, row, tree):
     """The sentence for an observation that no free surveyed point is near to."""
-    seen = case.observations
-    what = f"{seen.kind[row]} of {seen.size[row]:.2f} m at {case.when(row)}"
+    observed = case.observations
+    what = f"{observed.kind[row]} of {observed.size[row]:.2f} m at {case.when(row)}"
     if tree is None:
         return f"There is no surveyed point for the {what}."
-    distance, nearest = tree.query(seen.position[row])
-    taken = "" if case.free(row, [nearest])[0] else ", another observation of this pass,"
+    distance, nearest = tree.query(observed.position[row])
+    role = "" if case.free(row, [nearest])[0] else ", another observation of this pass,"
     return (
-        f"No surveyed point is left for the {what} ({case.limit(row)}); the nearest, "
-        f"{case.name(nearest)}{taken} a {case.control.kind[nearest]} of "
+        f"No surveyed point is left for the {what} ({case.limit}); the nearest, "
+        f"{case.name(nearest)}{role} a {case.control.kind[nearest]} of "
         f"{case.control.size[nearest]:.2f} m, lies {distance:.2f} m away."
     )
 
 
-def _unseen(case, refused):
+def _without_observation(case, refused):
     """Refusals for the control points that no pass observed."""
     column = case.decision.column
-    seen = {case.name(one) for one in column[column >= 0]} | {refusal.name for refusal in refused}
-    missing = [i for i, name in enumerate(case.control.name) if name not in seen]
+    known = {case.name(c) for c in column[column >= 0]} | {refusal.name for refusal in refused}
+    missing = [i for i, name in enumerate(case.control.name) if name not in known]
     if len(case.observations) == 0:
         return [Refusal(case.name(i), None, "No target was found in the cloud.") for i in missing]
     distance, near = cKDTree(case.observations.position).query(case.control.position[missing])
     refusals = []
-    for one, away, row in zip(missing, distance, near, strict=True):
-        found = f"the nearest one found, at {case.when(row)}, lies {away:.2f} m away"
+    for point, away, row in zip(missing, distance, near, strict=True):
+        nearest = f"the nearest one found, at {case.when(row)}, lies {away:.2f} m away"
         if column[row] >= 0:
-            found += f" and is {case.name(column[row])}"
-        reason = f"No target is left for it; {found} ({case.limit(row)})."
-        refusals.append(Refusal(case.name(one), None, reason))
+            nearest += f" and is {case.name(column[row])}"
+        reason = f"No target is left for it; {nearest} ({case.limit})."
+        refusals.append(Refusal(case.name(point), None, reason))
     return refusals

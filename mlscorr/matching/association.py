@@ -1,0 +1,111 @@
+"""Which observation is which surveyed point: the joint decision of all matches."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.matching.beliefs import build_chain
+from mlscorr.matching.decision import decide, moved_share_by_others
+from mlscorr.matching.marginals import marginals
+from mlscorr.matching.pairs import find_pairs
+from mlscorr.matching.reasons import Refusal, explain
+from mlscorr.pos import stated_sigma
+from mlscorr.survey import SEARCH_RADIUS, ControlPoints, Pos, TargetObservations, Trajectory
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Matched observations, those left over, and the refusals.
+
+    Parameters
+    ----------
+    matched : TargetObservations
+        With names.
+    unmatched : TargetObservations
+        Without.
+    refusals : tuple of Refusal
+        Of surveyed points without an observation.
+    probability : (n,) array
+        Of each match, given all others.
+    reasons : tuple of m str
+        Why each unmatched observation has no name.
+    moved : TargetObservations, optional
+        Those unmatched that show where a surveyed point's target stands instead, with its name.
+    """
+
+    matched: TargetObservations
+    unmatched: TargetObservations
+    refusals: tuple[Refusal, ...]
+    probability: np.ndarray
+    reasons: tuple[str, ...]
+    moved: TargetObservations | None = None
+
+
+def match(
+    observations: TargetObservations,
+    control: ControlPoints,
+    trajectory: Trajectory,
+    pos: Pos | None = None,
+    search_radius: float = SEARCH_RADIUS,
+) -> Matches:
+    """Assign observations to control points, at most one per control point and visit.
+
+    Kind and size must agree and the distance lie within the search radius. Misclosures change
+    smoothly along the drive; by how much is not known, whatever the POS states. A match is used
+    when its probability, given all other observations before and after it and over all that the
+    drift may be, is at least 0.99, and refused with a reason otherwise. So is one to a surveyed
+    point that lies elsewhere than its target by more than its neighbours' credible motion; all
+    passes decide that together.
+
+    Parameters
+    ----------
+    observations : TargetObservations
+    control : ControlPoints
+        Control and check points together.
+    trajectory : Trajectory
+        As recorded.
+    pos : Pos, optional
+        Beliefs, used where the trajectory has no sigmas.
+    search_radius : float
+        How far a surveyed point may lie from its observation. Units: m.
+
+    Raises
+    ------
+    ValueError
+        Where an observation lies outside the trajectory.
+    """
+    order = np.argsort(observations.gps_time, kind="stable")
+    ordered = observations[order]
+    pose = trajectory.at(ordered.gps_time)
+    pos = Pos() if pos is None else pos
+    stated = stated_sigma(trajectory, pos, ordered.gps_time)
+    pairs = find_pairs(ordered, control, search_radius)
+    chain = build_chain(ordered, control, pose, stated, pairs, pos)
+    decision = _decide(chain, len(control))
+    refusals, reasons = explain(ordered, control, pairs, decision, search_radius)
+    rank = np.argsort(order)
+    column = decision.column[rank]
+    named = replace(observations, name=tuple(control.name[c] if c >= 0 else None for c in column))
+    elsewhere = decision.moved(pairs)[rank]
+    names = tuple(control.name[c] for c in elsewhere[elsewhere >= 0])
+    return Matches(
+        named[column >= 0],
+        named[column < 0],
+        refusals,
+        decision.probability[rank][column >= 0],
+        tuple(reasons[i] for i in rank[column < 0]),
+        replace(observations[elsewhere >= 0], name=names),
+    )
+
+
+def _decide(chain, count):
+    """The Decision; where points were seen repeatedly, what each pass tells of them counts in all.
+
+    A surveyed point that other passes found in its place is no explanation of a jump in this one.
+    """
+    first = marginals(chain)
+    decision = decide(chain.pairs, first, count, chain.moved_share)
+    if decision.passes.max(initial=0) < 2 or (decision.column >= 0).all():
+        return decision
+    share = moved_share_by_others(chain.pairs, first, count, chain.moved_share)
+    return decide(chain.pairs, marginals(chain._replace(moved_share=share)), count, share)

@@ -1,0 +1,53 @@
+"""Numbers that the matching rests on."""
+
+from collections import namedtuple
+from dataclasses import astuple, dataclass, fields
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Priors, competing beliefs and limits of who is who.
+
+    Where no source is named, ``benchmarks/ablation.py matching`` shows what each does to the counts
+    of matches that are right, refused and wrong.
+    """
+
+    # Pairs
+    pause: float = 2.0  # s; without a point: the vehicle came by twice, and may see a target twice
+    size_tolerance: float = 0.01  # m; between a size taken down and one observed
+
+    # Beliefs
+    sigma_scales: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0)  # k; of stated sigmas to the truth
+    slow_biases: tuple[float, ...] = (1.0, 3.0)  # m; that no sigma states: multipath in a canyon
+    unstated_sigmas: tuple[float, ...] = (0.02, 0.2)  # m; good mounting; calibration due, GNSS
+    time_shares: tuple[float, ...] = (1.0, 0.3)  # of the POS's; drift ends with an outage
+    constant_sigma: float = 1.5  # m; of datum and mounting: frames of one name differ by metres
+    turning_sigma: float = 0.3  # m; its part that is fixed to the vehicle
+    rough_share: float = 0.1  # g(t); one sigma: steps when satellites come and go
+    visible_share: float = 0.8  # targets; in a pass: some are hidden
+    street_length: float = 30.0  # m; a street is at least as long as it is wide
+    lookalike_density: float = 1 / 600  # 1/m^2; for each target, along and across a street
+    moved_share: float = 0.05  # targets; marks kicked, numbers mixed
+    moved_sigma: float = 1.0  # m; per axis, by how much
+    exchanged_share: float = 0.03  # targets; names exchanged, kind or size taken down wrong
+    restart_time: float = 200.0  # s; of those not in the path: outages of GNSS are minutes apart
+
+    # Hypotheses
+    smallest_weight: float = -16.0  # log; against the best: 1e-7
+    memory: int = 4  # matches; hypotheses that agree in the last ones are merged
+    joined_hypotheses: int = 12  # hypotheses; of each belief, when past and future are joined
+
+    # Decision
+    smallest_probability: float = 0.99  # probability; of a match that is used, given all others
+    smallest_sound: float = 0.9  # probability; that its point isn't elsewhere; outlier test follows
+    smallest_rival: float = 0.001  # probability; from which a rival is named
+
+
+SETTINGS = Settings()
+_Tuple = namedtuple("_Tuple", [field.name for field in fields(Settings)])  # type: ignore[misc]
+
+
+def settings_tuple() -> Any:
+    """The settings as they are at this moment, as a tuple with names: compiled loops take that."""
+    return _Tuple(*astuple(SETTINGS))
