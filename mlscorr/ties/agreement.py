@@ -1,0 +1,158 @@
+"""Ties that agree with their neighbours, how much a second of them is believed, what they hold."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlscorr.survey import Ties
+from mlscorr.ties.settings import SETTINGS
+
+NORMAL_SCATTER = 1.4826  # a normal distribution's sigma over its median absolute deviation
+
+
+def residuals(ties: Ties, correction: np.ndarray) -> np.ndarray:
+    """What a correction leaves of the misclosures (n,). Units: m.
+
+    Parameters
+    ----------
+    ties : Ties
+    correction : (m, 3) array
+        Of all features, as pair_features takes it. Units: m.
+    """
+    change = correction[ties.feature[:, 0]] - correction[ties.feature[:, 1]]
+    return ties.misclosure - np.einsum("ni,ni->n", ties.direction, change)
+
+
+def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
+    """Which ties agree with those near them in both times whose direction is about parallel.
+
+    A tie is refused that lies farther from the median of its neighbours than gate_sigmas of their
+    scatter and its own noise: a car that left, another wall. Where fewer than five are near, none
+    can be refused.
+
+    Parameters
+    ----------
+    ties : Ties
+    correction : (m, 3) array
+        Of all features; what it leaves varies less from tie to tie. Units: m.
+
+    Returns
+    -------
+    (n,) bool array
+    """
+    if len(ties) == 0:
+        return np.zeros(0, bool)
+    left = residuals(ties, correction)
+    # a direction and its opposite are the same, with the other sign; pass pairs are apart in time
+    points = np.column_stack([ties.gps_time / SETTINGS.window, 2 * ties.direction])
+    opposite = points * np.repeat([1.0, -1.0], [2, 3])
+    values = np.append(np.append(left, -left), np.nan)
+    count = min(SETTINGS.neighbours + 1, 2 * len(ties))
+    _, rows = cKDTree(np.concatenate([points, opposite])).query(
+        points, range(1, count + 1), distance_upper_bound=1.0
+    )
+    votes = values[rows]
+    votes[rows == np.arange(len(ties))[:, None]] = np.nan  # its own
+    judged = np.isfinite(votes).sum(axis=1) >= 5
+    agree = np.ones(len(ties), bool)
+    middle = np.nanmedian(votes[judged], axis=1)
+    scatter = NORMAL_SCATTER * np.nanmedian(np.abs(votes[judged] - middle[:, None]), axis=1)
+    limit = SETTINGS.gate_sigmas * np.sqrt(scatter**2 + ties.variance[judged])
+    agree[judged] = np.abs(left[judged] - middle) <= limit
+    return agree
+
+
+def information(ties: Ties, group: np.ndarray) -> np.ndarray:
+    """Information sum of n n' / variance of groups of ties (g, 3, 3). Units: 1/m^2.
+
+    Its eigenvectors are the directions in which the ties of a group hold a shift between both
+    times; the weakest is what they hold least.
+
+    Parameters
+    ----------
+    ties : Ties
+    group : (n,) int array
+        Number of each tie's group, from 0.
+    """
+    total = np.zeros((group.max(initial=-1) + 1, 3, 3))
+    rows = ties.direction / ties.sigma[:, None]
+    np.add.at(total, group, rows[:, :, None] * rows[:, None, :])
+    return total
+
+
+def unheld_directions(ties: Ties) -> Iterator[tuple[Ties, np.ndarray]]:
+    """The ties of each two passes that hold no shift between them along an axis, and it (3,).
+
+    In a tunnel normals stand across the way but for their noise, which seems to hold it: only
+    those count that lean by more than two parallel ones may differ.
+
+    Parameters
+    ----------
+    ties : Ties
+    """
+    for passes in np.unique(ties.pass_number, axis=0):
+        part = ties[(ties.pass_number == passes).all(axis=1)]
+        axis = np.linalg.eigh(information(part, np.zeros(len(part), int))[0])[1][:, 0]
+        along = part.direction @ axis
+        along = np.where(np.abs(along) > np.sin(SETTINGS.parallel), along, 0.0)
+        if np.sum(along**2 / part.variance) * SETTINGS.least_gate**2 < 1.0:
+            yield part, axis
+
+
+def unheld_sentence(ties: Ties, axis: np.ndarray) -> str:
+    """A sentence on two passes whose ties leave an axis (3,) unheld.
+
+    Parameters
+    ----------
+    ties : Ties
+        Of two passes.
+    axis : (3,) array
+        Unit vector.
+    """
+    first, second = ties.pass_number[0]
+    words = ", ".join(f"{value:.2f}" for value in axis + 0.0)
+    return (
+        f"The {len(ties)} ties of passes {first} and {second} leave the direction E, N, H = "
+        f"{words} unheld: all walls are parallel there, as in a tunnel. Only control in both "
+        "passes, or poles and walls across the way, hold it."
+    )
+
+
+def weigh_by_time(ties: Ties, best: float = SETTINGS.best_second) -> Ties:
+    """Ties with variances so large that those of a second are together no better than a sigma.
+
+    What thousands of them share, roughness or angles of the scanner, is in no variance of a single
+    tie: as independent rows they would outweigh control. Where many hold a direction, each of them
+    counts the less; what few ties hold keeps its weight.
+
+    Parameters
+    ----------
+    ties : Ties
+    best : float
+        One sigma of a shift along any axis, by the ties of one second and pair of passes. Units: m.
+    """
+    factor = np.ones(len(ties))
+    for side in (0, 1):
+        group = group_by_time(ties, side, SETTINGS.moment)
+        held = information(ties, group)[group]
+        held = np.einsum("ni,nij,nj->n", ties.direction, held, ties.direction)
+        factor = np.maximum(factor, held * best**2)
+    return replace(ties, variance=ties.variance * factor)
+
+
+def group_by_time(ties: Ties, side: int, duration: float) -> np.ndarray:
+    """Number (n,) of each tie's pair of passes and stretch of time, from 0, in their order.
+
+    Parameters
+    ----------
+    ties : Ties
+    side : int
+        Whose time counts: 0 for the earlier view, 1 for the later.
+    duration : float
+        Of a stretch. Units: s.
+    """
+    stretch = np.floor(ties.gps_time[:, side] / duration)
+    keys = np.column_stack([ties.pass_number, stretch])
+    return np.unique(keys, axis=0, return_inverse=True)[1].ravel()

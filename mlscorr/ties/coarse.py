@@ -1,0 +1,133 @@
+"""How metres of misfit between passes are found before anything is known of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlscorr.survey import TieFeatures
+from mlscorr.ties.settings import SETTINGS
+from mlscorr.ties.thinning import direction_class
+
+
+@dataclass(frozen=True)
+class Votes:
+    """Parallel planes of a stretch and of passes before it, n pairs.
+
+    Parameters
+    ----------
+    arm : (n, 3) array
+        From the middle of the stretch to its planes. Units: m.
+    normal : (n, 3) array
+        Mean of both.
+    misfit : (n,) array
+        Along the normal, earlier - stretch. Units: m.
+    """
+
+    arm: np.ndarray
+    normal: np.ndarray
+    misfit: np.ndarray
+
+
+def coarse_correction(
+    features: TieFeatures, radius: float, angle: float = SETTINGS.parallel
+) -> np.ndarray:
+    """What puts each pass on those before it: a stiff motion of each stretch of time.
+
+    In a stretch all parallel planes within the radius vote for a shift along their normal; the
+    most votes of each direction start a motion (shift and small rotation) that is refined with
+    ever narrower weights. It is a start for pair_features, no more: the earliest pass stays, and
+    along a direction that no plane holds so do the others.
+
+    Parameters
+    ----------
+    features : TieFeatures
+    radius : float
+        Of the search. Units: m.
+    angle : float
+        Of normals that may be parallel. Units: rad.
+
+    Returns
+    -------
+    correction : (n, 3) array
+        Of each feature. Units: m.
+    """
+    correction = np.zeros((len(features), 3))
+    is_plane = features.kind == "plane"
+    for number in np.unique(features.pass_number)[1:]:
+        before = np.flatnonzero((features.pass_number < number) & is_plane)
+        rows = np.flatnonzero(features.pass_number == number)
+        tree = cKDTree(features.centre[before] + correction[before])
+        stretch = np.floor(features.gps_time[rows] / SETTINGS.pause)
+        times, motions, middles = [], [], []
+        for part in np.unique(stretch):
+            inside = rows[(stretch == part) & is_plane[rows]]
+            votes = _votes(features, inside, before, tree, radius, angle)
+            if len(votes.misfit) >= SETTINGS.points:
+                times.append((part + 0.5) * SETTINGS.pause)
+                motions.append(_motion(votes, radius, angle))
+                middles.append(features.centre[inside].mean(axis=0))
+        if times:
+            motion, middle = (
+                np.column_stack(
+                    [np.interp(features.gps_time[rows], times, c) for c in np.array(v).T]
+                )
+                for v in (motions, middles)
+            )
+            arm = features.centre[rows] - middle
+            correction[rows] = motion[:, :3] + np.cross(motion[:, 3:], arm)
+    return correction
+
+
+def _votes(features, inside, before, tree, radius, angle):
+    """The Votes of planes (k,) with those before, whose places the tree holds."""
+    limit = np.hypot(radius, SETTINGS.cell)
+    count = min(4 * SETTINGS.neighbours, len(before))
+    if count == 0 or len(inside) == 0:
+        return Votes(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
+    _, near = tree.query(features.centre[inside], range(1, count + 1), distance_upper_bound=limit)
+    row, column = np.nonzero(near < len(before))
+    near, row = near[row, column], inside[row]
+    first, second = features.direction[row], features.direction[before[near]]
+    parallel = np.einsum("ni,ni->n", first, second) >= np.cos(angle)
+    near, row = near[parallel], row[parallel]
+    normal = (first + second)[parallel]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    apart = tree.data[near] - features.centre[row]
+    misfit = np.einsum("ni,ni->n", normal, apart)
+    beside = np.linalg.norm(apart - misfit[:, None] * normal, axis=1) <= SETTINGS.cell
+    arm = features.centre[row] - features.centre[inside].mean(axis=0)
+    return Votes(arm[beside], normal[beside], misfit[beside])
+
+
+def _motion(votes, radius, angle):
+    """Shift and rotation (6,), m and rad, that most votes agree with."""
+    design = np.column_stack([votes.normal, np.cross(votes.arm, votes.normal)])
+    prior = np.repeat([radius, angle], 3) ** -2.0
+    motion, width = np.append(_most_votes(votes, radius), np.zeros(3)), radius / 2
+    while width > SETTINGS.roughest:
+        for _ in range(3):
+            left = votes.misfit - design @ motion
+            weight = width**2 / (width**2 + left**2) ** 2  # Geman-McClure
+            normal = (design.T * weight) @ design + np.diag(prior)
+            motion = np.linalg.solve(normal, design.T @ (weight * votes.misfit))
+        width /= 2
+    return motion
+
+
+def _most_votes(votes, radius):
+    """The shift (3,) by the fullest bin of misfits of each class of directions. Units: m."""
+    bins = direction_class(votes.normal)
+    opposite = bins > 13  # folded: a wall to the left and one to the right vote together
+    bins, sign = np.where(opposite, 26 - bins, bins), np.where(opposite, -1.0, 1.0)
+    total, right = 1e-6 * np.eye(3), np.zeros(3)
+    width = 2 * SETTINGS.roughest
+    for number in np.unique(bins):
+        misfit = (votes.misfit * sign)[bins == number]
+        edges = np.arange(-radius - width, radius + 2 * width, width)
+        count = np.convolve(np.histogram(misfit, edges)[0], [1, 2, 1], "same")
+        best, weight = edges[np.argmax(count)] + width / 2, float(count.max() - np.median(count))
+        normal = (votes.normal * sign[:, None])[bins == number].mean(axis=0)
+        total += weight * np.outer(normal, normal)
+        right += weight * best * normal
+    return np.linalg.solve(total, right)

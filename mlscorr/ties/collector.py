@@ -1,0 +1,73 @@
+"""Tie features of a survey's clouds, found while these are read."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures
+from mlscorr.ties.cells import CellTable
+from mlscorr.ties.settings import SETTINGS
+from mlscorr.ties.shapes import find_shapes
+from mlscorr.ties.thinning import thin
+
+
+class TieCollector:
+    """Finds the planes and poles of the chunks that it is given, in any order.
+
+    What it holds grows neither with the points nor with the file: cells of the last moments, whose
+    points may still come, and of those before a bounded number of features a second (see thin).
+
+    Parameters
+    ----------
+    survey : Survey
+    held_cells : int, optional
+        Above as many, cells of moments that have passed are looked at and left.
+    """
+
+    def __init__(self, survey: Survey, held_cells: int = SETTINGS.held_cells):
+        self._survey, self._held_cells = survey, held_cells
+        self._segments = survey.trajectory.passes
+        start = np.floor(survey.trajectory.gps_time[0])
+        self._origin = np.floor(survey.trajectory.position[0])
+        self._cells = CellTable(self._origin, start, SETTINGS.cell, SETTINGS.moment)
+        self._starts = np.full((len(survey.clouds), len(self._segments)), np.inf)
+        self._kept: list[TieFeatures] = []
+        self._kept_in_order, self._loose = 0, 0
+
+    def add(self, file: CloudFile, chunk: PointCloud) -> None:
+        """Take in a chunk of a file.
+
+        Parameters
+        ----------
+        file : CloudFile
+            Of the survey.
+        chunk : PointCloud
+        """
+        source = self._survey.clouds.index(file)
+        group = source * len(self._segments)
+        self._cells.add(chunk, self._segments, group, self._starts[source])
+        if self._cells.count > self._held_cells:
+            moment = self._cells.moment
+            self._close(moment < moment.max() - 1)  # beams that take turns come a little late
+
+    def _close(self, rows):
+        """Keep the features of cells (count,), and of all so far so many as may stay."""
+        self._kept.append(find_shapes(self._survey, *self._cells.of(rows)))
+        self._cells.remove(rows)
+        self._loose += len(self._kept[-1])
+        if self._loose > max(self._held_cells, self._kept_in_order):
+            features = TieFeatures.concatenate(self._kept)
+            self._kept = [features[thin(features, self._origin)]]
+            self._kept_in_order, self._loose = len(self._kept[0]), 0
+
+    def features(self) -> TieFeatures:
+        """Features of all chunks so far, in order of pass and time; chunks may still follow."""
+        rest = find_shapes(self._survey, *self._cells.of(np.ones(self._cells.count, bool)))
+        features = TieFeatures.concatenate([*self._kept, rest])
+        features = features[thin(features, self._origin)]
+        number = np.empty(self._starts.size, int)
+        number[np.argsort(self._starts.ravel(), kind="stable")] = np.arange(1, number.size + 1)
+        group = features.pass_number
+        features = replace(features, pass_number=number[group], source=group // len(self._segments))
+        keys = (*features.centre.T, features.gps_time, features.pass_number)
+        return features[np.lexsort(keys)]

@@ -1,0 +1,159 @@
+"""Which features of two visits are the same thing, given what is believed of their places."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlscorr.survey import TieFeatures, Ties
+from mlscorr.ties.settings import SETTINGS
+
+
+def pair_features(
+    features: TieFeatures,
+    correction: np.ndarray,
+    sigma: np.ndarray,
+    radius: float,
+    angle: float = SETTINGS.parallel,
+    turned: np.ndarray | None = None,
+) -> Ties:
+    """Ties between features of two visits, by different passes or by one that came back.
+
+    A feature has at most one partner in each other pass, and one in its own at another visit: the
+    nearest whose direction is parallel, each the other's. Call it again with a better correction,
+    smaller sigma, radius and angle.
+
+    Parameters
+    ----------
+    features : TieFeatures
+    correction : (n, 3) array
+        What is believed to be missing at each feature: corrected = centre + correction. Units: m.
+    sigma : (n,) array
+        One sigma of the correction, along any direction. Units: m.
+    radius : float
+        Two features are no pair where they are farther apart than this, or than three sigmas of
+        the difference, along a plane's normal or across a pole. Units: m.
+    angle : float
+        Largest angle between directions: twice a boresight error and more, at first. Units: rad.
+
+    turned : (n, 3) array, optional
+        The features' directions as the correction turns them; as recorded by default.
+
+    Returns
+    -------
+    Ties
+        Misclosures are of the recorded places, whatever the correction.
+    """
+    present = features if turned is None else replace(features, direction=turned)
+    pairs = _mutual(present, *candidate_pairs(present, correction, sigma, radius, angle))
+    first, second = present.direction[pairs.T]
+    direction = first + second
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    apart = np.diff((features.centre + correction)[pairs], axis=1)[:, 0]
+    along = np.einsum("ni,ni->n", apart, direction)
+    is_pole = features.kind[pairs[:, 0]] == "pole"
+    across = np.maximum((apart**2).sum(axis=1) - along**2, 0.0)
+    lever = np.where(is_pole, along**2, across)
+    # each direction is taken to the middle between both centres
+    variance = features.variance[pairs].sum(axis=1) + lever * features.tilt[pairs].sum(axis=1) / 4
+    variance += 2 * SETTINGS.surface_sigma**2
+    sides = _across(direction[is_pole])
+    return Ties.between(
+        features,
+        np.concatenate([pairs[~is_pole], *[pairs[is_pole]] * 2]),
+        np.concatenate([direction[~is_pole], *sides]),
+        np.concatenate([variance[~is_pole], *[variance[is_pole]] * 2]),
+        correction,
+    )
+
+
+def _across(axis):
+    """Two unit vectors (n, 3) across axes and each other, the first of them horizontal."""
+    side = np.cross(axis, [0.0, 1.0, 0.0])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    return side, np.cross(axis, side)
+
+
+def candidate_pairs(
+    features: TieFeatures,
+    correction: np.ndarray,
+    sigma: np.ndarray,
+    radius: float,
+    angle: float = SETTINGS.parallel,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (k, 2) of parallel features within their gates, and distances (k,) in such units.
+
+    Parameters
+    ----------
+    features, correction, sigma, radius, angle
+        As of pair_features.
+    """
+    place = features.centre + correction
+    visits = _visits(features)
+    limit = np.hypot(min(radius, 2 * SETTINGS.gate_sigmas * sigma.max(initial=0.0)), SETTINGS.cell)
+    # directions that differ by the angle are as far apart as places may be; no pole is near a plane
+    weight = limit / (2 * np.sin(angle / 2))
+    points = np.column_stack([place, weight * features.direction])
+    points[features.kind == "pole", 3:] += 4 * weight
+    trees = [cKDTree(points[rows]) for rows in visits]
+    low, high = (
+        np.array([edge(place[rows], axis=0) for rows in visits]).reshape(-1, 3)
+        for edge in (np.min, np.max)
+    )
+    parts = [np.empty((0, 2), int)]
+    for i, tree in enumerate(trees):
+        near = (low <= high[i] + limit) & (high >= low[i] - limit)
+        for j in np.flatnonzero(near.all(axis=1)):
+            if i != j:
+                _, nearest = tree.query(
+                    points[visits[j]], range(1, SETTINGS.neighbours + 1),
+                    distance_upper_bound=np.sqrt(2) * limit,
+                )  # fmt: skip
+                first, column = np.nonzero(nearest < len(visits[i]))
+                partner = visits[i][nearest[first, column]]
+                parts.append(np.sort(np.column_stack([visits[j][first], partner]), axis=1))
+    pairs = np.unique(np.concatenate(parts), axis=0)
+    distance = _distance(features, place, sigma, radius, pairs)
+    cosine = np.einsum("ni,ni->n", *features.direction[pairs.T])
+    kept = np.isfinite(distance) & (cosine >= np.cos(angle))
+    return pairs[kept], distance[kept]
+
+
+def _visits(features):
+    """Rows of each visit: a stretch of time of a pass, so that a loop counts as another visit."""
+    stretch = np.floor(features.gps_time / SETTINGS.pause)
+    keys = np.column_stack([features.pass_number, stretch])
+    number = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    order = np.argsort(number, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(number[order])) + 1) if len(order) else []
+
+
+def _distance(features, place, sigma, radius, pairs):
+    """Distances (k,) of pairs in units of gate and cell; infinite for what can't be a pair."""
+    first, second = pairs.T
+    axis = features.direction[first] + features.direction[second]
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    apart = place[second] - place[first]
+    along = np.abs(np.einsum("ni,ni->n", apart, axis))
+    across = np.sqrt(np.maximum((apart**2).sum(axis=1) - along**2, 0.0))
+    is_pole = features.kind[first] == "pole"
+    misfit, beside = np.where(is_pole, [across, along], [along, across])
+    variance = (sigma**2 + features.variance)[pairs].sum(axis=1) + 2 * SETTINGS.surface_sigma**2
+    gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))
+    # a pass starts with each file too: tiles of one drive see the street at one visit
+    is_pair = np.abs(np.diff(features.gps_time[pairs])[:, 0]) > SETTINGS.pause
+    is_pair &= (features.kind[first] == features.kind[second]) & (misfit <= gate)
+    is_pair &= beside <= SETTINGS.cell
+    return np.where(is_pair, np.hypot(misfit / gate, beside / SETTINGS.cell), np.inf)
+
+
+def _mutual(features, pairs, distance):
+    """Pairs (k, 2) of which each is the other's nearest in its pass."""
+    pairs = pairs[np.argsort(distance, kind="stable")]
+    nearest = np.ones(len(pairs), bool)
+    for feature, partner in (pairs.T, pairs.T[::-1]):
+        keys = np.column_stack([feature, features.pass_number[partner]])
+        is_first = np.zeros(len(pairs), bool)
+        is_first[np.unique(keys, axis=0, return_index=True)[1]] = True
+        nearest &= is_first
+    return pairs[nearest]

@@ -1,0 +1,91 @@
+"""Ties of a survey of which nothing is known but what its POS states."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.pos import stated_sigma
+from mlscorr.survey import Survey, TieFeatures, Ties
+from mlscorr.ties.agreement import (
+    NORMAL_SCATTER,
+    consistent_ties,
+    residuals,
+    weigh_by_time,
+)
+from mlscorr.ties.coarse import coarse_correction
+from mlscorr.ties.pairing import pair_features
+from mlscorr.ties.settings import SETTINGS
+from mlscorr.ties.thinning import thinned_ties
+
+
+@dataclass(frozen=True)
+class TieSearch:
+    """Ties that agree, and what was left of the rest.
+
+    Parameters
+    ----------
+    ties : Ties
+        Weighed by time.
+    refused : Ties
+        Those that contradict their neighbours in time.
+    correction : (m, 3) array
+        Of each feature, that puts the passes coarsely on each other. Units: m.
+    radius : float
+        Of the search. Units: m.
+    """
+
+    ties: Ties
+    refused: Ties
+    correction: np.ndarray
+    radius: float
+
+
+def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
+    """Ties of a survey without control: coarsely first, then by what the POS states.
+
+    Parameters
+    ----------
+    survey : Survey
+        Its search radius is the limit.
+    features : TieFeatures
+    """
+    sigma = feature_sigma(survey, features)
+    radius = np.sqrt(2) * SETTINGS.gate_sigmas * float(sigma.max(initial=0.0))
+    radius = min(max(radius, SETTINGS.least_gate), survey.search_radius)
+    correction = coarse_correction(features, radius)
+    for _ in range(2):  # what the first pairs leave tells how near partners are
+        ties = pair_features(features, correction, sigma, radius)
+        agree = consistent_ties(ties, correction)
+        left = np.abs(residuals(ties[agree], correction))
+        if len(left):
+            sigma = np.minimum(sigma, 2 * NORMAL_SCATTER * np.median(left))
+    return TieSearch(weigh_by_time(ties[agree]), ties[~agree], correction, radius)
+
+
+def agreeing_ties(ties: Ties, correction: np.ndarray) -> Ties:
+    """Those that agree with their neighbours, as many as are believed, with their weights.
+
+    Parameters
+    ----------
+    ties : Ties
+    correction : (m, 3) array
+        Of all features. Units: m.
+    """
+    return weigh_by_time(thinned_ties(ties[consistent_ties(ties, correction)]))
+
+
+def feature_sigma(survey: Survey, features: TieFeatures) -> np.ndarray:
+    """One sigma (n,) of the place of features, as the POS states it of position and attitude. m.
+
+    Not below what makes the least gate: the mounting's error is not in the POS's sigma.
+
+    Parameters
+    ----------
+    survey : Survey
+    features : TieFeatures
+    """
+    stated = stated_sigma(survey.trajectory, survey.pos, features.gps_time)
+    pose = survey.trajectory.at(features.gps_time)
+    distance = np.linalg.norm(features.centre - pose.position, axis=1)
+    sigma = np.hypot(stated.position.max(axis=1), distance * stated.angles.max(axis=1))
+    return np.maximum(sigma, SETTINGS.least_gate / (np.sqrt(2) * SETTINGS.gate_sigmas))

@@ -1,0 +1,40 @@
+"""Numbers that the search for ties rests on."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Limits and sizes, each with its unit and reason."""
+
+    # Features
+    cell: float = 1.0  # m: some hundred points of a scanner in a street, flat for most of them
+    moment: float = 1.0  # s: the POS error is one value over it (a POS has a bandwidth of 1 Hz)
+    held_cells: int = 200_000  # cells in memory, 35 MB: some seconds of any scanner
+    points: int = 24  # of a feature: a variance of 21 degrees of freedom is known to a third
+    roughest: float = 0.05  # m about a plane: asphalt and masonry have centimetres, shrubs more
+    narrowest: float = 0.15  # m, one sigma along a side: half a cell (1 / sqrt(12) for a whole one)
+    rounding: float = 0.0003  # m; one sigma of a coordinate at the usual LAS scale of 1 mm
+    grazing: float = 0.05  # sine of beam to plane: a road 50 m from a scanner 2.5 m above it
+    thickest: float = 0.18  # m: radius of a pole or young trunk; people are wider
+    largest_lean: float = 0.2  # rad: of a pole; branches lean more
+    roundness: float = 0.1  # of the radius, one sigma: trunks are no cylinders, masts have edges
+    features: int = 32  # of a second and direction of a pass: two blocks of a wall, or of the road
+    ties: int = (
+        6  # of a second, direction and pair of passes: 10 mm each make 4 mm, two may be wrong
+    )
+    coarse_features: int = 6000  # for six unknowns of a mounting; more cost time alone
+    block: float = 4.0  # m: neighbours that are kept together, so that two passes keep the same
+    # Pairs
+    pause: float = 10.0  # s between two visits of one pass: until then the POS error is about one
+    parallel: float = 0.14  # rad, 8 deg: normals of few points, and a boresight off by 4 deg
+    gate_sigmas: float = 3.0  # 3 in 1 000 normal errors lie beyond
+    least_gate: float = 2.0  # m: a boresight off by 2 deg, of both passes, 30 m away
+    neighbours: int = 16  # nearest features, or ties, that are weighed: a plane's within 2 m
+    surface_sigma: float = 0.002  # m: walls and roads are no planes
+    best_second: float = 0.005  # m per axis: thousands of ties share what none of them states
+    # Agreement
+    window: float = 3.0  # s: over which a POS error is one shift
+
+
+SETTINGS = Settings()

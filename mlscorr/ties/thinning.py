@@ -1,0 +1,92 @@
+"""Which of many features and ties stay: the same number in each second and direction."""
+
+import numpy as np
+
+from mlscorr.survey import TieFeatures, Ties
+from mlscorr.ties.settings import SETTINGS
+
+
+def direction_class(direction: np.ndarray) -> np.ndarray:
+    """Number (n,) from 0 to 26 of the nearest of the directions to a cube's neighbours.
+
+    Parameters
+    ----------
+    direction : (n, 3) array
+        Unit vectors.
+    """
+    largest = np.abs(direction).max(axis=1, keepdims=True)
+    return np.rint(direction / largest).astype(int) @ [9, 3, 1] + 13
+
+
+def thin(features: TieFeatures, origin: np.ndarray) -> np.ndarray:
+    """Rows (k,) of the features that stay, whatever the order in which they came.
+
+    Of each second and pass, kind and class of directions stay at most SETTINGS.features, so that
+    memory follows the time that was driven, not the points. Those stay whose block of space has
+    the least of some random numbers, the same in all passes: what is left of one pass is left of
+    the others.
+
+    Parameters
+    ----------
+    features : TieFeatures
+    origin : (3,) array
+        Of the blocks: the same for all passes. Units: m.
+    """
+    moment = np.floor(features.gps_time / SETTINGS.moment).astype(np.int64)
+    bins = 2 * direction_class(features.direction) + (features.kind == "pole")
+    chances = [
+        _chance(np.floor((features.centre - origin) / edge).astype(np.int64))
+        for edge in (SETTINGS.block, SETTINGS.cell)
+    ]
+    group = np.column_stack([features.pass_number, moment, bins])
+    return _least(group, [features.gps_time, *chances[::-1]], SETTINGS.features)
+
+
+def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
+    """About a number of features: all of some blocks of space, the same blocks in every pass.
+
+    Parameters
+    ----------
+    features : TieFeatures
+    number : int
+    """
+    if len(features) <= number:
+        return features
+    chance = _chance(np.floor(features.centre / SETTINGS.block).astype(np.int64))
+    return features[chance <= np.partition(chance, number)[number]]
+
+
+def thinned_ties(ties: Ties) -> Ties:
+    """As many ties of each second, pair of passes and direction as can still tell it anything.
+
+    A second of them is believed to SETTINGS.best_second only (``weigh_by_time``): more of them
+    would cost time alone. Those stay whose first place has the least of some random numbers.
+
+    Parameters
+    ----------
+    ties : Ties
+    """
+    moment = np.floor(ties.gps_time[:, 0] / SETTINGS.moment).astype(np.int64)
+    bins = direction_class(ties.direction)
+    group = np.column_stack([ties.pass_number, moment, np.minimum(bins, 26 - bins)])
+    chance = _chance(np.floor(ties.place[:, 0] / SETTINGS.cell).astype(np.int64))
+    return ties[_least(group, [ties.gps_time[:, 0], chance], SETTINGS.ties)]
+
+
+def _least(group, order, number):
+    """Rows (k,) of at most a number of each group (n, g): the first in an order, as of lexsort."""
+    rows = np.lexsort([*order, *group.T])
+    begins = np.append(True, (np.diff(group[rows], axis=0) != 0).any(axis=1))[: len(rows)]
+    first = np.flatnonzero(begins)
+    rank = np.arange(len(rows)) - np.repeat(first, np.diff(np.append(first, len(rows))))
+    return np.sort(rows[rank < number])
+
+
+def _chance(cells):
+    """A random 64-bit number (n,) that depends on integers (n, 3) alone."""
+    mixed = np.zeros(len(cells), np.uint64)
+    for number in cells.T:
+        mixed ^= number.astype(np.uint64)
+        mixed *= np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio (Fibonacci hashing)
+        mixed ^= mixed >> np.uint64(32)
+    return mixed
