@@ -1,0 +1,11 @@
+"""Targets in the cloud: candidates -> clusters -> plane and outline -> observations."""
+
+from mlscorr.targets.candidates import NO_POINTS, Candidates, Neighbourhoods, collect, search_radius
+from mlscorr.targets.extract import PassTarget, as_observations, fit_near_control
+from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
+from mlscorr.targets.intensity import why_useless
+from mlscorr.targets.regions import BrightRegion
+from mlscorr.targets.search import search_targets
+from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets.shapes import BY_EDGES, diameter
+from mlscorr.targets.visits import scanner_path

@@ -1,31 +1,43 @@
-"""Bright components of a cloud at several levels of intensity, as in a component tree.
+"""Bright components of a piece of cloud at several levels of intensity, as in a component tree.
 
 A target is brighter than what surrounds it, but intensity falls with range and incidence, so no
 single threshold serves. Each component at each level is a candidate; the shape decides.
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-LEVELS = 16  # between the darkest and the brightest point of a region, in equal ratios
-FEWEST_POINTS = 20  # on a target: fewer can't tell plane and outline
-LINK_SHARES = 0.2, 0.4  # of the target's size: beside a bright post; with wide scan lines
-BACKGROUND = 4.0  # times the points of the fullest place: so many bright ones are road and walls
-NEIGHBOURS = 2.9  # voxels, a third of the link each: 3 would be a tie that rounding decides
-CHEAP = 1500  # bright points that are looked at in any case
+from mlscorr.targets.settings import SETTINGS
 
 
-def split_by_time(gps_time, pause):
-    """Runs of points without a pause longer than this (s): a list of index arrays, in time."""
+def split_by_time(gps_time: np.ndarray, pause: float) -> list[np.ndarray]:
+    """Runs of points without a longer pause.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    pause : float
+        Units: s.
+
+    Returns
+    -------
+    list of int arrays
+        Rows, in time.
+    """
     order = np.argsort(gps_time, kind="stable")
     breaks = np.flatnonzero(np.diff(gps_time[order]) > pause) + 1
     return np.split(order, breaks)
 
 
-def bright_components(xyz, intensity, size):
-    """Index arrays of connected components of points brighter than each of several levels.
+def bright_components(
+    xyz: np.ndarray, intensity: np.ndarray, size: float
+) -> Iterator[tuple[float, np.ndarray]]:
+    """Connected components of points brighter than each of several levels.
 
     Parameters
     ----------
@@ -36,56 +48,83 @@ def bright_components(xyz, intensity, size):
     size : float
         Of a target; points closer than a share of it belong together. Units: m.
 
-    Yields (level, rows); a component that stays the same over levels comes once, at the highest.
+    Yields
+    ------
+    level : float
+    rows : (k,) int array
+        A component that stays the same over levels comes once, at the highest.
     """
     low, high = np.percentile(intensity, 1), intensity.max()
-    background = max(BACKGROUND * _fullest(xyz, size), len(intensity) / 4, CHEAP)
-    seen, last = set(), 0
-    for level in np.geomspace(max(high, 1.0), max(low, 1.0), LEVELS + 1)[1:]:
+    background = max(SETTINGS.cheap_count, len(intensity) / 4)
+    known, last = set(), 0
+    levels = np.geomspace(max(high, 1.0), max(low, 1.0), SETTINGS.intensity_steps + 1)
+    for level in levels[1:]:
         bright = np.flatnonzero(intensity >= level)
-        if len(bright) < FEWEST_POINTS or len(bright) == last:
+        if len(bright) < SETTINGS.smallest_count or len(bright) == last:
             continue
-        last = len(bright)
         if len(bright) > background:
             return
-        parts = (part for share in LINK_SHARES for part in _components(xyz, bright, share * size))
-        for rows in parts:
-            if len(rows) >= FEWEST_POINTS and (key := (rows[0], rows[-1], len(rows))) not in seen:
-                seen.add(key)
-                yield float(level), rows
-
-
-def _fullest(xyz, size):
-    """Number of points in the fullest cube of a target's size."""
-    return np.unique(_keys(_cells(xyz, size)), return_counts=True)[1].max()
+        last = len(bright)
+        for share in SETTINGS.link_shares:
+            for part in components(xyz[bright], share * size):
+                rows = bright[part]
+                if (key := (rows[0], rows[-1], len(rows))) not in known:
+                    known.add(key)
+                    yield float(level), rows
 
 
 def _cells(xyz, edge):
-    """Cube (n, 3) of this edge (m) that each point lies in, counted from the lowest."""
+    """Cube (n, d) of this edge (m) that each point lies in, counted from the lowest."""
     cells = np.floor(xyz / edge).astype(np.int64)
     return cells - cells.min(axis=0)
 
 
 def _keys(cells):
     """One number (n,) for each cube, in the order of its coordinates."""
-    span = cells.max(axis=0) + 1
-    return (cells[:, 0] * span[1] + cells[:, 1]) * span[2] + cells[:, 2]
+    return np.ravel_multi_index(tuple(cells.T), cells.max(axis=0) + 1)
 
 
-def _components(xyz, rows, link):
-    """Rows of each connected component among some rows, each in order."""
-    label = connected(xyz[rows], link)
+def components(points: np.ndarray, link: float) -> list[np.ndarray]:
+    """Connected components of enough points to be a target.
+
+    Parameters
+    ----------
+    points : (n, d) array
+        Units: m.
+    link : float
+        Points as near as this belong together. Units: m.
+
+    Returns
+    -------
+    list of int arrays
+        Rows of each, in order.
+    """
+    label = connected(points, link)
     order = np.argsort(label, kind="stable")
-    return np.split(rows[order], np.flatnonzero(np.diff(label[order])) + 1)
+    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    return [part for part in parts if len(part) >= SETTINGS.smallest_count]
 
 
-def connected(xyz, link):
-    """Component number of each point: occupied voxels first, so that density costs nothing."""
-    if len(xyz) == 0:
+def connected(points: np.ndarray, link: float) -> np.ndarray:
+    """Component number of each point: occupied voxels first, so that density costs nothing.
+
+    Parameters
+    ----------
+    points : (n, d) array
+        In two dimensions or three. Units: m.
+    link : float
+        Points as near as this belong together. Units: m.
+
+    Returns
+    -------
+    (n,) int array
+    """
+    if len(points) == 0:
         return np.empty(0, int)
-    cells = _cells(xyz, link / 3)
+    cells = _cells(points, link / 3)
     _, first, cell_of = np.unique(_keys(cells), return_index=True, return_inverse=True)
     cells = cells[first]
-    pairs = cKDTree(cells).query_pairs(NEIGHBOURS, output_type="ndarray").T
+    link_cells = np.nextafter(3.0, 0.0)  # three voxels apart is a tie that rounding would decide
+    pairs = cKDTree(cells).query_pairs(link_cells, output_type="ndarray").T
     graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(len(cells),) * 2)
     return connected_components(graph, directed=False)[1][cell_of]

@@ -1,4 +1,4 @@
-"""Candidates -> pieces of cloud by control point, pass and visit -> TargetObservations."""
+"""Candidates -> pieces of cloud by control point, pass and visit -> targets as fitted."""
 
 import warnings
 from dataclasses import replace
@@ -6,87 +6,74 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlscorr.survey import TargetObservations
-from mlscorr.targets.candidates import search_radius
-from mlscorr.targets.fit import fit_targets
+from mlscorr.survey import Survey, TargetObservations
+from mlscorr.targets.candidates import Candidates, search_radius
+from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
 from mlscorr.targets.intensity import why_useless
+from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import BY_EDGES
-from mlscorr.targets.visits import PAUSE, motion_covariance, scanner_path, split_visits
+from mlscorr.targets.visits import motion_covariance, scanner_path, split_visits
+
+PassTarget = tuple[int, FittedTarget]  # a pass number, and a target of that pass
 
 
-def extract_targets(candidates, control, trajectory, scanner, rng, mounting=None):
-    """Find targets of the surveyed kinds and sizes near control points.
+def fit_near_control(
+    candidates: Candidates, survey: Survey, rng: np.random.Generator
+) -> list[PassTarget]:
+    """Fit targets of the surveyed kinds and sizes near control and check points.
 
     Parameters
     ----------
     candidates : Candidates
-    control : ControlPoints
-        Control and check points together: they say where to look and for what.
-    trajectory : Trajectory
-        As recorded.
-    scanner : Scanner
-        Noise that blurs the outline.
+    survey : Survey
+        Its points say where to look and for what, its scanner's noise blurs the outline, and its
+        lever arm tells where the beams came from.
     rng : numpy.random.Generator
-        For the random samples of the plane fit.
-    mounting : Mounting, optional
-        Its lever arm tells where the beams came from; else from the navigation centre.
+        For the random samples of the flat patches.
 
-    Returns TargetObservations without names, in order of pass and time.
+    Returns
+    -------
+    list of (pass number, FittedTarget)
+        In this order, and of time. Of fits that overlap, the best: the order of the surveyed points
+        decides nothing.
+
+    Warns where the intensity tells nothing.
     """
-    return as_observations(
-        fit_near_control(candidates, control, trajectory, scanner, rng, mounting)
-    )
-
-
-def fit_near_control(candidates, control, trajectory, scanner, rng, mounting=None):
-    """Fit targets as extract_targets does: pairs (pass number, FittedTarget) in their order."""
-    if len(candidates.cloud) == 0:
+    cloud, passes, surveyed = candidates.cloud, candidates.pass_number, survey.surveyed
+    if len(cloud) == 0:
         return []
-    _warn_of_intensity(candidates.cloud.intensity, control.kind)
-    passes = candidates.pass_number
-    lever_arm = np.zeros(3) if mounting is None else mounting.lever_arm
-    scanned_from = scanner_path(candidates.cloud.gps_time, trajectory, lever_arm)
+    _warn_of_intensity(cloud.intensity, surveyed.kind)
+    scanned_from = scanner_path(cloud.gps_time, survey.trajectory, survey.lever_arm)
     seed = rng.integers(2**63)  # of each piece alike: no target depends on another
-    tree = cKDTree(candidates.cloud.xyz)
-    found = []
-    for index, radius in enumerate(search_radius(trajectory, control)):
-        rows = np.sort(np.array(tree.query_ball_point(control.position[index], radius), int))
-        shape = control.kind[index], float(control.size[index])
-        for number in np.unique(passes[rows]):
-            here = rows[passes[rows] == number]
-            piece = candidates.cloud[here], scanned_from[here]
-            for target in _targets_of_pass(*piece, shape, scanner, np.random.default_rng(seed)):
-                if not any(number == n and _same(target, other) for n, other in found):
-                    found.append((int(number), target))
-    found.sort(key=lambda pair: (pair[0], pair[1].gps_time))
-    return _with_motion(found, trajectory)
-
-
-def _targets_of_pass(cloud, scanned_from, shape, scanner, rng):
-    """Targets of a kind and size near one control point in one pass, at each visit of it."""
-    return [
-        target
-        for rows in split_visits(cloud.gps_time, scanned_from)
-        for target in fit_targets(
-            cloud[rows], cloud.xyz[rows] - scanned_from[rows], [shape], scanner, rng
-        )
+    tree = cKDTree(cloud.xyz)
+    targets: dict[int, list[FittedTarget]] = {}
+    balls = [
+        (index, min(ball, whole))
+        for index, whole in enumerate(search_radius(survey, surveyed))
+        for ball in (SETTINGS.near_radius + surveyed.size[index] / np.sqrt(2), whole)
     ]
+    for index, radius in dict.fromkeys(balls):
+        rows = np.sort(np.array(tree.query_ball_point(surveyed.position[index], radius), int))
+        shape = surveyed.kind[index], float(surveyed.size[index])
+        for number in np.unique(passes[rows]).tolist():
+            in_pass, generator = rows[passes[rows] == number], np.random.default_rng(seed)
+            for visit in split_visits(cloud.gps_time[in_pass], scanned_from[in_pass]):
+                piece = in_pass[visit]
+                sight = cloud.xyz[piece] - scanned_from[piece]
+                fits = fit_targets(cloud[piece], sight, [shape], survey.scanner, generator)
+                targets.setdefault(number, []).extend(fits)
+    best = [(number, target) for number in sorted(targets) for target in distinct(targets[number])]
+    return _with_motion(best, survey)
 
 
-def _with_motion(found, trajectory):
+def _with_motion(targets, survey):
     """The targets with the motion of the POS error in their covariances."""
-    time, duration = [[getattr(t, name) for _, t in found] for name in ("gps_time", "duration")]
-    motion = motion_covariance(trajectory, time, duration)
+    time, duration = [[getattr(t, name) for _, t in targets] for name in ("gps_time", "duration")]
+    motion = motion_covariance(survey.trajectory, survey.pos, time, duration)
     return [
         (number, replace(target, covariance=target.covariance + moved))
-        for (number, target), moved in zip(found, motion, strict=True)
+        for (number, target), moved in zip(targets, motion, strict=True)
     ]
-
-
-def _same(one, other):
-    """Whether two fits are one target at one visit: half a target and two seconds apart or less."""
-    near = np.linalg.norm(one.position - other.position) < max(one.size, other.size) / 2
-    return near and abs(one.gps_time - other.gps_time) < PAUSE
 
 
 def _warn_of_intensity(intensity, kinds):
@@ -100,18 +87,23 @@ def _warn_of_intensity(intensity, kinds):
         )
 
 
-def as_observations(found):
-    """TargetObservations without names of pairs (pass number, FittedTarget), in their order."""
-    n = len(found)
-    targets = [target for _, target in found]
+def as_observations(targets: list[PassTarget]) -> TargetObservations:
+    """Targets as observations without names, in their order.
+
+    Parameters
+    ----------
+    targets : list of (pass number, FittedTarget)
+    """
+    n = len(targets)
+    fitted = [target for _, target in targets]
     return TargetObservations(
         name=(None,) * n,
-        pass_number=np.array([number for number, _ in found], dtype=int),
-        gps_time=np.array([target.gps_time for target in targets], dtype=float),
-        position=np.array([target.position for target in targets]).reshape(n, 3),
-        covariance=np.array([target.covariance for target in targets]).reshape(n, 3, 3),
-        normal=np.array([target.normal for target in targets]).reshape(n, 3),
-        kind=tuple(target.kind for target in targets),
-        size=np.array([target.size for target in targets], dtype=float),
-        points=np.array([target.points for target in targets], dtype=int),
+        pass_number=np.array([number for number, _ in targets], dtype=int),
+        gps_time=np.array([target.gps_time for target in fitted], dtype=float),
+        position=np.array([target.position for target in fitted]).reshape(n, 3),
+        covariance=np.array([target.covariance for target in fitted]).reshape(n, 3, 3),
+        normal=np.array([target.normal for target in fitted]).reshape(n, 3),
+        kind=tuple(target.kind for target in fitted),
+        size=np.array([target.size for target in fitted], dtype=float),
+        points=np.array([target.points for target in fitted], dtype=int),
     )

@@ -1,22 +1,20 @@
 """Targets of one piece of cloud: what extraction near control and search without it both call."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from mlscorr.survey import PointCloud
-from mlscorr.targets.beams import Pulses
-from mlscorr.targets.clusters import FEWEST_POINTS
+from mlscorr.matching import SETTINGS as MATCHING
+from mlscorr.survey import PointCloud, Scanner
+from mlscorr.targets.echoes import Echoes
 from mlscorr.targets.intensity import why_useless
 from mlscorr.targets.plane import centre_of
-from mlscorr.targets.seeds import bright_seeds, hole_seeds, plate_seeds, spot_seeds
+from mlscorr.targets.regions import BrightRegion
+from mlscorr.targets.seeds import bright_seeds, hole_seeds, plate_seeds, region_seeds
+from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets.shape_fit import ShapeFit, exact_fit, rough_fit
 from mlscorr.targets.shapes import BY_EDGES, sides
-from mlscorr.targets.stages import exact_fit, met_target, rough_fit
-
-THICKNESS = 0.03  # m off a plane: less than a post's or a frame's depth
-SETTLED = 0.93  # overlap of a rough fit that needs no second
-SAME_PLACE = 0.1  # of the size, from a settled fit to a seed of another level of the same blob
 
 
 @dataclass(frozen=True)
@@ -94,8 +92,26 @@ class FittedTarget:
     cloud: PointCloud
     view: TargetView
 
+    def overlaps(self, other: "FittedTarget") -> bool:
+        """Whether two fits are one target at one visit: less than half a target apart.
 
-def fit_targets(cloud, sight, shapes, scanner, rng, spot=None):
+        Parameters
+        ----------
+        other : FittedTarget
+        """
+        apart = np.linalg.norm(self.position - other.position)
+        near = apart < max(self.size, other.size) / 2
+        return bool(near and abs(self.gps_time - other.gps_time) < MATCHING.pause)
+
+
+def fit_targets(
+    cloud: PointCloud,
+    sight: np.ndarray,
+    shapes: Sequence[tuple[str, float | None]],
+    scanner: Scanner,
+    rng: np.random.Generator,
+    region: BrightRegion | None = None,
+) -> list[FittedTarget]:
     """Fit targets of the given shapes in one piece of cloud of one pass and visit.
 
     Parameters
@@ -110,96 +126,105 @@ def fit_targets(cloud, sight, shapes, scanner, rng, spot=None):
         Noise that blurs the outline.
     rng : numpy.random.Generator
         For the random samples in which flat patches are looked for.
-    spot : Spot, optional
-        The one bright blob to look at.
+    region : BrightRegion, optional
+        The only one to look at.
 
-    Returns a list of FittedTarget, best first; no two at the same place. Where the intensity is
-    of no use, plates that stand free are found by their edges.
+    Returns
+    -------
+    list of FittedTarget
+        Best first; no two at the same place. Where the intensity is of no use, plates that stand
+        free are found by their edges.
     """
-    if len(cloud) < FEWEST_POINTS:
+    if len(cloud) < SETTINGS.smallest_count:
         return []
     order = np.argsort(cloud.gps_time, kind="stable")
     origin = cloud.xyz.mean(axis=0)
-    xyz = cloud.xyz[order] - origin
     time, intensity = cloud.gps_time[order], cloud.intensity[order].astype(float)
-    tolerance = max(THICKNESS, 4 * scanner.range_noise)
-    pulses = Pulses(xyz, time, intensity, sight[order], cKDTree(xyz), tolerance)
+    tolerance = max(SETTINGS.thickness, 4 * scanner.range_noise)
+    echoes = Echoes(cloud.xyz[order] - origin, time, intensity, sight[order], tolerance)
     blind = why_useless(intensity) is not None
-    roughly = []
+    rough: list[ShapeFit] = []
     for kind, size in shapes:
-        if spot is None or blind:
-            seeds = _seeds(pulses, kind, size, blind, rng)
+        if kind == "hole":
+            seeds = hole_seeds(echoes, size, rng)
+        elif kind in BY_EDGES or blind:
+            seeds = plate_seeds(echoes, kind, size, rng)
+        elif region is not None:
+            seeds = region_seeds(echoes, region, origin, kind, size)
         else:
-            seeds = spot_seeds(pulses, spot, origin, kind, size)
+            seeds = bright_seeds(echoes, kind, size)
         for seed in seeds:
-            if not any(_settled(fit, seed, kind, size) for fit in roughly):
-                fit = rough_fit(pulses, seed, kind, size)
-                roughly += [fit] if fit is not None else []
-    exact = [exact_fit(pulses, fit, scanner) for fit in _best(roughly)]
-    exact = _best([fit for fit in exact if fit is not None])
-    return [_as_target(pulses, fit, origin) for fit in exact]
+            if not any(_is_settled(fit, seed, kind, size) for fit in rough):
+                fit = rough_fit(echoes, seed, kind, size)
+                rough += [fit] if fit is not None else []
+    fits = [exact_fit(echoes, fit, scanner) for fit in _best(rough)]
+    return [_as_target(echoes, fit, origin) for fit in _best([f for f in fits if f is not None])]
 
 
-def _seeds(pulses, kind, size, blind, rng):
-    if kind == "hole":
-        return hole_seeds(pulses, size, rng)
-    if kind in BY_EDGES or blind:
-        return plate_seeds(pulses, kind, size, rng)
-    return bright_seeds(pulses, kind, size)
+def distinct(targets: Iterable[FittedTarget]) -> list[FittedTarget]:
+    """The best target of each place and visit, in order of time.
+
+    Where two are the same, the one with more points is kept: the edge of a
+    piece cut the other.
+
+    Parameters
+    ----------
+    targets : iterable of FittedTarget
+    """
+    kept: list[FittedTarget] = []
+    for target in sorted(targets, key=lambda target: -target.score * np.sqrt(target.points)):
+        if not any(target.overlaps(other) for other in kept):
+            kept.append(target)
+    return sorted(kept, key=lambda target: target.gps_time)
 
 
-def _settled(fit, seed, kind, size):
+def _is_settled(fit, seed, kind, size):
     """Whether a good fit of the same shape is where a seed is: another level tells nothing new."""
-    if (fit.kind, fit.size) != (kind, size) or fit.outline.overlap < SETTLED:
+    if (fit.kind, fit.size) != (kind, size) or fit.outline.overlap < SETTINGS.close_overlap:
         return False
     middle = seed.plane.origin + seed.middle @ seed.plane.axes[:2]
-    return np.linalg.norm(fit.position - middle) < SAME_PLACE * fit.outline.size
+    return np.linalg.norm(fit.position - middle) < SETTINGS.rough_play * fit.outline.size
 
 
 def _best(fits):
     """The best fit at each place, best first: half a target apart or less is one place."""
-    best = []
-    for one in sorted(fits, key=lambda fit: -fit.verdict.rank):
-        for other in best:
-            apart = np.linalg.norm(one.position - other.position)
-            if apart < max(one.outline.size, other.outline.size) / 2:
-                break
-        else:
-            best.append(one)
+    best: list[ShapeFit] = []
+    for fit in sorted(fits, key=lambda fit: -fit.assessment.rank):
+        apart = [np.linalg.norm(fit.position - other.position) for other in best]
+        sizes = [max(fit.outline.size, other.outline.size) for other in best]
+        if all(distance >= size / 2 for distance, size in zip(apart, sizes, strict=True)):
+            best.append(fit)
     return best
 
 
-def _as_target(pulses, fit, origin):
+def _as_target(echoes, fit, origin):
     """The fit in the map: centre, covariance, normal towards the scanner, time at the centre."""
     points, state, rows = fit.beams
     plane, outline = fit.seed.plane, fit.outline
-    met = rows[met_target(fit) & (rows >= 0)]
-    centre = centre_of(pulses, plane, outline, met)
-    turned = -plane.axes[2] if centre.away else plane.axes[2]
-    size = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)
-    told = sides(state, fit.kind, fit.seed.by_edges) == 1
-    view = TargetView(
-        points,
-        state,
-        told,
-        outline.centre,
-        outline.covariance,
-        outline.turn,
-        outline.inner,
-        outline.size,
-        plane.axes[:2],
-    )
+    met = rows[fit.on_target & (rows >= 0)]
+    centre = centre_of(echoes, plane, outline, met)
+    size, sigma = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)
     return FittedTarget(
         gps_time=centre.gps_time,
         duration=centre.duration,
         position=centre.position + origin,
         covariance=centre.covariance,
-        normal=turned,
+        normal=centre.normal,
         kind=fit.kind,
-        size=float(size[0]),
-        size_sigma=float(size[1]),
+        size=float(size),
+        size_sigma=float(sigma),
         points=len(met),
-        score=fit.verdict.score,
-        cloud=PointCloud(pulses.xyz[met] + origin, pulses.gps_time[met], pulses.intensity[met]),
-        view=view,
+        score=fit.assessment.score,
+        cloud=PointCloud(echoes.xyz[met] + origin, echoes.gps_time[met], echoes.intensity[met]),
+        view=TargetView(
+            points,
+            state,
+            sides(state, fit.kind, fit.seed.by_edges) == 1,
+            outline.centre,
+            outline.covariance,
+            outline.turn,
+            outline.inner,
+            outline.size,
+            plane.axes[:2],
+        ),
     )

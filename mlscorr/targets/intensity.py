@@ -2,13 +2,16 @@
 
 import numpy as np
 
-FEWEST_LEVELS = 4  # different values; fewer are a flag or a class, not an intensity
+from mlscorr.targets.settings import SETTINGS
 
 
-def why_useless(intensity):
-    """Why no bright target can be told by these intensities (n,); None where it can.
+def why_useless(intensity: np.ndarray) -> str | None:
+    """Sentence for intensities that tell no bright target; None where they can.
 
-    8 bits in 16 are no reason: only ratios count.
+    Parameters
+    ----------
+    intensity : (n,) array
+        8 bits in 16 are no reason: only ratios count.
 
     >>> import numpy as np
     >>> why_useless(np.zeros(1000))
@@ -20,6 +23,6 @@ def why_useless(intensity):
     if len(values) <= 1:
         value = f"{values[0]:g}" if len(values) else "missing"
         return f"The intensity of all {len(intensity)} points is {value}."
-    if len(values) < FEWEST_LEVELS:
+    if len(values) < SETTINGS.smallest_levels:
         return f"The intensity of {len(intensity)} points takes only {len(values)} values."
     return None

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
+from mlscorr.targets.sequence import quasi_random
+from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import (
     CHECKERED,
     PERIOD,
@@ -21,21 +23,16 @@ from mlscorr.targets.shapes import (
     sides,
 )
 
-TRIALS = 600  # outlines in each round; half of them in a rough fit
-ROUNDS = 24
-ROUGH_ROUNDS = 5  # of them, enough to tell whether there is an outline; a crossing needs twice
-FEW_POINTS = 120  # of each side, enough while the blur is wide
-ENOUGH = 0.3  # effective share of the trials, at which their mean and spread are the posterior's
-FEWEST = 0.1  # effective share, below which the likelihood is flattened until it has as many
-WIDER = 1.35  # times the posterior's spread: the next trials
-PLAY = 0.45  # of the size, from where the fit begins to the centre: half of it may be hidden
-FIRST_BLUR = 8.0  # the size over the blur at first, so that the best outline is never lost
-GOLDEN = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101, 0.46140288)
-
 
 @dataclass(frozen=True)
 class Size:
-    """What is known of a size before the fit: mean and sigma within [low, high]. Units: m."""
+    """What is known of a size before the fit.
+
+    Parameters
+    ----------
+    mean, sigma, low, high : float
+        Normal within limits. Units: m.
+    """
 
     mean: float
     sigma: float
@@ -70,14 +67,22 @@ class Outline:
     overlap: float
 
     @property
-    def row(self):
+    def row(self) -> np.ndarray:
         """The outline as a row of trial outlines."""
         return np.array([*self.centre, self.turn, self.size, self.inner])
 
 
 def fit_outline(
-    points, state, kind, size, blur, start=None, by_edges=False, ring=False, rough=False
-):
+    points: np.ndarray,
+    state: np.ndarray,
+    kind: str,
+    size: Size,
+    blur: float,
+    start: np.ndarray,
+    by_edges: bool = False,
+    ring: bool = False,
+    rough: bool = False,
+) -> Outline:
     """Fit an outline to beams that crossed its plane.
 
     Parameters
@@ -90,8 +95,8 @@ def fit_outline(
     size : Size
     blur : float
         One sigma of a beam's place across the outline. Units: m.
-    start : (2,) array, optional
-        Where to begin; else the middle of the beams inside. Units: m.
+    start : (2,) array
+        Where to begin. Units: m.
     by_edges : bool
         Whether intensity tells nothing.
     ring : bool
@@ -99,62 +104,56 @@ def fit_outline(
     rough : bool
         Whether to stop early.
 
-    Returns an Outline. Source: population Monte Carlo (Cappe et al. 2004) on quasi-random trials;
-    the blur starts wide and halves, so that the posterior's mode is not lost.
+    Source: population Monte Carlo (Cappe et al. 2004) on quasi-random trials; the blur starts wide
+    and halves, so that the posterior's mode is not lost.
     """
     form, side = form_of(kind, by_edges), sides(state, kind, by_edges)
     period = PERIOD.get(kind, 0.0)
-    if start is None:
-        start = (points[side == 1].min(axis=0) + points[side == 1].max(axis=0)) / 2
-    count = TRIALS // (1 + rough)
+    count = SETTINGS.trials // (1 + rough)
     trials, free = _first_trials(start, size, period, ring, count)
-    spent = np.zeros(len(trials))  # minus log of the density they were drawn from
-    width, mean, spread = size.mean / FIRST_BLUR, trials.mean(axis=0), np.ptp(trials, axis=0) / 2
-    rounds = ROUGH_ROUNDS * (1 + (form == CHECKERED)) if rough else ROUNDS
+    spent = np.zeros(count)  # minus log of the density they were drawn from
+    width = size.mean / SETTINGS.first_blur
+    mean, spread = trials.mean(axis=0), np.ptp(trials, axis=0) / 2
+    rounds = SETTINGS.rough_rounds * (1 + (form == CHECKERED) if rough else 5)
     for number in range(1, rounds + 1):
-        near = _telling(points, mean, spread, form, max(width, blur))
+        near = _informative(points, mean, spread, form, max(width, blur))
         if width > blur:
-            near = _thinned(near, side, FEW_POINTS // (1 + rough))
+            near = _thinned(near, side, count // 5)
         value = log_likelihood(points[near], side[near], trials, form, max(width, blur))
         value += spent + _log_prior(trials, size, start, ring)
         weight, effective = _weights(value)
         mean, covariance = _moments(trials, weight, period)
         spread = 4 * np.sqrt(np.diag(covariance))
-        if width <= blur and effective > ENOUGH * count:
+        if width <= blur and effective > 3 * SETTINGS.smallest_share * count:
             break
-        if effective > FEWEST * count:
+        if effective > SETTINGS.smallest_share * count:
             width /= 2
-        drawn = WIDER**2 * covariance[np.ix_(free, free)]
+        drawn = SETTINGS.proposal_width**2 * covariance[np.ix_(free, free)]
         trials, spent = _next_trials(mean, drawn, free, number, count)
-    distance = distance_inside(points, mean, form)
+    inside, marked = distance_inside(points, mean, form) > 0, side == 1
     if form == CHECKERED:
-        told, inside = side == 1, (distance > 0) & (distance_on_white(points, mean) > 0)
-        told &= distance > 0
-    else:
-        told, inside = side == 1, distance > 0
+        marked &= inside
+        inside &= distance_on_white(points, mean) > 0
     return Outline(
         mean[:2],
         covariance[:2, :2],
-        float(mean[2]),
-        float(mean[3]),
-        float(mean[4]),
+        *map(float, mean[2:]),
         float(np.sqrt(covariance[3, 3])),
-        float((inside & told).sum() / max((inside | told).sum(), 1)),
+        float((inside & marked).sum() / max((inside | marked).sum(), 1)),
     )
 
 
-def _sequence(n, dimensions, shift=0):
-    """Quasi-random numbers (n, d) in (0, 1). Source: Roberts 2018, the R sequence."""
-    steps = np.arange(1, n + 1)[:, None] + 1009 * shift
-    return (0.5 + steps * np.array(GOLDEN[:dimensions])) % 1.0
+def _ring_limits():
+    """Inner over outer diameter: a ring's dark disc is neither a speck nor all of it."""
+    return np.array([SETTINGS.core / 2, 1.0 - SETTINGS.core / 4])
 
 
 def _first_trials(middle, size, period, ring, count):
     """Outlines (c, 5) all about the middle, and which of their columns are free."""
-    reach = PLAY * size.mean
-    low = np.array([*(middle - reach), 0.0, size.low, 0.15 if ring else 0.0])
-    high = np.array([*(middle + reach), period, size.high, 0.9 if ring else 0.0])
-    return low + (high - low) * _sequence(count, 5), np.flatnonzero(high > low)
+    play, inner = SETTINGS.hidden_share * size.mean, _ring_limits() * ring
+    low = np.array([*(middle - play), 0.0, size.low, inner[0]])
+    high = np.array([*(middle + play), period, size.high, inner[1]])
+    return low + (high - low) * quasi_random(count, 5), np.flatnonzero(high > low)
 
 
 def _next_trials(mean, covariance, free, number, count):
@@ -162,7 +161,7 @@ def _next_trials(mean, covariance, free, number, count):
     scale = np.sqrt(np.diag(covariance)) + 1e-9
     correlation = covariance / np.outer(scale, scale) + 1e-6 * np.eye(len(free))
     root = np.linalg.cholesky(correlation) * scale[:, None]
-    normal = ndtri(_sequence(count, len(free), number))
+    normal = ndtri(quasi_random(count, len(free), number))
     trials = np.tile(mean, (count, 1))
     trials[:, free] += normal @ root.T
     return trials, 0.5 * np.sum(normal**2, axis=1)
@@ -170,10 +169,12 @@ def _next_trials(mean, covariance, free, number, count):
 
 def _log_prior(trials, size, middle, ring):
     """Log prior (c,) of trial outlines: uniform about the middle but for the size."""
-    within = (np.abs(trials[:, :2] - middle) <= PLAY * size.mean).all(axis=1)
+    play = SETTINGS.hidden_share * size.mean
+    within = (np.abs(trials[:, :2] - middle) <= play).all(axis=1)
     within &= (trials[:, 3] >= size.low) & (trials[:, 3] <= size.high)
     if ring:
-        within &= (trials[:, 4] >= 0.1) & (trials[:, 4] <= 0.95)
+        low, high = _ring_limits()
+        within &= (trials[:, 4] >= low) & (trials[:, 4] <= high)
     return np.where(within, -0.5 * ((trials[:, 3] - size.mean) / size.sigma) ** 2, -1e9)
 
 
@@ -187,7 +188,7 @@ def _weights(value):
         weight = np.exp(power * (value - value.max()))
         weight /= weight.sum()
         effective = 1 / (weight @ weight)
-        if effective >= FEWEST * len(value) or power < 1e-6:
+        if effective >= SETTINGS.smallest_share * len(value) or power < 1e-6:
             return weight, effective if power == 1.0 else 0.0
         power *= 0.7
 
@@ -203,7 +204,7 @@ def _moments(trials, weight, period):
     return mean, (weight[:, None] * deviation).T @ deviation
 
 
-def _telling(points, mean, spread, form, width):
+def _informative(points, mean, spread, form, width):
     """Rows of the points that can lie near the outline: all others say the same of every trial."""
     turned = mean[3] * spread[2] * (form != ROUND)
     play = np.hypot(spread[0], spread[1]) + turned + spread[3] / 2 + spread[4] + 6 * width
@@ -213,7 +214,7 @@ def _telling(points, mean, spread, form, width):
     return np.flatnonzero(distance < play)
 
 
-def _thinned(rows, side, few):
-    """At most so few of the rows on each side, evenly among them."""
+def _thinned(rows, side, count):
+    """At most so many of the rows on each side, evenly among them."""
     parts = [rows[side[rows] == value] for value in (-1, 0, 1)]
-    return np.concatenate([part[:: len(part) // few + 1] for part in parts])
+    return np.concatenate([part[:: len(part) // count + 1] for part in parts])

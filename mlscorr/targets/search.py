@@ -1,24 +1,25 @@
 """Search of a whole cloud for whatever looks like a target, without control, while it streams."""
 
+from collections.abc import Iterable, Iterator, Sequence
+
 import numpy as np
 
-from mlscorr.survey import PointCloud
-from mlscorr.targets.blobs import bright_blobs
-from mlscorr.targets.candidates import PAUSE, Neighbourhoods
+from mlscorr.matching import SETTINGS as MATCHING
+from mlscorr.survey import PointCloud, Survey
+from mlscorr.targets.candidates import Neighbourhoods
 from mlscorr.targets.clusters import split_by_time
-from mlscorr.targets.fit import fit_targets
-from mlscorr.targets.seeds import Spot
+from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
+from mlscorr.targets.regions import bright_regions
+from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.visits import scanner_path
 
-OVERLAP = 1.0  # s: the scanner passes a target in less than that
-MOST_CARRIED = 0.25  # of a chunk: points that are looked at again, so that no target is cut in two
-MOST_FITS = 150  # of a chunk's blobs, the most striking: bounds time and memory when all glitters
-LARGEST = 1.5  # m: nobody carries a larger target
-CONTEXT = 0.4  # m around a blob: a board's rim, and what lies behind its edges
-MOST_POINTS = 50_000  # of a piece: a stop in front of a target tells no more with more of them
 
-
-def search_targets(chunks, trajectory, shapes, scanner, rng, lever_arm):
+def search_targets(
+    chunks: Iterable[PointCloud],
+    survey: Survey,
+    shapes: Sequence[tuple[str, float | None]],
+    rng: np.random.Generator,
+) -> Iterator[tuple[PointCloud, list[FittedTarget]]]:
     """Fit target-like objects in the chunks of one cloud file, while they pass through.
 
     Memory is one chunk and a quarter, whatever the intensities are. Where points come in order of
@@ -27,83 +28,70 @@ def search_targets(chunks, trajectory, shapes, scanner, rng, lever_arm):
     Parameters
     ----------
     chunks : iterable of PointCloud
-    trajectory : Trajectory
+    survey : Survey
+        Its trajectory, lever arm and scanner.
     shapes : sequence of (kind, size or None)
         As fit_targets takes them.
-    scanner : Scanner
     rng : numpy.random.Generator
-    lever_arm : (3,) array
-        Of the scanner. Units: m.
 
-    Yields (chunk, list of FittedTarget); an object may be in the lists of two chunks.
+    Yields
+    ------
+    chunk : PointCloud
+    targets : list of FittedTarget
+        One may be in the lists of two chunks.
     """
     carried = None
     for chunk in chunks:
         whole = chunk if carried is None else PointCloud.concatenate([carried, chunk])
-        pieces = _pieces(whole, trajectory, lever_arm)
-        yield chunk, [t for piece in pieces for t in _fit_piece(*piece, shapes, scanner, rng)]
+        yield (
+            chunk,
+            [
+                target
+                for cloud, sight, region in _pieces(whole, survey)
+                for target in _fit_piece(cloud, sight, region, shapes, survey.scanner, rng)
+            ],
+        )
         carried = _end_of(chunk)
 
 
-def _fit_piece(cloud, sight, spot, shapes, scanner, rng):
-    """FittedTarget of the shape that fits a spot best, each fitted to the end, in a list."""
-    found = [
+def _fit_piece(cloud, sight, region, shapes, scanner, rng):
+    """FittedTarget of the shape that fits a region best, each fitted to the end, in a list."""
+    targets = [
         target
         for shape in shapes
-        for target in fit_targets(cloud, sight, [shape], scanner, rng, spot)
-        if target.size <= LARGEST
+        for target in fit_targets(cloud, sight, [shape], scanner, rng, region)
+        if target.size <= SETTINGS.largest_size
     ]
-    return distinct(found)
-
-
-def distinct(found):
-    """The best FittedTarget of each place and visit, in order of time.
-
-    Where two are the same, the one with more points is kept: the edge of a chunk cut the other.
-    """
-    kept = []
-    for one in sorted(found, key=lambda target: -target.score * np.sqrt(target.points)):
-        if not any(are_same(one, other) for other in kept):
-            kept.append(one)
-    return sorted(kept, key=lambda target: target.gps_time)
-
-
-def are_same(one, other):
-    """Whether two FittedTarget overlap, with less than two seconds between them."""
-    apart = np.linalg.norm(one.position - other.position)
-    near = apart < max(one.size, other.size) / 2
-    return near and abs(one.gps_time - other.gps_time) < PAUSE
+    return distinct(targets)
 
 
 def _end_of(chunk):
-    """The last second of a chunk, at most a quarter of it."""
-    fewest = int((1.0 - MOST_CARRIED) * len(chunk))
-    late = chunk.gps_time[fewest:] > chunk.gps_time.max() - OVERLAP
-    return chunk[fewest:][late]
+    """The end of a chunk, at most a quarter of it: a scanner passes a target within a second."""
+    first = int((1.0 - SETTINGS.largest_carry) * len(chunk))
+    late = chunk.gps_time[first:] > chunk.gps_time.max() - MATCHING.pause / 2
+    return chunk[first:][late]
 
 
-def _pieces(cloud, trajectory, lever_arm):
-    """(PointCloud, sight (n, 3), Spot) about each striking blob, one for each pass and visit."""
-    blobs = bright_blobs(cloud.xyz, cloud.intensity)
-    if len(blobs) == 0:
+def _pieces(cloud, survey):
+    """(PointCloud, sight (n, 3), BrightRegion) about each bright region, by pass and visit."""
+    regions = bright_regions(cloud.xyz, cloud.intensity)[: SETTINGS.largest_fits]
+    if len(regions) == 0:
         return
-    spots = [Spot(*spot) for spot in zip(blobs.centre, blobs.reach, blobs.threshold, strict=True)][
-        :MOST_FITS
-    ]
-    balls = Neighbourhoods(blobs.centre[:MOST_FITS], blobs.reach[:MOST_FITS] + CONTEXT).each(
-        cloud.xyz
-    )
+    centre = np.array([region.centre for region in regions])
+    radius = 2 * np.array([region.radius for region in regions])  # what lies behind its edges
+    balls = Neighbourhoods(centre, radius).each(cloud.xyz)
     rows = np.unique(np.concatenate(balls))
     near = cloud[rows]
-    segment = trajectory.segment(near.gps_time)
+    segment = survey.trajectory.segment(near.gps_time)
     sight = np.full((len(rows), 3), np.nan)
     placed = near[segment >= 0]
-    sight[segment >= 0] = placed.xyz - scanner_path(placed.gps_time, trajectory, lever_arm)
-    for ball, spot in zip(balls, spots, strict=True):
+    path = scanner_path(placed.gps_time, survey.trajectory, survey.lever_arm)
+    sight[segment >= 0] = placed.xyz - path
+    for region, ball in zip(regions, balls, strict=True):
         inside = np.searchsorted(rows, ball)
-        for number in np.unique(segment[inside][segment[inside] >= 0]):
-            here = inside[segment[inside] == number]
-            for visit in split_by_time(near.gps_time[here], PAUSE):
-                surplus = max(0, len(visit) - MOST_POINTS)
-                part = here[visit[surplus // 2 : len(visit) - (surplus + 1) // 2]]
-                yield near[part], sight[part], spot
+        for part in np.unique(segment[inside][segment[inside] >= 0]):
+            in_pass = inside[segment[inside] == part]
+            for visit in split_by_time(near.gps_time[in_pass], MATCHING.pause):
+                surplus = max(0, len(visit) - SETTINGS.piece_points)  # of a stop in front of it
+                piece = in_pass[visit[surplus // 2 : len(visit) - (surplus + 1) // 2]]
+                yield near[piece], sight[piece], region

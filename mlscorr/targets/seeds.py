@@ -1,26 +1,17 @@
 """Where in a piece of cloud a target may be: bright components, flat patches, gaps in patches."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from mlscorr.targets.beams import Pulses
-from mlscorr.targets.clusters import FEWEST_POINTS, bright_components, connected
+from mlscorr.targets.clusters import bright_components, components
+from mlscorr.targets.echoes import Echoes
 from mlscorr.targets.plane import Plane, consensus, fit_plane, plane_through
+from mlscorr.targets.regions import BrightRegion
+from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import diameter
-
-LEAST_EXTENT = 0.7, 0.33  # of the size, along and across: a target may be partly hidden
-LARGEST_EXTENT = 1.3  # of the longest extent: with a line spacing of noise at either end
-BLOOMED = 1.35  # times the size, of a disc that saturates the receiver
-LINK_SHARES = 0.2, 0.4  # of the size, between neighbours on a patch
-GUESSES = 0.2, 0.4, 0.8  # m, of an unknown size: sets how far neighbours may be apart
-PATCHES = 10  # flat patches looked for in a piece: road, walls, and then plates
-SAMPLES = 100  # planes tried for each
-MOST_POINTS = 8000  # thinned, in which patches are looked for
-GRAZING = 0.1  # sine of the angle between a beam and a plane it can be said to cross
-GAPS = 12  # looked at on a patch, largest first
-LEAST_GAP = 0.06  # m, diameter of the smallest hole
 
 
 @dataclass(frozen=True)
@@ -37,7 +28,7 @@ class Seed:
     by_edges : bool
         Whether intensity tells nothing.
     extent : float
-        About the longest extent of what is seen. Units: m.
+        About the longest extent of what is visible. Units: m.
     middle : (2,) array
         About the centre, in the plane. Units: m.
     bloomed : bool
@@ -56,83 +47,121 @@ class Seed:
     mesh: float = 0.0
 
 
-@dataclass(frozen=True)
-class Spot:
-    """A bright blob: centre (3,) and half extent in m, and the least intensity of its points."""
+def region_seeds(
+    echoes: Echoes, region: BrightRegion, origin: np.ndarray, kind: str, size: float | None
+) -> Iterator[Seed]:
+    """Seeds in one bright region.
 
-    centre: np.ndarray
-    reach: float
-    threshold: float
-
-
-def spot_seeds(pulses: Pulses, spot, origin, kind, size):
-    """Seeds in one bright blob (Spot) of a cloud about an origin (3,), as of bright_seeds."""
-    apart = np.linalg.norm(pulses.xyz - (spot.centre - origin), axis=1)
-    bright = pulses.intensity >= spot.threshold
-    rows = np.flatnonzero((apart <= spot.reach) & bright)
-    saturated = np.mean(pulses.intensity[rows] >= pulses.intensity.max()) > 0.5
-    guess, bloomed = size or 1.4 * spot.reach, BLOOMED if saturated else 1.0
-    for seed in _flat_parts(pulses, rows, kind, size, guess, bloomed):
-        yield Seed(*seed[:2], spot.threshold, False, *seed[2:], saturated)
-
-
-def bright_seeds(pulses: Pulses, kind, size):
-    """Seeds at bright components of the extent of a shape; of any extent where size is None."""
-    saturated = pulses.intensity.max()
-    for guess in GUESSES if size is None else (size,):
-        for level, rows in bright_components(pulses.xyz, pulses.intensity, guess):
-            bloomed = BLOOMED if np.mean(pulses.intensity[rows] >= saturated) > 0.5 else 1.0
-            for seed in _flat_parts(pulses, rows, kind, size, guess, bloomed):
-                yield Seed(*seed[:2], level, False, *seed[2:], bloomed > 1)
+    Parameters
+    ----------
+    echoes : Echoes
+    region : BrightRegion
+    origin : (3,) array
+        Of the echoes, in the region's coordinates. Units: m.
+    kind : str
+    size : float or None
+        Units: m.
+    """
+    apart = np.linalg.norm(echoes.xyz - (region.centre - origin), axis=1)
+    rows = np.flatnonzero((apart <= region.radius) & (echoes.intensity >= region.threshold))
+    guess = size or 1.4 * region.radius  # half a square's diagonal
+    yield from _bright_parts(echoes, rows, region.threshold, kind, size, guess)
 
 
-def plate_seeds(pulses: Pulses, kind, size, rng):
-    """Seeds at flat patches of the extent of a shape, whatever their intensity."""
-    for guess in GUESSES if size is None else (size,):
-        for plane, rows in flat_patches(pulses, guess, rng):
-            points = plane.crossing(pulses.xyz[rows], pulses.sight[rows])
-            for share in LINK_SHARES:
-                for part in _components(points, max(share * guess, 0.06)):
-                    seed = _sized(pulses, rows[part], plane, kind, size, guess, 1.0)
-                    if seed is not None:
-                        yield Seed(*seed[:2], 0.0, True, *seed[2:])
+def bright_seeds(echoes: Echoes, kind: str, size: float | None) -> Iterator[Seed]:
+    """Seeds at bright components of the extent of a shape.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    kind : str
+    size : float or None
+        Of any extent where it is None. Units: m.
+    """
+    for guess in SETTINGS.size_guesses if size is None else (size,):
+        for level, rows in bright_components(echoes.xyz, echoes.intensity, guess):
+            yield from _bright_parts(echoes, rows, level, kind, size, guess)
 
 
-def hole_seeds(pulses: Pulses, size, rng):
-    """Seeds at round gaps in flat patches: where a circle of the size holds no point of it."""
-    for plane, rows in flat_patches(pulses, size or 0.4, rng):
-        points = plane.crossing(pulses.xyz[rows], pulses.sight[rows])
-        for middle, radius, mesh in _gaps(pulses, plane, points, size):
+def plate_seeds(
+    echoes: Echoes, kind: str, size: float | None, rng: np.random.Generator
+) -> Iterator[Seed]:
+    """Seeds at flat patches of the extent of a shape, whatever their intensity.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    kind : str
+    size : float or None
+        Of any extent where it is None. Units: m.
+    rng : numpy.random.Generator
+    """
+    for guess in SETTINGS.size_guesses if size is None else (size,):
+        for plane, rows in flat_patches(echoes, guess, rng):
+            points = plane.crossing(echoes.xyz[rows], echoes.sight[rows])
+            for share in SETTINGS.link_shares:
+                for part in components(points, max(share * guess, 2 * SETTINGS.thickness)):
+                    extent = _extent(points[part], kind, size, guess)
+                    if extent is not None:
+                        yield Seed(rows[part], plane, 0.0, True, *extent)
+
+
+def hole_seeds(echoes: Echoes, size: float | None, rng: np.random.Generator) -> Iterator[Seed]:
+    """Seeds at round gaps in flat patches: where a circle of the size holds no point of it.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    size : float or None
+        Units: m.
+    rng : numpy.random.Generator
+    """
+    for plane, rows in flat_patches(echoes, size or np.median(SETTINGS.size_guesses), rng):
+        points = plane.crossing(echoes.xyz[rows], echoes.sight[rows])
+        for middle, radius, mesh in _gaps(echoes, plane, points, size):
             about = np.linalg.norm(points - middle, axis=1) < 2.5 * radius
-            if about.sum() >= FEWEST_POINTS:
+            if about.sum() >= SETTINGS.smallest_count:
                 yield Seed(rows[about], plane, 0.0, True, 2 * radius, middle, mesh=mesh)
 
 
-def flat_patches(pulses, size, rng):
-    """Planes of a piece with the rows on each, most points first; a point is on one of them."""
-    left = _thinned(pulses.xyz, size / 12, rng)
-    fewest = FEWEST_POINTS / 2
-    for _ in range(PATCHES):
-        if len(left) < fewest:
+def flat_patches(
+    echoes: Echoes, size: float, rng: np.random.Generator
+) -> Iterator[tuple[Plane, np.ndarray]]:
+    """Planes of a piece with the rows on each, most points first; a point is on one of them.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    size : float
+        Of a target. Units: m.
+    rng : numpy.random.Generator
+    """
+    left = _thinned(echoes.xyz, size / 12, rng)
+    smallest = SETTINGS.smallest_count / 2
+    for _ in range(SETTINGS.patches):
+        if len(left) < smallest:
             return
-        plane = _most_common_plane(pulses.xyz[left], size, pulses.tolerance, rng)
+        plane = _most_common_plane(echoes.xyz[left], size, echoes.tolerance, rng)
         if plane is None:
             return
-        on_plane = np.abs(plane.coordinates(pulses.xyz[left])[:, 2]) <= pulses.tolerance
-        if on_plane.sum() < fewest:
+        on_plane = np.abs(plane.coordinates(echoes.xyz[left])[:, 2]) <= echoes.tolerance
+        if on_plane.sum() < smallest:
             return
-        plane = fit_plane(pulses.xyz[left[on_plane]], pulses.tolerance)
-        height = np.abs(plane.coordinates(pulses.xyz)[:, 2])
-        steep = np.abs(pulses.sight @ plane.axes[2]) > GRAZING * np.linalg.norm(
-            pulses.sight, axis=1
-        )
-        yield plane, np.flatnonzero((height <= pulses.tolerance) & steep)
-        left = left[height[left] > pulses.tolerance]
+        plane = fit_plane(echoes.xyz[left[on_plane]], echoes.tolerance)
+        height = np.abs(plane.coordinates(echoes.xyz)[:, 2])
+        yield plane, np.flatnonzero((height <= echoes.tolerance) & _steep(echoes, plane))
+        left = left[height[left] > echoes.tolerance]
+
+
+def _steep(echoes, plane):
+    """Which beams can be said to cross a plane."""
+    slant = np.abs(echoes.sight @ plane.axes[2])
+    return slant > SETTINGS.grazing * np.linalg.norm(echoes.sight, axis=1)
 
 
 def _most_common_plane(xyz, size, tolerance, rng):
     """The plane through three near points that most points lie on, or None."""
-    seeds = rng.integers(len(xyz), size=SAMPLES)
+    seeds = rng.integers(len(xyz), size=SETTINGS.plane_trials)
     balls = cKDTree(xyz).query_ball_point(xyz[seeds], size / 2)
     pairs = np.array([[ball[int(i * len(ball))] for i in rng.random(2)] for ball in balls])
     normal = np.cross(xyz[pairs[:, 0]] - xyz[seeds], xyz[pairs[:, 1]] - xyz[seeds])
@@ -146,93 +175,85 @@ def _most_common_plane(xyz, size, tolerance, rng):
     return plane_through(origin[best], normal[best])
 
 
-def _flat_parts(pulses, rows, kind, size, guess, bloomed):
-    """Flat parts of a component that have a shape's extent: itself, or what is left of it without
-    a post or pole before or beside it."""
+def _bright_parts(echoes, rows, threshold, kind, size, guess):
+    """Seeds at the flat parts of a bright component, larger where the receiver was saturated."""
+    if len(rows) < SETTINGS.smallest_count:
+        return
+    bloomed = bool(np.mean(echoes.intensity[rows] >= echoes.intensity.max()) > 0.5)
+    bloom = SETTINGS.bloom if bloomed else 1.0
+    for part, plane, points in _flat_parts(echoes, rows, guess):
+        extent = _extent(points, kind, size, guess, bloom)
+        if extent is not None:
+            yield Seed(part, plane, threshold, False, *extent, bloomed)
+
+
+def _flat_parts(echoes, rows, size):
+    """Flat parts of a component, with their planes and places in them: itself, or what is left of
+    it without a post or pole before or beside it.
+    """
     for _ in range(3):
-        if len(rows) < FEWEST_POINTS or _too_small(pulses, rows, size or guess):
+        if len(rows) < SETTINGS.smallest_count:
             return
-        plane = fit_plane(pulses.xyz[rows], pulses.tolerance)
-        inside = plane.inliers
-        whole = inside.mean() >= 0.7
-        flat = rows[inside]
-        if whole or inside.sum() >= FEWEST_POINTS:
-            points = plane.crossing(pulses.xyz[flat], pulses.sight[flat])
-            parts = [np.arange(len(flat))] if whole else _components(points, 0.4 * guess)
-            for part in parts:
-                seed = _sized(pulses, flat[part], plane, kind, size, guess, bloomed)
-                if seed is not None:
-                    yield seed
+        longest = np.linalg.norm(np.ptp(echoes.xyz[rows], axis=0))
+        if longest + 2 * echoes.tolerance < size / 2:  # too small on whatever plane
+            return
+        plane = fit_plane(echoes.xyz[rows], echoes.tolerance)
+        flat, whole = rows[plane.inliers], plane.inliers.mean() >= 0.7
+        points = plane.crossing(echoes.xyz[flat], echoes.sight[flat])
+        link = SETTINGS.link_shares[-1] * size
+        parts = [np.arange(len(flat))] if whole else components(points, link)
+        for part in parts:
+            if len(part) >= SETTINGS.smallest_count and np.isfinite(points[part]).all():
+                yield flat[part], plane, points[part]  # no beam runs along the plane
         if whole:
             return
-        rows = rows[~inside]
+        rows = rows[~plane.inliers]
 
 
-def _too_small(pulses, rows, size):
-    """Whether points are too close together for a shape of this size (m), on whatever plane."""
-    longest = np.linalg.norm(np.ptp(pulses.xyz[rows], axis=0))
-    return longest + 2 * pulses.tolerance < size / 2  # of a guess; of a known size, more is asked
-
-
-def _sized(pulses, rows, plane, kind, size, guess, bloomed):
-    """(rows, plane, extent, middle) of a part of the extent that a shape may have, or None."""
-    if len(rows) < FEWEST_POINTS:
-        return None
-    points = plane.crossing(pulses.xyz[rows], pulses.sight[rows])
-    if not np.isfinite(points).all():  # beams along the plane
-        return None
+def _extent(points, kind, size, guess, bloom=1.0):
+    """Longest extent and middle (2,) of points (n, 2) if a shape may have it, else None."""
     low, high = points.min(axis=0), points.max(axis=0)
-    extent = high - low
+    shortest, longest = np.sort(high - low)
     if size is None:
-        if not guess / 2 <= extent.max() <= 2 * guess or extent.min() < 0.4 * extent.max():
-            return None
+        fits = guess / 2 <= longest <= 2 * guess and shortest >= 0.4 * longest
     else:
-        if extent.max() > LARGEST_EXTENT * bloomed * diameter(kind, size):
-            return None
-        if extent.max() < LEAST_EXTENT[0] * size or extent.min() < LEAST_EXTENT[1] * size:
-            return None
-    return rows, plane, float(extent.max()), (low + high) / 2
+        fits = longest <= (2 - SETTINGS.smallest_length) * bloom * diameter(kind, size)
+        fits &= longest >= SETTINGS.smallest_length * size
+        fits &= shortest >= SETTINGS.smallest_width * size
+    return (float(longest), (low + high) / 2) if fits else None
 
 
-def _components(points, link):
-    """Index arrays of the connected components of points (n, 2), those with enough points."""
-    label = connected(np.column_stack([points, np.zeros(len(points))]), link)
-    order = np.argsort(label, kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    return [np.sort(part) for part in parts if len(part) >= FEWEST_POINTS]
-
-
-def _gaps(pulses, plane, points, size):
+def _gaps(echoes, plane, points, size):
     """Middle (2,), radius and mesh (m) of the largest circles with no point on or before a patch.
 
     They are circumcircles of the Delaunay triangles (their centres are Voronoi's corners).
     """
-    height, beam = plane.coordinates(pulses.xyz)[:, 2], pulses.sight @ plane.axes[2]
-    blocked = (height * beam < 0) & (np.abs(height) > pulses.tolerance)
-    blocked &= np.abs(beam) > GRAZING * np.linalg.norm(pulses.sight, axis=1)
-    before = plane.crossing(pulses.xyz[blocked], pulses.sight[blocked])
+    height, beam = plane.coordinates(echoes.xyz)[:, 2], echoes.sight @ plane.axes[2]
+    blocked = (height * beam < 0) & (np.abs(height) > echoes.tolerance)
+    blocked &= _steep(echoes, plane)
+    before = plane.crossing(echoes.xyz[blocked], echoes.sight[blocked])
     known = np.vstack([points, before])
-    known = known[:: len(known) // MOST_POINTS + 1]
-    if len(known) < FEWEST_POINTS:
+    known = known[:: len(known) // SETTINGS.piece_points + 1]
+    if len(known) < SETTINGS.smallest_count:
         return
     a, b, c = np.moveaxis(known[Delaunay(known).simplices], 1, 0)
     centre, radius = _circumcircles(a, b, c)
-    low, high = (LEAST_GAP / 2, 0.75) if size is None else (0.4 * size, 0.75 * size)
+    low, high = (SETTINGS.thickness, 0.75) if size is None else (0.4 * size, 0.75 * size)
     if size is None:
         low = max(low, 2.5 * float(np.median(radius)))
     order = np.argsort(-radius)
     order = order[(radius[order] >= low) & (radius[order] <= high)]
-    found = []
+    centres = []
     tree = cKDTree(points)
     for i in order:
-        apart = all(np.linalg.norm(centre[i] - other) > radius[i] for other in found)
+        apart = all(np.linalg.norm(centre[i] - other) > radius[i] for other in centres)
         if apart and _surrounded(
             points[tree.query_ball_point(centre[i], 1.5 * radius[i])], centre[i]
         ):
-            found.append(centre[i])
+            centres.append(centre[i])
             near = np.linalg.norm(centre - centre[i], axis=1) < 2 * radius[i]
             yield centre[i], float(radius[i]), float(np.median(radius[near]))
-        if len(found) >= GAPS:
+        if len(centres) >= SETTINGS.patches:
             return
 
 
@@ -255,8 +276,8 @@ def _circumcircles(a, b, c):
 
 
 def _thinned(xyz, voxel, rng):
-    """Rows of one point in each voxel, and at most MOST_POINTS of them."""
+    """Rows of one point in each voxel, and at most SETTINGS.piece_points of them."""
     _, rows = np.unique(np.floor(xyz / max(voxel, 0.02)).astype(int), axis=0, return_index=True)
-    if len(rows) > MOST_POINTS:
-        rows = rng.choice(rows, MOST_POINTS, replace=False)
+    if len(rows) > SETTINGS.piece_points:
+        rows = rng.choice(rows, SETTINGS.piece_points, replace=False)
     return np.sort(rows)

@@ -4,13 +4,15 @@ A trial outline is a row of u, v (centre, m), turn (rad), size (m) and inner (sh
 that a ring's dark inner disc takes, 0 for none).
 """
 
-from math import log
+from functools import cache
 
 import numpy as np
 from numba import njit
 from scipy.special import ndtr
 
-PASSED, DARK, BRIGHT = -1, 0, 1  # what a beam did at the plane: went by, met dark, met bright
+from mlscorr.targets.settings import SETTINGS
+
+MISS, DARK, BRIGHT = -1, 0, 1  # what a beam did at the plane: went by, met dark, met bright
 ROUND, SQUARE, CHECKERED = range(3)
 FORMS = {
     "circle": ROUND,
@@ -21,39 +23,60 @@ FORMS = {
 }
 PERIOD = {"square": np.pi / 2, "board": np.pi / 2, "checkerboard": np.pi}  # of turn; rad
 BY_EDGES = ("hole", "board")  # told by where beams pass, not by intensity
-WRONG_SIDE = 0.01  # share of beams that tell the wrong side whatever their distance (mixed returns)
-LOG_WRONG, LOG_RIGHT = log(WRONG_SIDE), log(1 - WRONG_SIDE)
-CERTAIN = 5.0  # sigmas from the outline, beyond which only WRONG_SIDE counts
-PER_SIGMA = 200  # entries of the tables, exact to 5e-6 between them
+TABLE_SIGMAS = 5.0  # from the outline, beyond which a beam's place tells no more
+TABLE_STEPS = 200  # a sigma: the tables are exact to 5e-6 between them
 
 
-def diameter(kind, size):
-    """Longest extent (m) of a shape of this size (m)."""
+def diameter(kind: str, size: float) -> float:
+    """Longest extent (m) of a shape.
+
+    Parameters
+    ----------
+    kind : str
+    size : float
+        Units: m.
+    """
     return size * (1.0 if FORMS[kind] == ROUND else np.sqrt(2))
 
 
-def sides(state, kind, by_edges):
-    """Side (n,) that each beam tells: 1 inside, -1 outside; a checkerboard's state stays as is."""
+def sides(state: np.ndarray, kind: str, by_edges: bool) -> np.ndarray:
+    """Side (n,) that each beam tells: 1 inside, -1 outside; a checkerboard's state stays as is.
+
+    Parameters
+    ----------
+    state : (n,) int array
+        BRIGHT, DARK or MISS.
+    kind : str
+    by_edges : bool
+        Whether intensity tells nothing.
+    """
     if kind == "checkerboard" and not by_edges:
         return state.astype(np.int8)
     if kind == "hole":
-        inside = state == PASSED
+        inside = state == MISS
     elif by_edges:
-        inside = state != PASSED
+        inside = state != MISS
     else:
         inside = state == BRIGHT
     return np.where(inside, 1, -1).astype(np.int8)
 
 
-def form_of(kind, by_edges):
-    """Form that the likelihood uses: by its edges, a checkerboard is a square like others."""
+def form_of(kind: str, by_edges: bool) -> int:
+    """Form that the likelihood uses: by its edges, a checkerboard is a square like others.
+
+    Parameters
+    ----------
+    kind : str
+    by_edges : bool
+        Whether intensity tells nothing.
+    """
     return SQUARE if kind == "checkerboard" and by_edges else FORMS[kind]
 
 
 @njit(cache=True)
 def _within(x, y, half, inner, form):
     """Distance (m) inside the outline of a place in the shape's own axes, negative outside."""
-    if form != 0:
+    if form != ROUND:
         return half - max(abs(x), abs(y))
     radius = np.sqrt(x * x + y * y)
     return min(half - radius, radius - inner * half) if inner > 0 else half - radius
@@ -66,8 +89,17 @@ def _on_white(x, y):
 
 
 @njit(cache=True)
-def distance_inside(points, outline, form):
-    """Distance (n,) in m of points (n, 2) inside an outline (5,), negative outside."""
+def distance_inside(points: np.ndarray, outline: np.ndarray, form: int) -> np.ndarray:
+    """Distance (n,) of points inside an outline, negative outside. Units: m.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        Units: m.
+    outline : (5,) array
+        As a row of trial outlines.
+    form : int
+    """
     cos, sin, distance = np.cos(outline[2]), np.sin(outline[2]), np.empty(len(points))
     for i in range(len(points)):
         du, dv = points[i, 0] - outline[0], points[i, 1] - outline[1]
@@ -77,8 +109,16 @@ def distance_inside(points, outline, form):
 
 
 @njit(cache=True)
-def distance_on_white(points, outline):
-    """Distance (n,) in m of points (n, 2) from a checkerboard's crossing, positive on white."""
+def distance_on_white(points: np.ndarray, outline: np.ndarray) -> np.ndarray:
+    """Distance (n,) of points from a checkerboard's crossing, positive on white. Units: m.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        Units: m.
+    outline : (5,) array
+        As a row of trial outlines.
+    """
     cos, sin, distance = np.cos(outline[2]), np.sin(outline[2]), np.empty(len(points))
     for i in range(len(points)):
         du, dv = points[i, 0] - outline[0], points[i, 1] - outline[1]
@@ -86,54 +126,52 @@ def distance_on_white(points, outline):
     return distance
 
 
-def _table():
-    """Probability that a beam tells inside, at every fraction of a sigma from the outline."""
-    z = np.arange(-CERTAIN * PER_SIGMA, CERTAIN * PER_SIGMA + 2) / PER_SIGMA
-    return WRONG_SIDE + (1 - 2 * WRONG_SIDE) * ndtr(z)
-
-
-SHARE = _table()
-LOG_SHARE = np.log(SHARE)
+@cache
+def _tables(wrong):
+    """Probability that a beam tells inside, at steps of a sigma about the outline, and its log."""
+    z = np.arange(-TABLE_SIGMAS * TABLE_STEPS, TABLE_SIGMAS * TABLE_STEPS + 2) / TABLE_STEPS
+    share = wrong + (1 - 2 * wrong) * ndtr(z)
+    return share, np.log(share)
 
 
 @njit(cache=True)
-def _looked_up(table, z):
-    """Value of a table between its entries, z sigmas inside and not farther than CERTAIN."""
-    if np.isnan(z):  # of a beam along the plane
-        return z
-    place = (z + CERTAIN) * PER_SIGMA
+def _from_table(table, distance, width):
+    """Value at a distance inside the outline: quick where it is constant, nearly everywhere."""
+    if distance > TABLE_SIGMAS * width:
+        return table[-2]
+    if distance < -TABLE_SIGMAS * width:
+        return table[0]
+    if np.isnan(distance):  # of a beam along the plane
+        return distance
+    place = (distance / width + TABLE_SIGMAS) * TABLE_STEPS
     entry = int(place)
     return table[entry] + (place - entry) * (table[entry + 1] - table[entry])
 
 
-@njit(cache=True)
-def _share(distance, width):
-    """Probability that a beam at this distance inside tells inside, blurred by width (m)."""
-    if distance > CERTAIN * width:
-        return 1.0 - WRONG_SIDE
-    if distance < -CERTAIN * width:
-        return WRONG_SIDE
-    return _looked_up(SHARE, distance / width)
+def log_likelihood(
+    points: np.ndarray, side: np.ndarray, outlines: np.ndarray, form: int, width: float
+) -> np.ndarray:
+    """Log likelihood (c,) of trial outlines by the beams' places and sides.
 
-
-@njit(cache=True)
-def _log_share(distance, width):
-    """Logarithm of _share: quick where it is constant, which is nearly everywhere."""
-    if distance > CERTAIN * width:
-        return LOG_RIGHT
-    if distance < -CERTAIN * width:
-        return LOG_WRONG
-    return _looked_up(LOG_SHARE, distance / width)
-
-
-@njit(cache=True)
-def log_likelihood(points, side, outlines, form, width):
-    """Log likelihood (c,) of trial outlines (c, 5), given points (n, 2) and their sides (n,).
+    Parameters
+    ----------
+    points : (n, 2) array
+        Units: m.
+    side : (n,) int array
+    outlines : (c, 5) array
+    form : int
+    width : float
+        One sigma of a beam's place. Units: m.
 
     Source: Bernoulli, each point inside or outside with a probability that falls across the
-    outline as a normal distribution of this width (m). A checkerboard's sides are states: beside
-    the board bright and dark are equally likely, on it no beam passes.
+    outline as a normal distribution of this width. A checkerboard's sides are states: beside the
+    board bright and dark are equally likely, on it no beam passes.
     """
+    return _log_likelihood(points, side, outlines, form, width, *_tables(SETTINGS.wrong_side))
+
+
+@njit(cache=True)
+def _log_likelihood(points, side, outlines, form, width, share, log_share):
     result = np.zeros(len(outlines))
     for c in range(len(outlines)):
         u, v, turn, size, inner = outlines[c]
@@ -142,14 +180,15 @@ def log_likelihood(points, side, outlines, form, width):
             du, dv = points[i, 0] - u, points[i, 1] - v
             x, y = cos * du + sin * dv, cos * dv - sin * du
             within = _within(x, y, size / 2, inner, form)
-            if form != 2:
-                total += _log_share(within * side[i], width)
+            if form != CHECKERED:
+                total += _from_table(log_share, within * side[i], width)
                 continue
             if side[i] < 0:
-                total += _log_share(-within, width)
+                total += _from_table(log_share, -within, width)
                 continue
-            on_board = _share(within, width)
+            on_board = _from_table(share, within, width)
             white = _on_white(x, y) * (1 if side[i] == 1 else -1)
-            total += np.log(on_board * _share(white, width) + (1.0 - on_board) * 0.5)
+            right = _from_table(share, white, width)
+            total += np.log(on_board * right + (1.0 - on_board) * 0.5)
         result[c] = total
     return result

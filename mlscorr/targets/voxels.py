@@ -1,5 +1,7 @@
 """Occupied cubes of a chunk of cloud in a hash table, so that millions of points cost little."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numba import njit
 
@@ -7,7 +9,14 @@ EMPTY = -1
 
 
 @njit(cache=True)
-def key_of(x, y, z, edge):
+def key_of(x: float, y: float, z: float, edge: float) -> np.int64:
+    """Key of the cube that holds a place.
+
+    Parameters
+    ----------
+    x, y, z, edge : float
+        Units: m.
+    """
     return (np.int64(x / edge) << 42) | (np.int64(y / edge) << 21) | np.int64(z / edge)
 
 
@@ -22,36 +31,63 @@ def _slot(keys, key):
 
 
 @njit(cache=True)
-def number_voxels(xyz, low, edge):
-    """Number (n,) of the occupied cube of each point, and the key of each cube."""
+def number_voxels(xyz: np.ndarray, low: np.ndarray, edge: float) -> tuple[np.ndarray, ...]:
+    """Number the occupied cubes.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    low : (3,) array
+        Not above any of them. Units: m.
+    edge : float
+        Units: m.
+
+    Returns
+    -------
+    of_point : (n,) int array
+        Number of each point's cube.
+    keys_of : (c,) int array
+        Key of each cube.
+    keys, number : (t,) int arrays
+        The hash table, for ``neighbours``.
+    """
     size = 1024
     keys = np.full(size, EMPTY)
     number = np.empty(size, np.int64)
     of_point = np.empty(len(xyz), np.int32)
-    found = np.empty(len(xyz), np.int64)
+    known = np.empty(len(xyz), np.int64)
     count, last_key, last = 0, np.int64(EMPTY), 0
     for i in range(len(xyz)):
         key = key_of(xyz[i, 0] - low[0], xyz[i, 1] - low[1], xyz[i, 2] - low[2], edge)
         if key != last_key:
             slot = _slot(keys, key)
             if keys[slot] == EMPTY:
-                keys[slot], number[slot], found[count] = key, count, key
+                keys[slot], number[slot], known[count] = key, count, key
                 count += 1
                 if 2 * count > size:
                     size *= 4
                     keys, number = np.full(size, EMPTY), np.empty(size, np.int64)
                     for k in range(count):
-                        slot = _slot(keys, found[k])
-                        keys[slot], number[slot] = found[k], k
+                        slot = _slot(keys, known[k])
+                        keys[slot], number[slot] = known[k], k
                     slot = _slot(keys, key)
             last_key, last = key, number[slot]
         of_point[i] = last
-    return of_point, found[:count].copy(), keys, number
+    return of_point, known[:count].copy(), keys, number
 
 
 @njit(cache=True)
-def sort_by_voxel(cell, count):
-    """Rows (n,) sorted by cell, and where each cell starts among them (c + 1,)."""
+def sort_by_voxel(cell: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (n,) sorted by cell, and where each cell starts among them (count + 1,).
+
+    Parameters
+    ----------
+    cell : (n,) int array
+        Number of each point's cell.
+    count : int
+        Of cells.
+    """
     starts = np.zeros(count + 1, np.int64)
     for i in range(len(cell)):
         starts[cell[i] + 1] += 1
@@ -63,9 +99,16 @@ def sort_by_voxel(cell, count):
     return order, starts
 
 
-@njit(cache=True)
-def neighbours(key, keys, number):
-    """Numbers of the occupied cubes among the 27 about a key."""
+@njit  # numba can't call a generator that it read from its cache
+def neighbours(key: int, keys: np.ndarray, number: np.ndarray) -> Iterator[int]:
+    """Numbers of the occupied cubes among the 27 about a key.
+
+    Parameters
+    ----------
+    key : int
+    keys, number : (t,) int arrays
+        The hash table of ``number_voxels``.
+    """
     for dx in range(-1, 2):
         for dy in range(-1, 2):
             for dz in range(-1, 2):

@@ -1,8 +1,8 @@
-"""Compact bright blobs of a chunk of cloud: where targets may be when nobody says where.
+"""Compact bright regions of a chunk of cloud: where targets may be when nobody says where.
 
 A target stands out against what surrounds it, whatever the range does to all intensities there.
-So levels are relative to the darker part of the neighbourhood, and blobs at every half octave
-above it are looked at (a component tree; Najman and Couprie 2006).
+So levels are relative to the darker part of the neighbourhood, and connected regions at every half
+octave above it are looked at (a component tree; Najman and Couprie 2006).
 """
 
 from dataclasses import dataclass
@@ -10,44 +10,38 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mlscorr.targets.agreement import agreement
+from mlscorr.targets.jaccard import jaccard_index
+from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.voxels import key_of, neighbours, number_voxels, sort_by_voxel
 
-CELL = 1.0  # m: a neighbourhood is 3 x 3 x 3 of these, so twice the largest target
-LINK = 0.15  # m: bright points in voxels of this edge that touch belong together
-STEPS = 2  # levels in an octave of intensity
-LEVELS = 17 * STEPS  # 16 bits
-SURFACE = 9  # of the 27 cells are occupied where a road or wall passes through
-BACKGROUND = 0.5  # of a neighbourhood's points are darker than what is bright there
-FEWEST_POINTS = 20  # as on a target near a control point
-LARGEST = 2.1  # m: the diagonal of a plate of 1.5 m
-LEAST_SPREAD = 0.03  # m, standard deviation across: a strip of 0.1 m has it
-LARGEST_DEPTH = 0.04  # m, standard deviation across the plane, with a frame or an edge behind
-LONGEST = 3.5  # times the width: a disc seen by half, not a road marking
-MOST_POINTS = 20_000  # about a component, in the test of its shape
-RIM = 1.15, 1.6  # times a target's half diagonal: it ends within, and is looked at so far
-LEAST_LIKENESS = 0.75  # of the shape's points and the bright ones: a ring has a dark quarter
-BRIGHTER = 2 * STEPS  # levels, a disc than its board: paints differ by ten times
+OCTAVE = 2  # levels of intensity
+LEVELS = 17 * OCTAVE  # of 16 bits
 
 
 @dataclass(frozen=True)
-class Blobs:
-    """Centre (n, 3) and half extent (n,) in m, number of points (n,), likeness (n,), the share
-    in which bright points and the best shape agree, and the intensity (n,) of what is bright.
+class BrightRegion:
+    """A bright region of a cloud.
+
+    Parameters
+    ----------
+    centre : (3,) array
+        Units: m.
+    radius : float
+        Half its extent. Units: m.
+    threshold : float
+        The least intensity of its points.
+    likeness : float
+        Jaccard index of its points and those of the shape that is most like it.
     """
 
     centre: np.ndarray
-    reach: np.ndarray
-    points: np.ndarray
-    likeness: np.ndarray
-    threshold: np.ndarray
-
-    def __len__(self):
-        return len(self.points)
+    radius: float
+    threshold: float
+    likeness: float = 1.0
 
 
-def bright_blobs(xyz, intensity):
-    """Flat blobs of 0.1 to 1.5 m, brighter than their neighbourhood and of a target's shape.
+def bright_regions(xyz: np.ndarray, intensity: np.ndarray) -> list[BrightRegion]:
+    """Flat regions of 0.1 to 1.5 m, brighter than their neighbourhood and of a target's shape.
 
     Parameters
     ----------
@@ -56,27 +50,31 @@ def bright_blobs(xyz, intensity):
     intensity : (n,) array
         Of any positive scale; whatever range does to it, it does to the neighbourhood too.
 
-    Returns Blobs, the best first, of those at one place only the best.
+    Returns
+    -------
+    list of BrightRegion
+        The best first, of those at one place only the best.
     """
     low = np.array([column.min() for column in xyz.T])  # faster than along the short axis
     level = _levels(intensity)
-    cell, keys_of, keys, number = number_voxels(xyz, low, CELL)
+    edge = 2 * SETTINGS.largest_size / 3  # of a third of a neighbourhood
+    cell, keys_of, keys, number = number_voxels(xyz, low, edge)
     dark = _background(cell, keys_of, keys, number, level)
     bright = _bright_rows(cell, level, dark)
-    table = _component_tree(xyz[bright] - low, level[bright], LINK)
+    thick, long = SETTINGS.thickness, 1 / SETTINGS.smallest_width
+    limits = SETTINGS.smallest_count, np.sqrt(2) * SETTINGS.largest_size, thick, long
+    table = _component_tree(xyz[bright] - low, level[bright], SETTINGS.largest_size / 10, limits)
     order, starts = sort_by_voxel(cell, len(keys_of))
-    likeness = _likeness(table, xyz, low, level, order, starts, keys, number)
-    return _as_blobs(table, *likeness.T, low)
+    shape = thick, *SETTINGS.rim, SETTINGS.largest_ratio, SETTINGS.rim_places // 4
+    grid = order, starts, keys, number, edge
+    likeness = _likeness(table, xyz, low, level, grid, shape, SETTINGS.piece_points)
+    return _as_regions(table, *likeness.T, low)
 
 
 def _levels(intensity):
     """Intensity (n,) in half octaves: (n,) small integers, all at least 0."""
-    return _table()[np.asarray(intensity).astype(np.uint16)]
-
-
-def _table():
-    steps = np.log2(np.maximum(np.arange(1 << 16), 1)) * STEPS
-    return np.floor(steps).astype(np.int8)
+    steps = np.log2(np.maximum(np.arange(1 << 16), 1)) * OCTAVE
+    return np.floor(steps).astype(np.int8)[np.asarray(intensity).astype(np.uint16)]
 
 
 @njit(cache=True)
@@ -93,11 +91,12 @@ def _background(cell, keys_of, keys, number, level):
         for near in neighbours(keys_of[c], keys, number):
             around += histogram[near]
             occupied += 1
-        wanted, below, step = BACKGROUND * around.sum(), 0, 0
-        while below + around[step] < wanted:
+        half, below, step = around.sum() / 2, 0, 0
+        while below + around[step] < half:
             below += around[step]
             step += 1
-        dark[c] = step if occupied >= SURFACE else -1  # a plate in the air is all there is
+        # a road or wall passes through 9 of the 27 cells; a plate in the air is all there is
+        dark[c] = step if occupied >= 9 else -1
     return dark
 
 
@@ -121,7 +120,7 @@ def _root(parent, i):
 
 
 @njit(cache=True)
-def _component_tree(local, level, edge):
+def _component_tree(local, level, edge, limits):
     """Components (k, 17) of bright points (n, 3) at each level, those that may be a target.
 
     Columns: level, points, low (3), high (3), sum (3), sum of products (xx, yy, zz, xy, xz, yz).
@@ -159,7 +158,7 @@ def _component_tree(local, level, edge):
             end += 1
         for k in range(first, end):
             root = _root(parent, order[k])
-            if touched[root] != now and count < len(result) and _may_be_target(table[root]):
+            if touched[root] != now and count < len(result) and _may_be_target(table[root], limits):
                 result[count] = table[root]
                 result[count, 0] = now
                 count += 1
@@ -169,9 +168,9 @@ def _component_tree(local, level, edge):
 
 
 @njit(cache=True)
-def _join(parent, table, one, other):
-    """Make the components of two voxels one."""
-    a, b = _root(parent, one), _root(parent, other)
+def _join(parent, table, voxel, beside):
+    """Join the components of two voxels."""
+    a, b = _root(parent, voxel), _root(parent, beside)
     if a == b:
         return
     parent[b] = a
@@ -198,67 +197,70 @@ def _moments(row):
 
 
 @njit(cache=True)
-def _may_be_target(row):
+def _may_be_target(row, limits):
     """Whether a component is compact, flat, and not a strip."""
-    if row[1] < FEWEST_POINTS:
+    count, extent, thick, ratio = limits
+    if row[1] < count:
         return False
-    if max(row[5] - row[2], row[6] - row[3], row[7] - row[4]) > LARGEST:
+    if max(row[5] - row[2], row[6] - row[3], row[7] - row[4]) > extent:
         return False
     _, sigma, _ = _moments(row)
-    return sigma[0] < LARGEST_DEPTH and sigma[1] > LEAST_SPREAD and sigma[2] < LONGEST * sigma[1]
+    return sigma[0] < thick and sigma[1] > thick and sigma[2] < ratio * sigma[1]
 
 
 @njit(cache=True)
-def _likeness(table, xyz, low, level, order, starts, keys, number):
+def _likeness(table, xyz, low, level, grid, shape, largest):
     """How far each component agrees with a disc, a square or a checkerboard, and the level from
     which it does best: (k, 2).
 
-    order holds the rows of the points (n, 3) sorted by cells, which start at starts.
+    grid holds the rows of the points (n, 3) sorted by cells, and the cells' hash table.
     """
+    order, starts, keys, number, edge = grid
+    thick, end, border, ratio, directions = shape
     result = np.zeros((len(table), 2))
-    uv, level_of = np.empty((MOST_POINTS, 2)), np.empty(MOST_POINTS, np.int8)
+    uv, level_of = np.empty((largest, 2)), np.empty(largest, np.int8)
     for k in range(len(table)):
         row = table[k]
         mean, sigma, axes = _moments(row)
         corner = np.sqrt(6.0) * sigma[2]  # of a square, if this is one
-        reach, n = RIM[1] * corner, 0
-        middle = key_of(mean[0], mean[1], mean[2], CELL)
+        around, n = border * corner, 0
+        middle = key_of(mean[0], mean[1], mean[2], edge)
         for near in neighbours(middle, keys, number):
             for i in order[starts[near] : starts[near + 1]]:
                 x = xyz[i, 0] - low[0] - mean[0]
                 y = xyz[i, 1] - low[1] - mean[1]
                 z = xyz[i, 2] - low[2] - mean[2]
-                if abs(x) > reach or abs(y) > reach or abs(z) > reach or n == MOST_POINTS:
+                if abs(x) > around or abs(y) > around or abs(z) > around or n == largest:
                     continue
-                if abs(x * axes[0, 0] + y * axes[1, 0] + z * axes[2, 0]) < 2.0 * LARGEST_DEPTH:
+                if abs(x * axes[0, 0] + y * axes[1, 0] + z * axes[2, 0]) < 2.0 * thick:
                     uv[n, 0] = x * axes[0, 2] + y * axes[1, 2] + z * axes[2, 2]
                     uv[n, 1] = x * axes[0, 1] + y * axes[1, 1] + z * axes[2, 1]
                     level_of[n] = level[i]
                     n += 1
         for step in range(2):  # a voxel takes the level of its brightest point, others are below
-            share = agreement(uv[:n], level_of[:n] >= row[0] - step, RIM[0] * corner)
+            bright = level_of[:n] >= row[0] - step
+            share = jaccard_index(uv[:n], bright, end * corner, ratio, directions)
             if share > result[k, 0]:
                 result[k, 0], result[k, 1] = share, row[0] - step
     return result
 
 
-def _as_blobs(table, likeness, level, low):
-    """Blobs of components that are like a target, the best of each place.
+def _as_regions(table, likeness, level, low):
+    """Regions of components that are like a target, the best of each place.
 
     Of a disc on a board in the air, both are; it is the disc that was surveyed, so that what is
-    much brighter within another takes its place.
+    four times as bright within another takes its place.
     """
-    reach = np.linalg.norm(table[:, 5:8] - table[:, 2:5], axis=1) / 2
+    radius = np.linalg.norm(table[:, 5:8] - table[:, 2:5], axis=1) / 2
     middle = (table[:, 5:8] + table[:, 2:5]) / 2
-    worth = likeness * np.sqrt(table[:, 1])
-    kept = []
-    for i in np.argsort(-worth, kind="stable"):
-        if likeness[i] < LEAST_LIKENESS:
+    kept: list[int] = []
+    for i in np.argsort(-likeness * np.sqrt(table[:, 1]), kind="stable"):
+        if likeness[i] < SETTINGS.smallest_likeness:
             continue
         apart = np.linalg.norm(middle[kept] - middle[i], axis=1)
-        beside = apart > np.maximum(reach[kept], reach[i]) / 2
-        around = (level[kept] <= level[i] - BRIGHTER) & (reach[kept] > reach[i])
+        beside = apart > np.maximum(radius[kept], radius[i]) / 2
+        around = (level[kept] <= level[i] - 2 * OCTAVE) & (radius[kept] > radius[i])
         if (beside | around).all():
             kept = [k for k, free in zip(kept, beside, strict=True) if free] + [i]
-    points, threshold = table[kept, 1].astype(int), 2.0 ** (level[kept] / STEPS)
-    return Blobs(low + middle[kept], reach[kept], points, likeness[kept], threshold)
+    threshold = 2.0 ** (level / OCTAVE)
+    return [BrightRegion(low + middle[k], radius[k], threshold[k], likeness[k]) for k in kept]

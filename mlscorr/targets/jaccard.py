@@ -3,27 +3,45 @@
 import numpy as np
 from numba import njit
 
-DIRECTIONS = 12  # in which a component is measured
-LARGEST_RATIO = 1.6  # of length and width, where part is hidden
-
 
 @njit(cache=True)
-def agreement(uv, bright, longest):
+def jaccard_index(
+    uv: np.ndarray, bright: np.ndarray, longest: float, largest_ratio: float, directions: int
+) -> float:
     """Largest share of common points of the bright ones and those in a shape that spans them.
 
-    The shape spans those that are no farther (m) from the middle than the longest.
+    Parameters
+    ----------
+    uv : (n, 2) array
+        Places in a plane. Units: m.
+    bright : (n,) bool array
+    longest : float
+        The shape spans those that are no farther from the middle. Units: m.
+    largest_ratio : float
+        Of its length and width.
+    directions : int
+        In which it is measured.
     """
     spanned = bright & (uv[:, 0] ** 2 + uv[:, 1] ** 2 <= longest**2)
     best_area, turn, diameter = np.inf, 0.0, 0.0
-    for step in range(DIRECTIONS):
-        angle = np.pi / 2 * step / DIRECTIONS
+    for step in range(directions):
+        angle = np.pi / 2 * step / directions
         low_x, high_x, low_y, high_y = _extent(uv, spanned, angle)
-        diameter += (high_x - low_x + high_y - low_y) / (2 * DIRECTIONS)
+        diameter += (high_x - low_x + high_y - low_y) / (2 * directions)
         if (high_x - low_x) * (high_y - low_y) < best_area:
             best_area, turn = (high_x - low_x) * (high_y - low_y), angle
     low_x, high_x, low_y, high_y = _extent(uv, spanned, turn)
     width, height = high_x - low_x, high_y - low_y
-    if not 0.0 < max(width, height) <= LARGEST_RATIO * min(width, height):
+    first = 0
+    if max(width, height) > largest_ratio * min(width, height):
+        # the white quadrants of a checkerboard fill the rectangle along their diagonal, which is
+        # as small as their own; what fills a rectangle needs twice of it when turned by 45 deg
+        turn, first = turn + np.pi / 4, 2
+        low_x, high_x, low_y, high_y = _extent(uv, spanned, turn)
+        width, height = high_x - low_x, high_y - low_y
+        if not width * height < np.sqrt(2.0) * best_area:
+            return 0.0
+    if not 0.0 < max(width, height) <= largest_ratio * min(width, height):
         return 0.0
     both, either = np.zeros(4), np.zeros(4)
     inside = np.zeros(4, np.bool_)
@@ -34,7 +52,7 @@ def agreement(uv, bright, longest):
         inside[1] = abs(x) <= width / 2 and abs(y) <= height / 2
         inside[2] = inside[1] and x * y > 0
         inside[3] = inside[1] and x * y <= 0
-        for shape in range(4):
+        for shape in range(first, 4):
             both[shape] += inside[shape] and bright[i]
             either[shape] += inside[shape] or bright[i]
     return (both / np.maximum(either, 1.0)).max()

@@ -1,0 +1,73 @@
+"""Numbers that the extraction of targets rests on."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Limits, resolutions and sigmas; sizes are a target's diameter or edge.
+
+    Where no source is named, ``benchmarks/ablation.py targets`` shows what each does to recall,
+    centre errors and false targets.
+    """
+
+    # Candidates and visits
+    near_radius: float = 2.0  # m; looked at first: what is bright farther off can't hide a target
+    held_points: int = 1_000_000  # points; bounds memory, before those that were passed are fitted
+    piece_points: int = 20_000  # points; bounds the time for one piece
+    turn_step: float = 0.5  # m; a vehicle that moved less may stand and shake, not turn back
+
+    # Clusters and seeds
+    smallest_count: int = 20  # points; on fewer, plane and outline can't both be held
+    smallest_levels: int = 4  # intensities; fewer are a flag or a class, not an intensity
+    intensity_steps: int = 16  # steps; equal ratios between the darkest and the brightest point
+    link_shares: tuple[float, float] = (0.2, 0.4)  # size; beside a bright post, and wide scan lines
+    cheap_count: int = 1500  # points; looked at though they are most of a piece: a plate alone
+    thickness: float = 0.03  # m; off a plane: less than a post's or a frame's depth
+    plane_trials: int = 100  # triples; find a plane of a third of the points with 0.98
+    size_guesses: tuple[float, float, float] = (0.2, 0.4, 0.8)  # m; half to twice of each
+    smallest_length: float = 0.7  # size; along what is visible of a target
+    smallest_width: float = 0.33  # size; across it: a target may be hidden by a post
+    bloom: float = 1.35  # size; of a disc that saturates the receiver
+    patches: int = 10  # patches; road, walls, and then plates; and gaps in a patch
+    grazing: float = 0.1  # sine; of a beam to a plane that it can be said to cross
+
+    # Outlines
+    trials: int = 600  # outlines; in each round, half of them in a rough fit
+    rough_rounds: int = 5  # rounds; tell if there is an outline; the exact one needs five times
+    smallest_share: float = 0.1  # trials; effective share, below which the likelihood is flattened
+    proposal_width: float = 1.35  # sigma; of the posterior: the next trials
+    hidden_share: float = 0.45  # size; from the seed to the centre: half of it may be hidden
+    first_blur: float = 8.0  # size over blur; wide at first, so that no outline is lost
+    rough_blur: float = 0.025  # size; of a rough fit
+    wrong_side: float = 0.01  # beams; on the wrong side whatever their distance (mixed returns)
+    divergence: float = 0.35e-3  # rad; four sigmas of a beam's width (RIEGL VQ-250 data sheet)
+    rounding: float = 0.0003  # m; one sigma of a coordinate at the usual LAS scale of 1 mm
+    speckle: float = 0.2  # intensity; relative spread where it is unknown
+    same_surface: float = 0.7  # dark over bright; from which on they may be one
+    outside_middle: float = 0.65  # diameter; off a seed's middle, itself off by a seventh of it
+    contradiction: float = 0.05  # beams; share of those that met nothing, well inside the outline
+    core: float = 0.2  # size; about the centre: in the dark disc of a ring of at least 0.4
+
+    # Assessment
+    smallest_overlap: float = 0.8  # Jaccard index; of outline and beams
+    close_overlap: float = 0.93  # Jaccard index; where one settles the place, or hides a part
+    smallest_support: float = 0.35  # outline; with beams on both sides: half may be hidden
+    hole_support: float = 0.75  # outline; of a hole: other gaps are open or have corners
+    largest_sigma: float = 0.08  # size; beyond it the outline holds the centre in one direction
+    good_support: float = 0.6  # outline; from which on a target is beyond doubt
+    good_contrast: float = 0.3  # bright to dark; difference over sum, beyond doubt
+    bush: float = 0.8  # tolerance; sigma about the plane: as thick as a bush
+    rim_places: int = 48  # places; along an outline
+    rough_play: float = 0.1  # overlap or size; by which a rough fit may miss the limits
+
+    # Search without control
+    largest_size: float = 1.5  # m; nobody carries a larger target
+    largest_carry: float = 0.25  # chunk; points that are looked at again with the next
+    largest_fits: int = 150  # regions; bounds time and memory of a chunk when all glitters
+    rim: tuple[float, float] = (1.15, 1.6)  # half diagonal; where it ends, and is looked at
+    smallest_likeness: float = 0.75  # Jaccard index; a ring has a dark quarter
+    largest_ratio: float = 1.6  # width; length of a target of which a part is hidden
+
+
+SETTINGS = Settings()
