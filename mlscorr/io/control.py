@@ -1,80 +1,83 @@
 """Surveyed targets from control.csv."""
 
-import csv
 import warnings
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.tables import ENCODING, find_columns, nearest, not_text, read_header
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.tables import find_columns, read_header, read_rows
+from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
 from mlscorr.survey import KINDS, ControlPoints
 
 POSITION = ("easting", "northing", "height")
 COLUMNS = ("name", *POSITION, "sigma_horizontal", "sigma_vertical", "kind", "size", "role")
 NORMAL = ("normal_e", "normal_n", "normal_h")
 ROLES = ("control", "check")
-LARGEST_TARGET = 10.0  # m, the size beyond which it was certainly given in mm
-SMALLEST_TARGET = 0.02  # m: the scanners' beams are as wide
-USUAL = 0.05, 1.5  # m, of targets
-LARGEST_COORDINATE = 1e8  # m, twice the Earth's girth and more; map zones prefixed to E fit in
-COARSE_SIGMA = 0.5  # m, beyond which a surveyed point corrects nothing
 
 
-def read_control(path):
-    """Control points and check points of a file: two ControlPoints, either of which may be empty.
+def read_control(path: str | Path) -> tuple[ControlPoints, ControlPoints]:
+    """Control points and check points of a file, either of which may be empty.
 
-    Raises ValueError for missing columns, names that are missing or doubled, cells that are no
-    numbers, an unknown kind or role, and sizes and sigmas that can't be metres.
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    control, check : ControlPoints
+
+    Raises
+    ------
+    ValueError
+        For missing columns, names that are missing or doubled, cells that are no numbers, an
+        unknown kind or role, and sizes and sigmas that can't be metres.
+
+    Warns
+    -----
+    UserWarning
+        Of a sigma with which a point hardly counts.
     """
-    path = Path(path)
-    header, skip = read_header(path)
+    header, lines = read_header(path)
     columns = find_columns(path, header, COLUMNS, (NORMAL,))
-    try:
-        rows = _rows(path, skip, header, columns)
-    except UnicodeDecodeError:
-        raise ValueError(not_text(path)) from None
+    rows = [
+        {name: _value(line, name, cells[i]) for name, i in columns.items()}
+        for line, cells in read_rows(path, lines, columns.values(), len(header), exact=True)
+    ]
     if not rows:
         raise ValueError(f"{path} has a header but no points.")
     doubled = [name for name, count in Counter(row["name"] for row in rows).items() if count > 1]
     if doubled:
         raise ValueError(
-            f"{path} names {', '.join(doubled)} more than once; every control or check point "
-            "needs a name of its own."
+            f"{path} names {shown(', '.join(doubled))} more than once; every control or check "
+            "point needs a name of its own."
         )
     for row in rows:
         _check(path, row)
-    return tuple(_points([row for row in rows if row["role"] == role]) for role in ROLES)
+    control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
+    warn_of_cut(path)
+    return control, check
 
 
-def holds_points(path):
-    """Whether a file holds more than a header; an empty one stands for no control at all."""
+def holds_points(path: str | Path) -> bool:
+    """Whether a file holds more than a header; an empty one stands for no control at all.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    bool
+    """
     with Path(path).open(encoding=ENCODING, errors="replace") as file:
         lines = (line for line in file if line.strip(" \t\r\n,;"))
         return sum(1 for _ in zip(lines, range(2), strict=False)) > 1
 
 
-def _rows(path, skip, header, columns):
-    """Rows of the file as dicts: text, and numbers for the columns that hold numbers."""
-    rows = []
-    with path.open(encoding=ENCODING, newline="") as file:
-        for _ in range(skip):
-            next(file)
-        reader = csv.reader(file, skipinitialspace=True)
-        for cells in reader:
-            if not any(cell.strip() for cell in cells):
-                continue
-            line = f"Line {skip + reader.line_num} of {path}"
-            if len(cells) != len(header):
-                raise ValueError(
-                    f"{line} has {len(cells)} columns where the header has {len(header)}: "
-                    "the file may have been cut off, or a comma may be missing."
-                )
-            rows.append({name: _value(line, name, cells[i].strip()) for name, i in columns.items()})
-    return rows
-
-
 def _value(line, name, cell):
+    """Value of a cell: text, or the number of a column that holds numbers."""
     if name in ("kind", "role"):
         return cell.casefold()
     if name == "name":
@@ -86,37 +89,37 @@ def _value(line, name, cell):
     try:
         number = float(cell)
     except ValueError:
-        raise ValueError(f"{line} has the {name} '{cell}', which is not a number.") from None
+        raise ValueError(f"{line} has the {name} '{shown(cell)}', which is not a number.") from None
     if not np.isfinite(number) and name not in NORMAL:
-        raise ValueError(f"{line} has the {name} '{cell}', which is not a finite number.")
+        raise ValueError(f"{line} has the {name} '{shown(cell)}', which is not a finite number.")
     return number
 
 
 def _check(path, row):
-    """Refuse one row whose values can't be meant."""
-    who = f"{row['name']} of {path}"
+    """Refuse a row whose values can't be meant."""
+    who, (smallest, largest) = f"{shown(row['name'])} of {path}", SETTINGS.target_size
     for key, known in (("kind", KINDS), ("role", ROLES)):
         if row[key] not in known:
             raise ValueError(
-                f"{who} has the unknown {key} '{row[key]}'; known are "
+                f"{who} has the unknown {key} '{shown(row[key])}'; known are "
                 f"{', '.join(known[:-1])} and {known[-1]}. "
                 f"Is {nearest(row[key], known)} meant?"
             )
-    if not SMALLEST_TARGET <= row["size"] <= LARGEST_TARGET:
+    if not smallest <= row["size"] <= largest:
         raise ValueError(
-            f"{who} has the size {row['size']:g} m, outside [{SMALLEST_TARGET:g}, "
-            f"{LARGEST_TARGET:g}] m: {_likely_unit(row['size'])}"
+            f"{who} has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
+            f"{_likely_unit(row['size'])}"
         )
     for key in POSITION:
-        if abs(row[key]) > LARGEST_COORDINATE:
+        if abs(row[key]) > SETTINGS.largest_coordinate:
             raise ValueError(
-                f"{who} has the {key} {row[key]:g} m, beyond {LARGEST_COORDINATE:g} m: no map "
-                "reaches that far (millimetres?)."
+                f"{who} has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
+                "no map reaches that far (millimetres?)."
             )
     for key in ("sigma_horizontal", "sigma_vertical"):
         if row[key] <= 0:
             raise ValueError(f"{who} has the {key} {row[key]:g} m; it must be greater than zero.")
-        if row[key] > COARSE_SIGMA:
+        if row[key] > SETTINGS.coarse_sigma:
             warnings.warn(
                 f"{who} has the {key} {row[key]:g} m and will hardly count (millimetres?).",
                 stacklevel=3,
@@ -132,14 +135,17 @@ def _likely_unit(size):
     """What may be meant by a size that can't be metres."""
     if size <= 0:
         return "a diameter or edge is positive."
-    for unit, factor in (("centimetres", 0.01), ("millimetres", 0.001)):
-        if USUAL[0] <= factor * size <= USUAL[1]:
-            return f"{unit}? Then give {factor * size:g}."
+    smallest, largest = SETTINGS.target_size
+    sizes = {"centimetres": size / 100, "millimetres": size / 1000}
+    usual = np.sqrt(smallest * largest)
+    unit = min(sizes, key=lambda unit: abs(np.log(sizes[unit] / usual)))
+    if smallest <= sizes[unit] <= largest:
+        return f"{unit}? Then give {sizes[unit]:g}."
     return "sizes are in metres; is the decimal point misplaced, or another unit meant?"
 
 
 def _points(rows):
-    """ControlPoints of rows; none of them gives an empty one."""
+    """ControlPoints of rows; no row gives an empty one."""
 
     def numbers(*names):
         table = [[row.get(name, np.nan) for name in names] for row in rows]

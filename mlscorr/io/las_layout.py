@@ -1,30 +1,57 @@
-"""What a LAS or LAZ file says of itself, checked against its bytes before its points are read.
+"""What a LAS or LAZ file says of itself, kept as the bytes that it is.
 
-Header and VLRs are kept as bytes, not parsed and written anew: so all that nobody changes comes
-out as it went in, also LAS 1.0 (which laspy cannot write), unknown VLRs and reserved fields.
-Byte positions are those of the ASPRS LAS 1.4 R15 specification; lazrs decodes the points.
+laspy says what point formats and extra bytes are made of, lazrs decodes the points. Header and
+VLRs are kept as bytes, not read and written anew by laspy, which cannot leave alone what nobody
+changes: it refuses LAS 1.0, decodes every VLR that it knows (one bad one would stop the file) and
+writes reserved fields, bytes behind the end of a text and the signature of a VLR its own way; and
+it believes counts before they are checked (2^31-1 VLRs keep it busy for good).
+Byte positions are those of the ASPRS LAS 1.4 R15 specification.
 """
 
+from __future__ import annotations
+
 import struct
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import lazrs
 import numpy as np
+from laspy import PointFormat
 
-HEADER_SIZES = (227, 227, 227, 235, 375)  # of LAS 1.0 to 1.4
-RECORD_LENGTHS = {0: 20, 1: 28, 2: 26, 3: 34, 4: 57, 5: 63, 6: 30, 7: 36, 8: 38, 9: 59, 10: 67}
-WITHOUT_TIME = (0, 2)
-COMPRESSED = 0x80  # bit of the point format
-WAVEFORMS_INSIDE = 0x02  # bit of the global encoding
-VLR_HEADER, EVLR_HEADER = 54, 60
+VLR_HEADER = struct.Struct("<2x16sHH32s")  # owner, record, length of data, description
 LASZIP = b"laszip encoded"
-LARGEST_CHUNK = 10_000_000  # points; lazrs allocates whole LAZ chunks and aborts if it cannot
+
+
+@contextmanager
+def decoding(message: str) -> Iterator[None]:
+    """Where lazrs works: its errors, and what it aborts with, become a sentence.
+
+    Parameters
+    ----------
+    message : str
+        What can't be read. It ends where lazrs' own words follow in brackets.
+
+    Raises
+    ------
+    ValueError
+    """
+    try:
+        yield
+    except BaseException as error:
+        # a Rust panic derives from BaseException, and has no name that could be imported
+        if not isinstance(error, lazrs.LazrsError) and type(error).__name__ != "PanicException":
+            raise
+        raise ValueError(
+            f"{message} ({error}). The file is cut off or damaged; copy it anew."
+        ) from error
 
 
 @dataclass(frozen=True)
-class Layout:
+class LasLayout:
     """Where the parts of a LAS file lie: head (header and VLRs), points, tail (EVLRs, waveforms).
 
     Parameters
@@ -40,68 +67,86 @@ class Layout:
     head: bytes
     size: int
 
-    def field(self, form, start):
-        """Values of the header at a byte position, in struct's notation."""
+    def field(self, form: str, start: int) -> tuple[Any, ...]:
+        """Values of the header.
+
+        Parameters
+        ----------
+        form : str
+            In struct's notation.
+        start : int
+            Position in bytes.
+
+        Returns
+        -------
+        tuple
+        """
         return struct.unpack_from("<" + form, self.head, start)
 
     @property
-    def version(self):
+    def version(self) -> tuple[int, int]:
         """1.0 to 1.4, as (major, minor)."""
-        return self.field("BB", 24)
+        major, minor = self.field("BB", 24)
+        return major, minor
 
     @property
-    def is_standard(self):
+    def is_standard(self) -> bool:
         """Whether gps_time is adjusted standard GPS time, not seconds of week."""
         return bool(self.head[6] & 1)
 
     @property
-    def point_format(self):
+    def point_format(self) -> int:
+        """Number of the point format."""
         return self.head[104] & 0x3F
 
     @property
-    def is_compressed(self):
-        return bool(self.head[104] & COMPRESSED)
+    def is_compressed(self) -> bool:
+        """Whether the points are LAZ."""
+        return bool(self.head[104] & 0x80)
 
     @property
-    def record_length(self):
+    def record_length(self) -> int:
         """Of a point with its extra bytes. Units: bytes."""
         return self.field("H", 105)[0]
 
     @property
-    def points(self):
+    def extra_bytes(self) -> int:
+        """Of a point, behind what its format has. Units: bytes."""
+        return self.record_length - PointFormat(self.point_format).size
+
+    @property
+    def points(self) -> int:
+        """Number of points."""
         return self.field(*(("Q", 247) if self.version >= (1, 4) else ("I", 107)))[0]
 
     @property
-    def scale(self):
+    def scale(self) -> np.ndarray:
         """Of X, Y, Z: (3,). Units: m."""
         return np.array(self.field("3d", 131))
 
     @property
-    def offset(self):
+    def offset(self) -> np.ndarray:
         """Of X, Y, Z: (3,). Units: m."""
         return np.array(self.field("3d", 155))
 
     @property
-    def record(self):
+    def record(self) -> np.dtype:
         """Type of a point record: the fields that are used here by name, the others by length."""
-        return np.dtype(
-            {
-                "names": ["X", "Y", "Z", "intensity", "gps_time"],
-                "formats": ["<i4", "<i4", "<i4", "<u2", "<f8"],
-                "offsets": [0, 4, 8, 12, 20 if self.point_format < 6 else 22],
-                "itemsize": self.record_length,
-            }
-        )
+        fields = PointFormat(self.point_format).dtype().fields
+        names = ["X", "Y", "Z", "intensity", "gps_time"]
+        kinds, starts = zip(*(fields[name][:2] for name in names), strict=True)
+        form: Any = {"names": names, "formats": kinds, "offsets": starts}
+        return np.dtype(form | {"itemsize": self.record_length})
 
     @cached_property
-    def vlrs(self):
+    def vlrs(self) -> list[tuple[int, int]]:
         """Start and end in head of each VLR. Raises ValueError when they don't fit."""
         count, bounds = self.field("I", 100)[0], []
         position = self.field("H", 94)[0]
         for _ in range(count):
-            end = position + VLR_HEADER
+            end = position + VLR_HEADER.size
             if end <= len(self.head):
-                end += self.field("H", position + 20)[0]
+                end += VLR_HEADER.unpack_from(self.head, position)[2]
             if end > len(self.head):
                 raise ValueError(
                     f"{self.path} is damaged: it announces {count} VLRs in its header, but only "
@@ -111,32 +156,112 @@ class Layout:
             position = end
         return bounds
 
-    def user_id(self, start):
-        """Who defined the VLR that starts at a byte of head."""
-        return self.head[start + 2 : start + 18].split(b"\0")[0]
+    def owner(self, start: int) -> tuple[bytes, int]:
+        """User and record of the VLR that starts at a byte of head.
+
+        Parameters
+        ----------
+        start : int
+
+        Returns
+        -------
+        user : bytes
+        record : int
+        """
+        user, record, *_ = VLR_HEADER.unpack_from(self.head, start)
+        return user.split(b"\0")[0], record
+
+    def vlr_data(self, user: bytes, record: int) -> Iterator[bytes]:
+        """Data of the VLRs of a user and a record.
+
+        Parameters
+        ----------
+        user : bytes
+        record : int
+
+        Yields
+        ------
+        bytes
+        """
+        for start, end in self.vlrs:
+            if self.owner(start) == (user, record):
+                yield self.head[start + VLR_HEADER.size : end]
+
+    def head_with(
+        self, user: bytes, record: int, data: bytes | None, description: bytes = b""
+    ) -> bytes:
+        """Header and VLRs with the VLRs of a user and a record replaced by one, or by none.
+
+        Parameters
+        ----------
+        user : bytes
+        record : int
+        data : bytes, optional
+        description : bytes
+
+        Returns
+        -------
+        bytes
+        """
+        header_size = self.field("H", 94)[0]
+        kept = [self.head[a:b] for a, b in self.vlrs if self.owner(a) != (user, record)]
+        if data is not None:
+            kept.append(VLR_HEADER.pack(user, record, len(data), description) + data)
+        between = self.head[self.vlrs[-1][1] if self.vlrs else header_size :]
+        head = bytearray(self.head[:header_size] + b"".join(kept) + between)
+        struct.pack_into("<II", head, 96, len(head), len(kept))
+        return bytes(head)
+
+    def with_record_length(self, length: int) -> LasLayout:
+        """The LasLayout with longer point records.
+
+        Parameters
+        ----------
+        length : int
+            Units: bytes.
+
+        Returns
+        -------
+        LasLayout
+        """
+        head = bytearray(self.head)
+        struct.pack_into("<H", head, 105, length)
+        return replace(self, head=bytes(head))
 
     @cached_property
-    def laszip(self):
+    def laszip(self) -> bytes:
         """Data of the LASzip VLR, which says how the points are compressed."""
-        found = [self.head[a + VLR_HEADER : b] for a, b in self.vlrs if self.user_id(a) == LASZIP]
-        if not found:
-            raise ValueError(f"{self.path} is damaged: compressed, but without a LASzip VLR.")
-        return found[0]
+        starts = [(a + VLR_HEADER.size, b) for a, b in self.vlrs if self.owner(a)[0] == LASZIP]
+        if not starts:
+            raise ValueError(
+                f"{self.path} is damaged: its points are compressed, and no LASzip VLR says how. "
+                "Copy the file anew."
+            )
+        return self.head[slice(*starts[0])]
 
     @property
-    def tail(self):
+    def tail(self) -> int:
         """Byte where EVLRs or waveforms start behind the points; the size where none are."""
         starts = [self.size]
-        if self.version >= (1, 3) and self.head[6] & WAVEFORMS_INSIDE:
+        if self.version >= (1, 3) and self.head[6] & 2:  # waveforms inside
             starts += self.field("Q", 227)
         if self.version >= (1, 4) and self.field("I", 243)[0]:
             starts += self.field("Q", 235)
         return min(starts)
 
-    def decoder(self, file, threads=True):
-        """What reads the points of the open file: seek(point) and decompress_many(buffer).
+    def decoder(self, file: BinaryIO, threads: bool = True) -> Any:
+        """What reads the points of a file: seek(point) and decompress_many(buffer).
 
-        Without threads seeking is cheap, and only gps_time is sure to be decoded.
+        Parameters
+        ----------
+        file : binary file
+            Open for reading.
+        threads : bool
+            Without them seeking is cheap, and only gps_time is sure to be decoded.
+
+        Returns
+        -------
+        lazrs decompressor, or what has its methods
         """
         file.seek(len(self.head))
         if not self.is_compressed:
@@ -159,138 +284,3 @@ class _PlainPoints:
     def decompress_many(self, buffer):
         if self.file.readinto(buffer) != len(buffer):
             raise lazrs.LazrsError("the file ends")
-
-
-def read_layout(path):
-    """Layout of a LAS 1.0-1.4 or LAZ file with gps_time, checked.
-
-    Raises ValueError when the file is missing, is none of these, has no points or no gps_time,
-    or holds less than its header says. Nothing is allocated by a number that was not checked.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise ValueError(f"There is no file {path}. Check cloud.files in survey.toml.")
-    size = path.stat().st_size
-    with open(path, "rb") as file:
-        head = file.read(HEADER_SIZES[0])
-        if head[:4] != b"LASF" or len(head) < HEADER_SIZES[0]:
-            raise ValueError(
-                f"{path} is not a LAS or LAZ file: of its {size} bytes the first are "
-                f"{head[:4]!r}, not b'LASF' and a header of at least {HEADER_SIZES[0]} bytes."
-            )
-        start = struct.unpack_from("<I", head, 96)[0]
-        if start > size:
-            raise ValueError(_cut_off(path, f"its points start at byte {start} of {size}"))
-        layout = Layout(path, head + file.read(max(0, start - len(head))), size)
-        _check_header(layout)
-        points_end = _check_chunks(layout, file) if layout.is_compressed else _check_size(layout)
-        _check_tail(layout, file, points_end)
-    return layout
-
-
-def _cut_off(path, evidence):
-    return f"{path} is cut off: {evidence}. Its writing or copying was interrupted; copy it anew."
-
-
-def _check_header(layout):
-    path, (major, minor) = layout.path, layout.version
-    if major != 1 or minor >= len(HEADER_SIZES):
-        raise ValueError(f"{path} is LAS {major}.{minor}; LAS 1.0 to 1.4 can be read.")
-    if not HEADER_SIZES[minor] <= layout.field("H", 94)[0] <= len(layout.head):
-        raise ValueError(
-            f"{path} is damaged: its header has {layout.field('H', 94)[0]} bytes and its points "
-            f"start at byte {len(layout.head)}; LAS 1.{minor} needs {HEADER_SIZES[minor]}."
-        )
-    number, length = layout.point_format, layout.record_length
-    if number in WITHOUT_TIME:
-        raise ValueError(
-            f"{path} has point format {number}, which holds no gps_time, so its points cannot be "
-            "placed on the trajectory. Export it in format 1, 3 or 6 to 10."
-        )
-    if number not in RECORD_LENGTHS or length < RECORD_LENGTHS[number]:
-        raise ValueError(
-            f"{path} is damaged: point format {number} with records of {length} bytes does not "
-            "exist."
-        )
-    if not (np.isfinite([layout.scale, layout.offset]).all() and (layout.scale > 0).all()):
-        raise ValueError(
-            f"{path} is damaged: scale {layout.scale} m and offset {layout.offset} m of its "
-            "coordinates must be numbers, the scale above zero."
-        )
-    if layout.points == 0:
-        raise ValueError(f"{path} holds 0 points; perhaps its writing was interrupted.")
-    if layout.vlrs and layout.user_id(layout.vlrs[0][0]) == b"copc":
-        raise ValueError(
-            f"{path} is a COPC file, whose index would be wrong once points have moved. Use the "
-            "original file, or convert it: pdal translate IN.copc.laz OUT.laz."
-        )
-
-
-def _check_size(layout):
-    """Byte where uncompressed points end."""
-    end = len(layout.head) + layout.points * layout.record_length
-    if end > layout.size:
-        whole = (layout.size - len(layout.head)) // layout.record_length
-        evidence = f"{whole} of the {layout.points} points that its header announces fit into"
-        raise ValueError(_cut_off(layout.path, f"{evidence} its {layout.size} bytes"))
-    return end
-
-
-def _check_chunks(layout, file):
-    """Byte where compressed points end and the chunk table starts."""
-    path, start = layout.path, len(layout.head)
-    file.seek(start)
-    table = int.from_bytes(file.read(8), "little", signed=True)
-    if not start + 8 <= table <= layout.size - 8:
-        raise ValueError(
-            _cut_off(path, f"its LAZ chunk table should be at byte {table} of {layout.size}")
-        )
-    file.seek(table + 4)
-    count = int.from_bytes(file.read(4), "little")
-    if count * layout.record_length > table - start:  # a chunk starts with a plain point
-        raise ValueError(f"{path} is damaged: {count} LAZ chunks cannot fit into {table} bytes.")
-    try:
-        vlr = lazrs.LazVlr(layout.laszip)
-        file.seek(start)
-        chunks = lazrs.read_chunk_table(file, vlr)
-        points, used = (sum(column) for column in zip(*chunks, strict=True))
-        largest = max(chunk[0] for chunk in chunks)
-        length = vlr.item_size()
-    except (lazrs.LazrsError, ValueError, TypeError) as error:
-        raise ValueError(f"{path} is damaged: its LAZ chunks cannot be read ({error}).") from error
-    if length != layout.record_length or used > table - start:
-        raise ValueError(
-            f"{path} is damaged: LAZ chunks of {used} bytes with {length} bytes a point are not "
-            f"what lies in {table - start} bytes with {layout.record_length} bytes a point."
-        )
-    if points < layout.points:
-        evidence = f"its LAZ chunks hold at most {points} of the {layout.points} points"
-        raise ValueError(_cut_off(path, f"{evidence} that its header announces"))
-    if largest > LARGEST_CHUNK:
-        raise ValueError(
-            f"{path} is compressed in chunks of {largest} points (limit {LARGEST_CHUNK}), which "
-            "do not fit into memory. Compress it anew: pdal translate IN.laz OUT.laz."
-        )
-    return table
-
-
-def _check_tail(layout, file, points_end):
-    """That EVLRs and waveforms lie between the points and the end of the file."""
-    path, size = layout.path, layout.size
-    if not points_end <= layout.tail <= size:
-        raise ValueError(
-            _cut_off(path, f"data behind the points should be at byte {layout.tail} of {size}")
-        )
-    if layout.version < (1, 4):
-        return
-    position, count = layout.field("QI", 235)
-    for number in range(count):
-        header = b""
-        if position + EVLR_HEADER <= size:
-            file.seek(position)
-            header = file.read(EVLR_HEADER)
-        position += EVLR_HEADER + int.from_bytes(header[20:28], "little")
-        if position > size:
-            raise ValueError(
-                _cut_off(path, f"{number} of its {count} EVLRs fit into its {size} bytes")
-            )

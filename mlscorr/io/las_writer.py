@@ -1,19 +1,35 @@
 """Writing points as LAS or LAZ 1.4, format 6, with GPS week seconds, block by block."""
 
+from __future__ import annotations
+
 import os
+from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import date
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import lazrs
 import numpy as np
 
+from mlscorr.io.output import output_file
+from mlscorr.survey import PointCloud
+
+if TYPE_CHECKING:
+    import laspy
+
 SCAN_ANGLE_UNIT = 0.006  # deg, LAS 1.4 specification, formats 6 to 10
-INTEGER_LIMIT = 2**31 - 1
+INTEGER_LIMIT = np.iinfo(np.int32).max  # of coordinates
 
 
 @contextmanager
-def cloud_writer(path, corner, crs=None, scale=0.001, created=None):
+def cloud_writer(
+    path: str | Path,
+    corner: np.ndarray,
+    crs: str | None = None,
+    scale: float = 0.001,
+    created: date | None = None,
+) -> Iterator[CloudWriter]:
     """A CloudWriter for one new LAS or LAZ file, which appears whole or not at all.
 
     Parameters
@@ -28,16 +44,24 @@ def cloud_writer(path, corner, crs=None, scale=0.001, created=None):
     created : date, optional
         Date in the header, today if not given.
 
-    Raises ValueError when no points were written, and OSError when the disk refuses.
+    Yields
+    ------
+    CloudWriter
+
+    Raises
+    ------
+    ValueError
+        When no points were written.
+    OSError
+        When the disk refuses.
     """
     import laspy
 
     path = Path(path)
     header = _header(corner, crs, scale, created)
     compress = path.suffix.lower() == ".laz"
-    part = path.with_name(path.name + ".part")
     try:
-        with open(part, "wb") as stream:
+        with output_file(path) as part, open(part, "wb") as stream:
             with laspy.open(
                 stream, mode="w", header=header, do_compress=compress, closefd=False
             ) as las:
@@ -47,16 +71,19 @@ def cloud_writer(path, corner, crs=None, scale=0.001, created=None):
                     raise ValueError(f"{path.name} would hold no points.")
             stream.flush()
             os.fsync(stream.fileno())
-        os.replace(part, path)
     except lazrs.LazrsError as error:
         raise OSError(f"{path} can't be written: {error}") from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 class CloudWriter:
     """Appends points to an open file; ``points`` counts them.
 
+    Parameters
+    ----------
+    las : laspy.LasWriter
+
+    Examples
+    --------
     >>> import tempfile, numpy as np
     >>> from mlscorr.survey import PointCloud
     >>> xyz = np.array([[532_000.0, 3_374_000.0, 42.0]])
@@ -65,11 +92,17 @@ class CloudWriter:
     ...     writer.write(cloud)
     """
 
-    def __init__(self, las):
+    def __init__(self, las: laspy.LasWriter) -> None:
         self._las = las
         self.points = 0
 
-    def write(self, cloud, scan_angle=None, return_number=1, number_of_returns=1):
+    def write(
+        self,
+        cloud: PointCloud,
+        scan_angle: np.ndarray | None = None,
+        return_number: np.ndarray | int = 1,
+        number_of_returns: np.ndarray | int = 1,
+    ) -> None:
         """Append a PointCloud.
 
         Parameters
@@ -80,7 +113,10 @@ class CloudWriter:
             From -180 to 180. Units: deg.
         return_number, number_of_returns : (n,) int array
 
-        Raises ValueError where a coordinate is not a number or does not fit the scale.
+        Raises
+        ------
+        ValueError
+            Where a coordinate is not a number or does not fit the scale.
         """
         import laspy
 

@@ -1,79 +1,98 @@
 """Writing .npz files whose arrays are longer than memory, block by block."""
 
 import zipfile
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-BLOCK = 1 << 20  # bytes
+from mlscorr.io.output import output_file
+from mlscorr.io.settings import SETTINGS
 
 
-@contextmanager
-def npz_writer(path):
-    """An NpzWriter for one new file, as np.savez writes it, which appears whole or not at all.
+class NpzWriter:
+    """Collects named arrays for one new file, as np.savez writes it: whole and growing ones.
 
-    A zip takes one array after the other, so those that grow lie in files of their own until the
-    end, which need as much space again. Raises OSError when the disk refuses.
+    The file appears at the end of a ``with`` block, whole or not at all. A zip takes one array
+    after the other, so those that grow lie in files of their own until the end, which need as
+    much space again.
 
+    Parameters
+    ----------
+    path : path
+
+    Raises
+    ------
+    OSError
+        When the disk refuses.
+
+    Examples
+    --------
     >>> import tempfile
     >>> path = tempfile.mkdtemp() + "/truth.npz"
-    >>> with npz_writer(path) as writer:
+    >>> with NpzWriter(path) as writer:
     ...     for start in (0, 3):
     ...         writer.append("number", np.arange(start, start + 3))
     ...     writer.put("unit", np.array("m"))
     >>> {name: array.tolist() for name, array in np.load(path).items()}
     {'number': [0, 1, 2, 3, 4, 5], 'unit': 'm'}
     """
-    path = Path(path)
-    part = path.with_name(path.name + ".part")
-    writer = NpzWriter(path)
-    try:
-        yield writer
-        writer._close()
-        with zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as archive:
-            writer._assemble(archive)
-        part.replace(path)
-    finally:
-        writer._close()
-        for spool in writer._growing.values():
-            spool.path.unlink(missing_ok=True)
-        part.unlink(missing_ok=True)
 
-
-class NpzWriter:
-    """Collects named arrays: whole ones, and growing ones of any length.
-
-    ``growing`` is the size of the latter so far, in bytes; ``watch(size)`` is called with the bytes
-    of them just copied, when all is put together at the end.
-    """
-
-    def __init__(self, path):
-        self._path = path
-        self._whole = {}
-        self._growing = {}
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
+        self._whole: dict[str, np.ndarray] = {}
+        self._growing: dict[str, _Spool] = {}
         self._files = ExitStack()
-        self.watch = lambda size: None
+        self.watch: Callable[[int], object] = lambda _: None  # bytes of growing arrays just copied
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        try:
+            self._files.close()
+            if kind is None:
+                with (
+                    output_file(self._path) as part,
+                    zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as archive,
+                ):
+                    self._assemble(archive)
+        finally:
+            for spool in self._growing.values():
+                spool.path.unlink(missing_ok=True)
 
     @property
-    def growing(self):
+    def growing(self) -> int:
+        """Size of the growing arrays so far. Units: bytes."""
         return sum(spool.size for spool in self._growing.values())
 
-    def put(self, name, array):
-        """A whole array."""
+    def put(self, name: str, array: ArrayLike) -> None:
+        """Take a whole array."""
         self._whole[name] = np.asanyarray(array)
 
-    def append(self, name, rows):
-        """More rows of a growing array; all of one type and one shape but for their number."""
+    def append(self, name: str, rows: ArrayLike) -> None:
+        """Take more rows of a growing array.
+
+        Parameters
+        ----------
+        name : str
+        rows : (n, ...) array
+            All of one type and one shape but for their number.
+
+        Raises
+        ------
+        ValueError
+            When they don't fit those before them.
+        """
         rows = np.ascontiguousarray(rows)
         if name not in self._growing:
             path = self._path.with_name(f"{self._path.name}.{name}.part")
             file = self._files.enter_context(path.open("wb"))
             self._growing[name] = _Spool(path, file, rows)
         self._growing[name].append(rows)
-
-    def _close(self):
-        self._files.close()
 
     def _assemble(self, archive):
         for name, spool in self._growing.items():
@@ -86,7 +105,7 @@ class NpzWriter:
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_2_0(member, header)
                 with open(spool.path, "rb") as rows:
-                    while block := rows.read(BLOCK):
+                    while block := rows.read(SETTINGS.copied_bytes):
                         member.write(block)
                         self.watch(len(block))
             spool.path.unlink()

@@ -1,24 +1,49 @@
 """Results: a folder that appears whole or not at all, and JSON documents."""
 
-import csv
+import errno
+import fcntl
+import glob
 import json
 import math
 import os
 import shutil
 import tempfile
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-PART = ".part"  # ends the name of a folder that isn't whole yet
+from mlscorr.io.folders import exchange, move_into, remove, take_along
+from mlscorr.io.inputs import check_unchanged
+from mlscorr.survey import InputFile
+
+PART = ".part"  # ends the name of what isn't whole yet
 
 
-def check_output(out, inputs, overwrite=False):
-    """Refuse an output folder that holds an input, holds anything without overwrite, or that
-    can't be written.
+def check_output(out: str | Path, inputs: Iterable[str | Path], overwrite: bool = False) -> None:
+    """Refuse an output folder that holds an input, or anything that may not be replaced.
 
-    Raises ValueError; OSError when it can't be written.
+    Parameters
+    ----------
+    out : path
+    inputs : iterable of path
+        Files that must stay as they are.
+    overwrite : bool
+        Whether files of the same name may be replaced.
+
+    Raises
+    ------
+    ValueError
+        For a folder that can't be meant.
+    OSError
+        When it can't be written.
     """
     out = Path(out)
+    for path in (out, *out.parents):
+        if path.is_symlink() and not path.exists():
+            raise ValueError(
+                f"{path} is a link to {os.readlink(path)}, which does not exist. Make that folder, "
+                "or choose another name."
+            )
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out} is a file; the results need a folder. Choose another name.")
     for path in map(Path, inputs):
@@ -28,82 +53,169 @@ def check_output(out, inputs, overwrite=False):
                 f"The output folder {out} holds the input {path.name}, which must stay as it is. "
                 "Choose another folder."
             )
-    if out.is_dir() and not overwrite and (present := sorted(p.name for p in out.iterdir())):
+    if not overwrite and (present := _entries(out)):
         raise ValueError(
             f"The output folder {out} holds {len(present)} entries already (first: {present[0]}). "
             "Choose another folder, or allow with --overwrite that files of the same name are "
             "replaced."
         )
-    _check_writable(out)
+    _place(out)
 
 
-def _check_writable(out):
-    """Make a folder where out will stand, and remove it: what can't be written is told early."""
-    out = out.absolute()
-    place = next(path for path in out.parents if path.exists())
+def _entries(out):
+    """Names in a folder, but those of results that aren't whole yet."""
+    names = sorted(path.name for path in out.iterdir()) if out.is_dir() else []
+    return [n for n in names if not (n.startswith(_prefix(out)) and n.endswith(PART))]
+
+
+def _prefix(out):
+    return f".{out.resolve().name}."
+
+
+def _place(out):
+    """The folder for what isn't whole yet: beside out, or inside where that is another disk.
+
+    A folder is made there, moved into out if there is one, and removed: what can't be written is
+    told early.
+    """
+    above = next(path for path in out.resolve().absolute().parents if path.exists())
     try:
-        Path(tempfile.mkdtemp(suffix=PART, dir=place)).rmdir()
+        probe = Path(tempfile.mkdtemp(prefix=_prefix(out), suffix=PART, dir=above))
     except OSError as error:
+        if out.is_dir() and os.access(out, os.W_OK):
+            return out.resolve()
         raise OSError(
-            f"the output folder {out} can't be made, as {place} takes no folder "
+            f"the output folder {out} can't be made, as {above} takes no folder "
             f"({error.strerror}). Choose another place."
         ) from None
+    try:
+        if out.is_dir():
+            probe = probe.rename(out.resolve() / probe.name)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        return out.resolve()
+    finally:
+        probe.rmdir()
+    return out.resolve().parent
 
 
 @contextmanager
-def output_folder(out):
-    """A folder to write into, which takes the name out only when all went well.
+def output_file(path: str | Path) -> Iterator[Path]:
+    """A file to write into, which takes its name only when all went well.
 
-    It stands beside out until then. Files of the same name in out are replaced, others stay.
+    It stands beside the path until then. A file there is replaced.
+
+    Parameters
+    ----------
+    path : path
+
+    Yields
+    ------
+    Path
+        The file to write into.
     """
-    out = Path(out).absolute()
+    path = Path(path)
+    part = path.with_name(path.name + PART)
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+@contextmanager
+def output_folder(
+    out: str | Path, inputs: Sequence[InputFile] = (), overwrite: bool = False
+) -> Iterator[Path]:
+    """A folder to write into, which takes its name only when all went well.
+
+    It stands beside its place until then, locked by this process. What processes left there that
+    were killed is removed.
+
+    Parameters
+    ----------
+    out : path
+    inputs : sequence of InputFile
+        Files that must stay as they are, and be what they were when they were read.
+    overwrite : bool
+        Whether files of the same name are replaced; others stay.
+
+    Yields
+    ------
+    Path
+        The folder to write into.
+
+    Raises
+    ------
+    ValueError
+        As check_output.
+    OSError
+        When an input has changed, another run has written into the folder, or the disk refuses.
+    """
+    check_output(out, [file.path for file in inputs], overwrite)
+    check_unchanged(inputs)
+    out = Path(out).resolve()
     out.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=PART, dir=out.parent))
+    place = _place(out)
+    _remove_abandoned(out, place)
+    part, lock = _locked_folder(out, place)
     try:
         part.chmod(0o777 & ~_umask())
         yield part
-        if out.exists():
-            _move_into(out, part)
-        else:
-            os.replace(part, out)
+        check_unchanged(inputs)
+        _finish(part, out, overwrite)
     finally:
-        _remove(part)
+        os.close(lock)
+        remove(part)
 
 
-def _move_into(out, part):
-    """Move the files of part into out; what they replace is put back when one can't be moved."""
-    files = [path.relative_to(part) for path in sorted(part.rglob("*")) if path.is_file()]
-    replaced, made = Path(tempfile.mkdtemp(dir=part)), []
+def _locked_folder(out, place):
+    """A new folder, and what holds its lock, which ends with the process."""
+    while True:
+        part = Path(tempfile.mkdtemp(prefix=_prefix(out), suffix=PART, dir=place))
+        lock = os.open(part, os.O_RDONLY)
+        with suppress(OSError):  # a disk that knows no locks
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        if part.exists():  # else another run took it for an abandoned one
+            return part, lock
+        os.close(lock)
+
+
+def _remove_abandoned(out, place):
+    """Remove what runs into the same folder left that were killed: nobody holds its lock."""
+    for part in place.glob(f"{glob.escape(_prefix(out))}*{PART}"):
+        with suppress(OSError):
+            lock = os.open(part, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                remove(part)
+            finally:
+                os.close(lock)
+
+
+def _finish(part, out, overwrite):
+    """Give the folder its name, all at once where out is on the disk of its parent."""
+    is_inside = part.parent == out
     try:
-        for file in files:
-            if not (out / file).parent.exists():
-                (out / file).parent.mkdir()
-                made.append(file.parent)
-            if (out / file).is_dir():
-                raise IsADirectoryError(f"{out / file} is a folder, where a file belongs.")
-            if (out / file).exists():
-                (replaced / file).parent.mkdir(exist_ok=True)
-                os.replace(out / file, replaced / file)
-            os.replace(part / file, out / file)
-    except BaseException:
-        for file in files:
-            if not (part / file).exists():
-                (out / file).unlink(missing_ok=True)
-            if (replaced / file).exists():
-                os.replace(replaced / file, out / file)
-        for folder in made:
-            (out / folder).rmdir()
-        raise
-
-
-def _remove(folder):
-    """Remove a folder, also when an impatient user interrupts once more."""
-    while folder.exists():
-        try:
-            shutil.rmtree(folder, ignore_errors=True)
+        if not is_inside:
+            if out.is_dir():
+                shutil.copymode(out, part)
+            os.rename(part, out)  # new or empty
             return
-        except KeyboardInterrupt:
-            continue
+    except OSError as error:
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            raise
+    if not overwrite and (present := _entries(out)):
+        raise FileExistsError(
+            f"another run wrote {len(present)} entries into {out} meanwhile (first: {present[0]}). "
+            "They were left as they are, and nothing of this run was kept. Choose another folder."
+        )
+    if is_inside:
+        move_into(out, part)
+    else:
+        take_along(out, part)
+        exchange(out, part)
 
 
 def _umask():
@@ -112,8 +224,19 @@ def _umask():
     return mask
 
 
-def document(name, content):
-    """A JSON document with its schema first; values that are not finite become None."""
+def document(name: str, content: dict) -> dict:
+    """A JSON document with its schema first; values that are not finite become None.
+
+    Parameters
+    ----------
+    name : str
+        Of the schema.
+    content : dict
+
+    Returns
+    -------
+    dict
+    """
     return {"schema": f"mlscorr.{name}/1", **_finite(content)}
 
 
@@ -127,44 +250,14 @@ def _finite(value):
     return value
 
 
-def write_json(path, content):
-    """Write a document as JSON."""
+def write_json(path: str | Path, content: dict) -> None:
+    """Write a document as JSON.
+
+    Parameters
+    ----------
+    path : path
+    content : dict
+        Without numbers that are not finite.
+    """
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
     Path(path).write_text(text + "\n", encoding="utf-8")
-
-
-def write_targets_csv(path, targets):
-    """Write the targets of report.json as a table; misclosures are surveyed - observed, in m."""
-    vectors = ("surveyed", "observed", "sigma", "before", "after")
-    single = ("name", "pass", "gps_time", "role")
-    axes = ("easting", "northing", "height")
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        names = [f"{vector}_{axis}" for vector in vectors for axis in axes]
-        writer.writerow([*single, *names, "used", "reason"])
-        for row in targets:
-            numbers = [
-                "" if value is None else f"{value:.4f}"
-                for vector in vectors
-                for value in (row[vector] or (None,) * 3)
-            ]
-            time = "" if row["gps_time"] is None else f"{row['gps_time']:.6f}"
-            first = [row["name"], row["pass"] or "", time, row["role"]]
-            writer.writerow([*first, *numbers, str(row["used"]).lower(), row["reason"] or ""])
-
-
-def write_extracted_csv(path, targets):
-    """Write the targets of targets.json as a table; sigmas are those of each axis, in m."""
-    axes = ("easting", "northing", "height")
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        names = [*axes, *(f"sigma_{axis}" for axis in axes), "normal_e", "normal_n", "normal_h"]
-        first = ("name", "pass", "gps_time", "kind", "size", "size_sigma")
-        writer.writerow([*first, *names, "points", "score", "matched", "reason"])
-        for row in targets:
-            sigma = [math.sqrt(row["covariance"][axis][axis]) for axis in range(3)]
-            numbers = [f"{value:.4f}" for value in (*row["observed"], *sigma, *row["normal"])]
-            sizes = [f"{row[key]:.4f}" for key in ("size", "size_sigma")]
-            head = [row["name"] or "", row["pass"], f"{row['gps_time']:.6f}", row["kind"], *sizes]
-            last = [row["points"], f"{row['score']:.3f}", str(row["matched"]).lower()]
-            writer.writerow([*head, *numbers, *last, row["reason"] or ""])

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-COLUMNS = 10  # time; N, E, D error; N, E, D velocity error; roll, pitch, yaw error
+from mlscorr.io.tables import check_finite, check_increasing
+
+COLUMNS = ("time", "N", "E", "D", "velocity N", "velocity E", "velocity D", "roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
@@ -27,32 +29,34 @@ class PosErrorSeries:
     attitude: np.ndarray
 
 
-def read_pos_error_series(path):
-    """PosErrorSeries of an .err file: time (s), N, E, D (m), velocities, roll, pitch, yaw (deg).
+def read_pos_error_series(path: str | Path) -> PosErrorSeries:
+    """Errors of an .err file: time (s), N, E, D (m), three velocities, roll, pitch, yaw (deg).
 
-    Raises ValueError for a file that is not such a table of numbers, or whose times don't
-    increase.
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    PosErrorSeries
+
+    Raises
+    ------
+    ValueError
+        For a file that is not such a table of numbers, or whose times don't increase.
     """
-    path = Path(path)
     try:
         table = np.loadtxt(path, ndmin=2, comments="#")
     except (ValueError, UnicodeDecodeError) as error:
         raise ValueError(f"{path} is not a table of numbers: {error}.") from None
-    if len(table) < 2 or table.shape[1] != COLUMNS:
+    if len(table) < 2 or table.shape[1] != len(COLUMNS):
         raise ValueError(
             f"{path} has {len(table)} rows of {table.shape[-1]} columns; at least 2 rows of "
-            f"{COLUMNS} are expected: time, N, E, D, three velocities, roll, pitch, yaw."
+            f"{len(COLUMNS)} are expected: {', '.join(COLUMNS)}."
         )
-    bad = ~np.isfinite(table).all(axis=1)
-    if bad.any():
-        raise ValueError(
-            f"{bad.sum()} of {len(table)} rows of {path} hold values that are not numbers "
-            f"(first: row {np.argmax(bad) + 1})."
-        )
+    check_finite(path, table, "row")
     gps_time, north, east, down = table[:, :4].T
-    if (np.diff(gps_time) <= 0).any():
-        row = int(np.argmax(np.diff(gps_time) <= 0)) + 2
-        raise ValueError(f"The times of {path} don't increase (first in row {row}).")
+    check_increasing(path, gps_time, "row")
     return PosErrorSeries(
-        gps_time, np.column_stack([east, north, -down]), np.radians(table[:, 7:10])
+        gps_time, np.column_stack([east, north, -down]), np.radians(table[:, -3:])
     )

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.sbet import SBET_FIELDS
-from mlscorr.io.tables import ENCODING, read_header
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.tables import ENCODING, check_finite, check_increasing, read_header, read_numbers
 from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
 
-MICROSECONDS = 1e13  # a time beyond this counts microseconds: seconds would be 300 000 years
 POS_COLUMNS = ("time", "latitude", "longitude", "height")  # then sigmas, of a .pos
 LAYOUTS = (  # time, east, north, up of CSV files with an attitude of unknown convention
     ("gpstime", "easting", "northing", "altitude"),  # pyboreas
@@ -26,84 +26,92 @@ LAYOUTS = (  # time, east, north, up of CSV files with an attitude of unknown co
 
 @dataclass(frozen=True)
 class Poses:
-    """Positions over time, with attitudes R_P^G where the file has them in a known convention.
+    """Positions over time, with attitudes where the file has them in a known convention.
 
-    gps_time (n,) in s, position (n, 3) easting, northing, height in m, attitude Rotation or None.
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    position : (n, 3) array
+        Easting, northing, height. Units: m.
+    attitude : Rotation, optional
+        R_P^G.
     """
 
     gps_time: np.ndarray
     position: np.ndarray
     attitude: Rotation | None = None
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.gps_time)
 
 
-def read_poses(path):
+def read_poses(path: str | Path) -> Poses:
     """Poses of a trajectory CSV, an SBET, a GNSS .pos, or a CSV of pyboreas or NovAtel.
 
-    Geographic files are brought into the UTM zone of their own first position. Raises ValueError
-    for an unknown layout, times that don't increase, or values that are not numbers.
+    Geographic files are brought into the UTM zone of their own first position.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Poses
+
+    Raises
+    ------
+    ValueError
+        For an unknown layout, times that don't increase, or values that are not numbers.
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix in SBET_SUFFIXES:
-        return _with_attitude(read_trajectory(path, _sbet_zone(path)))
     if suffix == ".pos":
-        return _checked(path, *_read_pos(path))
-    if suffix != ".csv":
+        return _checked(path, _read_pos(path))
+    if suffix == ".csv":
+        header, lines = read_header(path)
+        for layout in LAYOUTS:
+            if set(layout) <= set(header):
+                columns = [header.index(name) for name in layout]
+                seconds = {columns[0]: _seconds}
+                return _checked(path, read_numbers(path, lines, columns, len(header), seconds))
+    elif suffix not in SBET_SUFFIXES:
         raise ValueError(
             f"{path} has the unknown suffix '{path.suffix}'; a path is .csv, .pos or SBET "
             f"({', '.join(SBET_SUFFIXES)})."
         )
-    header, skip = read_header(path)
-    for layout in LAYOUTS:
-        if set(layout) <= set(header):
-            return _checked(path, *_read_layout(path, skip, [header.index(n) for n in layout]))
-    return _with_attitude(read_trajectory(path))
-
-
-def _with_attitude(trajectory):
+    zone = _sbet_zone(path) if suffix in SBET_SUFFIXES else None
+    trajectory = read_trajectory(path, zone)
     return Poses(trajectory.gps_time, trajectory.position, trajectory.attitude)
 
 
-def _checked(path, gps_time, position):
-    """Poses without attitude, in increasing time."""
-    table = np.column_stack([gps_time, position])
-    bad = ~np.isfinite(table).all(axis=1)
-    if bad.any() or len(table) < 2:
-        raise ValueError(
-            f"{path} has {len(table)} epochs, of which {bad.sum()} hold values that are not "
-            "numbers; a path needs at least 2 epochs and numbers only."
-        )
-    if (np.diff(gps_time) <= 0).any():
-        first = int(np.argmax(np.diff(gps_time) <= 0))
-        raise ValueError(
-            f"The times of {path} must increase: {(np.diff(gps_time) <= 0).sum()} epochs do not "
-            f"come after the one before (first: epoch {first + 2})."
-        )
-    return Poses(gps_time, position)
+def _checked(path, table):
+    """Poses of a table (n, 4) of times and positions, without attitude."""
+    check_finite(path, table, "epoch")
+    if len(table) < 2:
+        raise ValueError(f"{path} has {len(table)} epochs; a path needs at least 2 epochs.")
+    check_increasing(path, table[:, 0], "epoch")
+    return Poses(table[:, 0], table[:, 1:])
 
 
 def _read_pos(path):
-    """Times and positions of rows `time latitude longitude height ...`, degrees and m."""
+    """Times and map positions (n, 4) of rows `time latitude longitude height ...`, deg and m."""
     try:
         table = np.loadtxt(path, usecols=range(4), ndmin=2, encoding=ENCODING, comments=("%", "#"))
+        if not len(table) or np.abs(table[:, 1]).max() > 90 or np.abs(table[:, 2]).max() > 360:
+            raise ValueError(
+                "its second and third columns are no latitude and longitude in degrees."
+            )
     except ValueError as error:
         raise ValueError(
             f"{path} is not a table of {', '.join(POS_COLUMNS)} (s, deg, deg, m): {error}"
         ) from None
-    if not len(table) or np.abs(table[:, 1]).max() > 90 or np.abs(table[:, 2]).max() > 360:
-        raise ValueError(
-            f"{path} is not a table of {', '.join(POS_COLUMNS)} (s, deg, deg, m): its second and "
-            "third columns are no latitude and longitude in degrees."
-        )
     from pyproj import Transformer
 
     zone = _utm_zone(*table[0, 1:3])
     to_map = Transformer.from_crs("EPSG:4326", zone, always_xy=True)
-    easting, northing = to_map.transform(table[:, 2], table[:, 1])
-    return table[:, 0], np.column_stack([easting, northing, table[:, 3]])
+    table[:, 1], table[:, 2] = to_map.transform(table[:, 2], table[:, 1])
+    return table
 
 
 def _sbet_zone(path):
@@ -124,26 +132,6 @@ def _utm_zone(latitude, longitude):
     return f"EPSG:{(32600 if latitude >= 0 else 32700) + zone}"
 
 
-def _read_layout(path, skip, columns):
-    """Times (s) and positions of a CSV whose columns have been found."""
-    times, rows = [], []
-    with path.open(encoding=ENCODING) as file:
-        for number, line in enumerate(file, start=1):
-            cells = line.strip().split(",")
-            if number <= skip or cells == [""]:
-                continue
-            try:
-                times.append(_seconds(cells[columns[0]]))
-                rows.append([float(cells[column]) for column in columns[1:]])
-            except (ValueError, IndexError):
-                raise ValueError(
-                    f"Line {number} of {path} is no row of time, east, north and up: "
-                    f"'{line.strip()[:60]}'."
-                ) from None
-    times = np.array(times)
-    return times, np.array(rows).reshape(-1, 3)
-
-
 def _seconds(cell):
     """Time (s) of a cell in seconds, in microseconds, or as year-month-day-h-m-s-ms.
 
@@ -155,4 +143,4 @@ def _seconds(cell):
         elapsed = datetime.strptime(day, "%Y-%m-%d-%H-%M-%S") - datetime(1970, 1, 1)
         return elapsed.total_seconds() + float(milliseconds) / 1e3
     time = float(cell)
-    return time / 1e6 if time > MICROSECONDS else time
+    return time / 1e6 if time > SETTINGS.microseconds else time

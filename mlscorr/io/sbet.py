@@ -15,12 +15,22 @@ over trial headings is least 0.13 deg (sigma 0.22 deg) from the heading read her
 wander angle the heading is 1.02 deg off (4 sigma), without the convergence 1.24 deg (6 sigma).
 """
 
+from __future__ import annotations
+
+import warnings
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mlscorr.survey import Trajectory, attitude_from_angles
+from mlscorr.frames import attitude_from_angles
+from mlscorr.io.tables import check_finite
+from mlscorr.io.time_systems import WEEK
+from mlscorr.survey import Trajectory
+
+if TYPE_CHECKING:
+    from pyproj import CRS
 
 SBET_FIELDS = (
     "gps_time",
@@ -36,7 +46,6 @@ SMRMSG_FIELDS = (
     *("velocity_north", "velocity_east", "velocity_down"),  # m/s; not used
     *("roll", "pitch", "heading"),  # arc-minutes, one sigma
 )
-ARC_MINUTE = np.radians(1 / 60)  # rad
 LIMITS = {  # the largest magnitude that a value in radians can have
     "latitude": np.pi / 2,
     "longitude": 2 * np.pi,
@@ -47,7 +56,7 @@ LIMITS = {  # the largest magnitude that a value in radians can have
 }
 
 
-def read_sbet(path, crs, accuracy=None):
+def read_sbet(path: str | Path, crs: str | None, accuracy: str | Path | None = None) -> Trajectory:
     """Trajectory in a projected CRS from an SBET file.
 
     Positions are projected from the CRS's own geodetic datum. The ellipsoidal height is kept,
@@ -61,8 +70,15 @@ def read_sbet(path, crs, accuracy=None):
     accuracy : path, optional
         The smrmsg file; its 1 Hz sigmas are interpolated.
 
-    Raises ValueError for a missing or unsuitable CRS, a file that is not a whole number of
-    records, values that are no radians, or a geoid grid that is not installed.
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    ValueError
+        For a missing or unsuitable CRS, a file that is not a whole number of records, values that
+        are no radians, or a geoid grid that is not installed.
     """
     if crs is None:
         raise ValueError(
@@ -84,10 +100,22 @@ def read_sbet(path, crs, accuracy=None):
         raise ValueError(f"{path}: {error}") from None
 
 
-def check_crs(crs):
-    """The pyproj CRS that is meant, projected, in metres and with axes east and north.
+def check_crs(crs: str) -> CRS:
+    """The CRS that is meant, projected, in metres and with axes east and north.
 
-    Raises ValueError for anything else.
+    Parameters
+    ----------
+    crs : str
+        Anything pyproj understands.
+
+    Returns
+    -------
+    pyproj.CRS
+
+    Raises
+    ------
+    ValueError
+        For anything else.
     """
     crs = _parse_crs(crs)
     axes = crs.axis_info
@@ -108,13 +136,54 @@ def check_crs(crs):
     return crs
 
 
-def describe_projection(crs):
-    """Sentences on what a geographic trajectory's way into a CRS assumes."""
-    crs = check_crs(crs)
-    vertical = crs.sub_crs_list[1].name if crs.is_compound else None
+def check_area(crs: CRS, trajectory: Trajectory) -> None:
+    """Warn where a trajectory lies outside the area that a CRS was made for.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS
+    trajectory : Trajectory
+
+    Warns
+    -----
+    UserWarning
+    """
+    from pyproj import Transformer
+
+    to_degrees = Transformer.from_crs(crs.to_2d(), crs.geodetic_crs.to_2d(), always_xy=True)
+    east, north = np.median(trajectory.position[:, :2], axis=0)
+    longitude, latitude = to_degrees.transform(east, north)
+    area, margin = crs.area_of_use, 1.0  # deg, by which zones are used beyond their edges
+    if area is None or (
+        area.west - margin <= longitude <= area.east + margin
+        and area.south - margin <= latitude <= area.north + margin
+    ):
+        return
+    warnings.warn(
+        f"The trajectory (E {east:.0f}, N {north:.0f} m) lies at longitude {longitude:.2f}, "
+        f"latitude {latitude:.2f} deg by {_short(crs)} ({crs.name}), which was made for "
+        f"{area.west:g} to {area.east:g} and {area.south:g} to {area.north:g} deg: crs in "
+        "survey.toml may be of another zone, or easting and northing exchanged.",
+        stacklevel=3,
+    )
+
+
+def describe_projection(crs: str) -> tuple[str, str, str]:
+    """Sentences on what a geographic trajectory's way into a CRS assumes.
+
+    Parameters
+    ----------
+    crs : str
+
+    Returns
+    -------
+    tuple of str
+    """
+    projected: Any = check_crs(crs)
+    vertical = projected.sub_crs_list[1].name if projected.is_compound else None
     return (
-        f"The trajectory's latitude and longitude are taken as {crs.geodetic_crs.name}, the datum "
-        f"of {crs.name}; nothing in an SBET says otherwise.",
+        f"The trajectory's latitude and longitude are taken as {projected.geodetic_crs.name}, "
+        f"the datum of {projected.name}; nothing in an SBET says otherwise.",
         f"The trajectory's ellipsoidal heights were transformed to {vertical}."
         if vertical
         else "The trajectory's ellipsoidal heights were kept.",
@@ -183,12 +252,7 @@ def _read_records(path, fields, what):
             f"records of {width} bytes: it was cut off, or it is not {what}."
         )
     table = np.fromfile(path, dtype="<f8").reshape(-1, len(fields))
-    bad = ~np.isfinite(table).all(axis=1)
-    if bad.any():
-        raise ValueError(
-            f"{bad.sum()} of {len(table)} {what} records of {path} hold values that are not "
-            f"numbers (first: record {np.argmax(bad) + 1})."
-        )
+    check_finite(path, table, f"{what} record")
     return dict(zip(fields, table.T.astype(float), strict=True))
 
 
@@ -204,6 +268,16 @@ def _check_radians(path, record):
             )
 
 
+def _cause(accuracy, gps_time):
+    """Why an accuracy file may have other times than its trajectory."""
+    apart = float(np.mean(gps_time[[0, -1]]) - np.mean(accuracy[[0, -1]]))
+    if weeks := round(apart / WEEK):
+        return f"they are {weeks:+d} weeks apart, so one of the two has the wrong GPS week"
+    if 10 <= abs(apart) <= 40:
+        return f"they are {apart:+.1f} s apart, so one may be in UTC, which leap seconds set apart"
+    return "it belongs to another one"
+
+
 def _read_smrmsg(path, gps_time):
     """Sigmas (n, 3) of E, N, H (m) and roll, pitch, heading (rad) at the trajectory's times."""
     record = _read_records(path, SMRMSG_FIELDS, "smrmsg")
@@ -214,11 +288,11 @@ def _read_smrmsg(path, gps_time):
     if times[0] - gps_time[0] > 2 * step or gps_time[-1] - times[-1] > 2 * step:
         raise ValueError(
             f"the accuracy file {path} covers [{times[0]:.1f}, {times[-1]:.1f}] s, not the "
-            f"trajectory's [{gps_time[0]:.1f}, {gps_time[-1]:.1f}] s: it belongs to another one."
+            f"trajectory's [{gps_time[0]:.1f}, {gps_time[-1]:.1f}] s: {_cause(times, gps_time)}."
         )
     at_epochs = {name: np.interp(gps_time, times, values) for name, values in record.items()}
     position = np.column_stack([at_epochs[name] for name in ("east", "north", "down")])
     attitude = np.column_stack([at_epochs[name] for name in ("roll", "pitch", "heading")])
     if min(position.min(), attitude.min()) < 0:
         raise ValueError(f"the accuracy file {path} holds negative sigmas: it may not be smrmsg.")
-    return position, attitude * ARC_MINUTE
+    return position, np.radians(attitude / 60)

@@ -1,67 +1,42 @@
-"""TOML files read into pydantic models, with one sentence on each thing that is wrong in them."""
+"""The numbers that this room goes by, each with its unit, reason and source."""
 
-import tomllib
-from pathlib import Path
-
-from pydantic import BaseModel, ValidationError
-
-from mlscorr.io.tables import ENCODING, nearest
+from dataclasses import dataclass
 
 
-def read_settings_file(path, model):
-    """The document of a TOML file as a pydantic model; no other file is opened.
+@dataclass(frozen=True)
+class Settings:
+    """What files may hold, and how they are read and written.
 
-    Raises ValueError that names the line of bad TOML, or every key that is unknown (with the
-    nearest known one), missing, or of a value that can't be used.
+    A file that is refused wrongly can't be used at all, so limits are where no survey can be.
     """
-    try:
-        document = tomllib.loads(Path(path).read_text(encoding=ENCODING))
-    except UnicodeDecodeError:
-        raise ValueError(f"{path} is not a text file in UTF-8.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path} is not valid TOML: {error}.") from None
-    try:
-        return model.model_validate(document)
-    except ValidationError as error:
-        sentences = " ".join(_sentence(item, model) for item in _causes(error.errors()))
-        raise ValueError(f"{path}: {sentences}") from None
+
+    # ---- clouds
+    chunk_points: int = 1_000_000  # at a time: 125 MB with decoding, benchmarks/bench.py
+    sampled_points: int = 65  # times per file, first and last among them, for its time system
+    largest_chunk: int = 10_000_000  # points; lazrs allocates whole LAZ chunks, aborts if it can't
+    sigma_step: float = 1e-4  # m, of a point's sigma in 16 bits: up to 6.5 m
+    copied_bytes: int = 1 << 20  # at a time, where bytes are copied as they are
+
+    # ---- control
+    target_size: tuple[float, float] = (0.02, 10.0)  # m: the beam's width; surely given in mm
+    largest_coordinate: float = 1e8  # m: twice the Earth's girth, and map zones prefixed to E
+    coarse_sigma: float = 0.5  # m, beyond which a surveyed point corrects nothing
+    near: float = 1e3  # m, within which a survey's control and points lie of the trajectory
+    far: float = 5e3  # m, beyond which control and trajectory can't belong together
+
+    # ---- tables
+    longest_line: int = 10_000  # characters; no table has columns for that
+
+    # ---- trajectories
+    moving: float = 1.0  # m/s, below which the course over ground says nothing of the heading
+    baseline: float = 0.5  # s, over which the course is taken, long against noise of positions
+    course_tolerance: float = 30.0  # deg, beyond the drift of a boat or the crab of an aircraft
+    fastest: float = 340.0  # m/s, the speed of sound: no vehicle with a scanner
+    microseconds: float = 1e13  # a time beyond counts them: as seconds it were 300 000 years
+
+    # ---- times
+    covered_share: float = 0.5  # of the times inside the trajectory, from which a constant fits
+    earliest_time: float = 6.3e8  # s, GPS seconds of 2000, before which no vehicle was scanning
 
 
-def _causes(items):
-    """pydantic's findings without those on a list or section that follow from its own items."""
-
-    def follows(item):
-        depth = len(item["loc"])
-        return any(o["loc"][:depth] == item["loc"] and len(o["loc"]) > depth for o in items)
-
-    return [item for item in items if not follows(item)]
-
-
-def _sentence(item, model):
-    """One sentence on one of pydantic's findings, with the dotted key."""
-    key = ".".join(str(part) for part in item["loc"])
-    if item["type"] == "extra_forbidden":
-        name = ".".join(part for part in item["loc"] if isinstance(part, str))
-        return f"{key} is an unknown key; the nearest known one is {nearest(name, _keys(model))}."
-    if item["type"] == "missing":
-        return f"{key} is missing."
-    if item["type"] == "value_error":  # raised by a validator of ours, a sentence already
-        message = str(item["ctx"]["error"]).rstrip(".")
-        return f"{key}: {message}." if key else f"{message}."
-    if item["type"] in ("tuple_type", "list_type") and isinstance(item["input"], dict):
-        return f"{key} is a list of sections; write [[{key}]], not [{key}]."
-    message = item["msg"]
-    for kind in ("Input", "List", "Tuple"):
-        message = message.replace(f"{kind} should", "it should")
-    return f"{key} = {item['input']!r} can't be used: {message[0].lower()}{message[1:]}."
-
-
-def _keys(model, prefix=""):
-    """Every dotted key of a model, sections included."""
-    keys = []
-    for name, field in model.model_fields.items():
-        keys.append(prefix + name)
-        for kind in getattr(field.annotation, "__args__", (field.annotation,)):
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                keys += _keys(kind, f"{prefix}{name}.")
-    return keys
+SETTINGS = Settings()

@@ -7,13 +7,21 @@ from pathlib import Path, PurePath
 import numpy as np
 import tomlkit
 
-from mlscorr.io.tables import ENCODING
+from mlscorr.io.text_files import ENCODING
+from mlscorr.survey import Mounting
 
 PATHS = (("trajectory", "file"), ("trajectory", "accuracy"), ("control", "file"),
          ("scene", "reference"))  # fmt: skip
 
 
-def write_survey_copy(source, target, folder, mounting=None, clouds=None, trajectory=None):
+def write_survey_copy(
+    source: str | Path,
+    target: str | Path,
+    folder: str | Path,
+    mounting: Mounting | None = None,
+    clouds: list[str] | None = None,
+    trajectory: str | None = None,
+) -> None:
     """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
 
     Parameters
@@ -65,11 +73,23 @@ def _set_covariance(section, covariance):
     section["correlation"] = rows.multiline(True)
 
 
-def mounting_values(mounting):
-    """Lever arm (m) and boresight (deg) as survey.toml has them: two lists of three numbers."""
+def mounting_values(mounting: Mounting) -> tuple[list[float], list[float]]:
+    """Lever arm and boresight as survey.toml has them, to 0.01 mm and 1e-6 deg.
+
+    Parameters
+    ----------
+    mounting : Mounting
+
+    Returns
+    -------
+    lever_arm : list of three float
+        Units: m.
+    boresight : list of three float
+        Units: deg.
+    """
     boresight = mounting.boresight.as_euler("xyz", degrees=True)
-    rounded = (np.round(mounting.lever_arm, 5), np.round(boresight, 6))
-    return tuple((values + 0.0).tolist() for values in rounded)
+    lever_arm = np.round(mounting.lever_arm, 5) + 0.0
+    return lever_arm.tolist(), (np.round(boresight, 6) + 0.0).tolist()
 
 
 def _way(old, new):

@@ -9,6 +9,10 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from mlscorr.io.settings import SETTINGS
+from mlscorr.survey import Trajectory
 
 WEEK = 604800.0  # s
 ADJUSTMENT = 1e9  # s
@@ -18,8 +22,6 @@ NAMES = {
     "standard": "adjusted standard GPS time (GPS seconds minus 1e9)",
     "gps": "plain GPS seconds since 1980",
 }
-MOST = 0.5  # share of the times inside the trajectory from which on a constant fits
-EARLIEST = 6.3e8  # s, GPS seconds of the year 2000, before which nobody scanned from a vehicle
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class TimeMatch:
     trajectory_system: str
     inside: float
 
-    def __str__(self):
+    def __str__(self) -> str:
         if self.constant == 0.0:
             return f"{NAMES[self.cloud_system]}, as in the trajectory"
         return (
@@ -40,7 +42,9 @@ class TimeMatch:
         )
 
 
-def match_times(name, times, is_standard, trajectory, setting="auto"):
+def match_times(
+    name: str, times: ArrayLike, is_standard: bool, trajectory: Trajectory, setting: str = "auto"
+) -> TimeMatch:
     """Constant between a cloud's times and the trajectory's.
 
     Parameters
@@ -55,10 +59,24 @@ def match_times(name, times, is_standard, trajectory, setting="auto"):
     setting : str
         ``auto`` prefers the header but takes what fits; ``week`` and ``standard`` are obeyed.
 
-    Returns a TimeMatch. Warns when what fits contradicts the header. Raises ValueError when most
-    of the times lie outside the trajectory under every constant.
+    Returns
+    -------
+    TimeMatch
 
-    >>> from mlscorr.survey import Trajectory, attitude_from_angles
+    Raises
+    ------
+    ValueError
+        When most of the times lie outside the trajectory under every constant.
+
+    Warns
+    -----
+    UserWarning
+        When what fits contradicts the header.
+
+    Examples
+    --------
+    >>> from mlscorr.frames import attitude_from_angles
+    >>> from mlscorr.survey import Trajectory
     >>> level = attitude_from_angles(np.zeros(2), 0.0, 0.0)
     >>> trajectory = Trajectory(np.array([413200.0, 413300.0]), np.zeros((2, 3)), level)
     >>> match_times("a.laz", np.array([391040000.0 + 413250.0]), True, trajectory).constant
@@ -92,17 +110,17 @@ def match_times(name, times, is_standard, trajectory, setting="auto"):
 def _candidates(times, span):
     """Constants (s) as a list of (constant, cloud system, trajectory system), simplest first."""
     middle, goal = np.median(times), np.mean(span)
-    found = [(0.0, system, system) for system in SYSTEMS]
+    candidates = [(0.0, system, system) for system in SYSTEMS]
     to_gps = {"standard": ADJUSTMENT, "gps": 0.0}
     for cloud, added in to_gps.items():  # to seconds of week, or to the other continuous system
         week = np.floor((middle + added) / WEEK)
-        found += [(added - WEEK * (week + k), cloud, "week") for k in (0, -1, 1)]
-        found += [(added - taken, cloud, t) for t, taken in to_gps.items() if t != cloud]
+        candidates += [(added - WEEK * (week + k), cloud, "week") for k in (0, -1, 1)]
+        candidates += [(added - taken, cloud, t) for t, taken in to_gps.items() if t != cloud]
     for system, taken in to_gps.items():  # from seconds of week
         week = np.floor((goal + taken) / WEEK)
-        found += [(WEEK * (week + k) - taken, "week", system) for k in (0, -1, 1)]
-    found += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
-    return found
+        candidates += [(WEEK * (week + k) - taken, "week", system) for k in (0, -1, 1)]
+    candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
+    return candidates
 
 
 def _inside(times, span, constant):
@@ -118,49 +136,49 @@ def _best(candidates, times, span, systems):
             if cloud != system:
                 continue
             inside = _inside(times, span, constant)
-            if inside >= MOST and (best is None or inside > best.inside):
+            if inside >= SETTINGS.covered_share and (best is None or inside > best.inside):
                 best = TimeMatch(float(constant), cloud, trajectory, float(inside))
     return best
 
 
 def _others(flagged, times):
     """The systems that the header does not name, the likelier by the size of the times first."""
-    likely = _likely(times)
+    usual = _usual_systems(times)
     others = [system for system in SYSTEMS if system != flagged]
-    return sorted(others, key=lambda system: system not in likely)
+    return sorted(others, key=lambda system: system not in usual)
 
 
-def _likely(times):
+def _usual_systems(times):
     """The systems whose range the times lie in."""
     if times.min() >= 0 and times.max() <= 2 * WEEK:
         return ("week",)
     if times.min() >= ADJUSTMENT:
         return ("gps",)
-    return ("gps", "standard") if times.min() >= EARLIEST else ("standard",)
+    return ("gps", "standard") if times.min() >= SETTINGS.earliest_time else ("standard",)
 
 
 def _settle_equal(match, times):
     """Name the system of equal times by their size: a constant of zero says nothing of it."""
-    likely = _likely(times)
-    if match.constant != 0.0 or match.cloud_system in likely:
+    usual = _usual_systems(times)
+    if match.constant != 0.0 or match.cloud_system in usual:
         return match
-    return TimeMatch(0.0, likely[0], likely[0], match.inside)
+    return TimeMatch(0.0, usual[0], usual[0], match.inside)
 
 
 def _nothing_fits(name, times, span, candidates, setting):
     """A sentence with both spans, the likely cause and the way out."""
     shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
-    most = max(inside for inside, cloud in shares if setting in ("auto", cloud))
+    largest = max(inside for inside, cloud in shares if setting in ("auto", cloud))
     spans = (
         f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
         f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
     )
-    if most > 0:
+    if largest > 0:
         return (
-            f"Only {most:.0%} of {spans}: the trajectory covers a part of the cloud. "
+            f"Only {largest:.0%} of {spans}: the trajectory covers a part of the cloud. "
             "Export the whole trajectory, or clip the cloud to it."
         )
-    if setting == "auto" or max(shares)[0] < MOST:
+    if setting == "auto" or max(shares)[0] < SETTINGS.covered_share:
         return (
             f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
             "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "

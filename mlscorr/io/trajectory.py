@@ -1,27 +1,27 @@
 """Trajectories from CSV or SBET, and back to CSV."""
 
-import os
 import warnings
 from pathlib import Path
 
 import numpy as np
 
+from mlscorr.frames import angles_from_attitude, attitude_from_angles
+from mlscorr.io.output import output_file
 from mlscorr.io.sbet import read_sbet
-from mlscorr.io.tables import ENCODING, find_columns, read_header
-from mlscorr.survey import Trajectory, angles_from_attitude, attitude_from_angles
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.tables import find_columns, read_header, read_numbers
+from mlscorr.io.text_files import warn_of_cut
+from mlscorr.survey import Trajectory
 
 COLUMNS = ("gps_time", "easting", "northing", "height", "roll", "pitch", "heading")
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
 ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
 SBET_SUFFIXES = (".sbet", ".out")
 
-MOVING = 1.0  # m/s, below which the course over ground says nothing of the heading
-BASELINE = 0.5  # s, over which the course is taken, long against the noise of positions
-COURSE_AGREES = np.radians(10.0)  # a vehicle's crab angle and sideslip stay below
-COURSE_DISAGREES = np.radians(30.0)  # beyond the drift of a boat or the crab of an aircraft
 
-
-def read_trajectory(path, crs=None, accuracy=None):
+def read_trajectory(
+    path: str | Path, crs: str | None = None, accuracy: str | Path | None = None
+) -> Trajectory:
     """Trajectory of a .csv file, or of an SBET (.sbet, .out).
 
     Parameters
@@ -32,14 +32,26 @@ def read_trajectory(path, crs=None, accuracy=None):
     accuracy : path, optional
         An SBET's smrmsg file; a CSV carries its sigmas in its own columns.
 
-    Angles are degrees in the CSV and radians inside. Raises ValueError for missing columns, cells
-    that are not numbers, times that don't increase, radians where degrees belong, and an unknown
-    suffix. Warns when the heading disagrees with the course over ground.
+    Returns
+    -------
+    Trajectory
+        Angles are degrees in the CSV and radians inside.
+
+    Raises
+    ------
+    ValueError
+        For missing columns, cells that are not numbers, times that don't increase, radians where
+        degrees belong, and an unknown suffix.
+
+    Warns
+    -----
+    UserWarning
+        When the heading disagrees with the course over ground.
     """
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix in SBET_SUFFIXES:
-        return read_sbet(path, crs, accuracy)
+        return _checked_motion(path, read_sbet(path, crs, accuracy))
     if suffix != ".csv":
         raise ValueError(
             f"{path} has the unknown suffix '{path.suffix}'; "
@@ -50,15 +62,26 @@ def read_trajectory(path, crs=None, accuracy=None):
             f"{path} has its accuracy in its own sigma columns; an accuracy file ({accuracy}) "
             "belongs to an SBET."
         )
-    return _read_csv(path)
+    trajectory = _checked_motion(path, _read_csv(path))
+    warn_of_cut(path)
+    return trajectory
 
 
-def write_trajectory_csv(path, trajectory):
+def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
     """Write a trajectory with its sigmas, if any: 1e-6 s, 1e-5 m, 1e-7 deg, heading from 0 to 360.
 
     The file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+    trajectory : Trajectory
+
+    Raises
+    ------
+    OSError
+        When the disk refuses.
     """
-    path = Path(path)
     angles = np.degrees(np.column_stack(angles_from_attitude(trajectory.attitude)))
     blocks = [trajectory.gps_time[:, None], trajectory.position, angles]
     names, formats = COLUMNS, ["%.6f"] + ["%.5f"] * 3 + ["%.7f"] * 3
@@ -69,22 +92,18 @@ def write_trajectory_csv(path, trajectory):
         blocks.append(np.degrees(trajectory.attitude_sigma))
         names, formats = names + ATTITUDE_SIGMAS, formats + ["%.7f"] * 3
     table, line = np.hstack(blocks), ",".join(formats) + "\n"
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(",".join(names) + "\n")
-            for start in range(0, len(table), 10_000):  # one format call for many rows is fast
-                rows = table[start : start + 10_000]
-                file.write((line * len(rows)) % tuple(rows.ravel()))
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    with output_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(names) + "\n")
+        for start in range(0, len(table), 10_000):  # one format call for many rows is fast
+            rows = table[start : start + 10_000]
+            file.write((line * len(rows)) % tuple(rows.ravel()))
 
 
 def _read_csv(path):
-    header, skip = read_header(path)
+    header, lines = read_header(path)
     columns = find_columns(path, header, COLUMNS, (POSITION_SIGMAS, ATTITUDE_SIGMAS))
-    table = dict(zip(columns, _load(path, skip, len(header), columns.values()).T, strict=True))
+    numbers = read_numbers(path, lines, columns.values(), len(header))
+    table = dict(zip(columns, numbers.T, strict=True))
     _check_values(path, table)
     angles = np.column_stack([table[name] for name in COLUMNS[4:]])
     position = np.column_stack([table[name] for name in COLUMNS[1:4]])
@@ -106,49 +125,6 @@ def _read_csv(path):
         raise ValueError(f"{path}: {error}") from None
 
 
-def _load(path, skip, width, columns):
-    """The wanted columns of a table of numbers: (n, k)."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=".*input contained no data")
-        try:
-            table = np.loadtxt(
-                path,
-                delimiter=",",
-                skiprows=skip,
-                usecols=tuple(columns),
-                encoding=ENCODING,
-                ndmin=2,
-            )
-        except ValueError:
-            raise ValueError(_first_bad_line(path, skip, width, columns)) from None
-    if not len(table):
-        raise ValueError(f"{path} has a header but no epochs.")
-    return table
-
-
-def _first_bad_line(path, skip, width, columns):
-    """A sentence on the first line that is not a row of numbers."""
-    with path.open(encoding=ENCODING, errors="replace") as file:
-        for number, line in enumerate(file, start=1):
-            cells = line.split("#")[0].strip().split(",")
-            if number <= skip or cells == [""]:
-                continue
-            if len(cells) <= max(columns):
-                return (
-                    f"Line {number} of {path} has {len(cells)} columns where the header has "
-                    f"{width}: the file may have been cut off there."
-                )
-            for column in columns:
-                try:
-                    float(cells[column])
-                except ValueError:
-                    return (
-                        f"Line {number} of {path} has '{cells[column].strip()}' "
-                        f"where a number belongs (column {column + 1})."
-                    )
-    return f"{path} is not a table of numbers."
-
-
 def _check_values(path, table):
     """Refuse values that are not finite, or sigmas below zero."""
     for name, values in table.items():
@@ -165,6 +141,27 @@ def _check_values(path, table):
             )
 
 
+def _checked_motion(path, trajectory):
+    """The trajectory, where a vehicle can move so: no lone epoch far off, no leap of a distance.
+
+    A POS that finds its satellites again falls back at once by metres, so a single step may be
+    faster than any vehicle, two in turn may not.
+    """
+    length = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+    speed = length / np.diff(trajectory.gps_time)
+    is_fast = np.concatenate([[True], speed > SETTINGS.fastest, [True]])
+    bad = is_fast[1:-1] & (is_fast[:-2] | is_fast[2:] | (length > SETTINGS.near))
+    if bad.any():
+        worst = int(np.argmax(np.where(bad, speed, 0.0)))
+        raise ValueError(
+            f"{bad.sum()} of {len(bad)} steps of {path} are faster than {SETTINGS.fastest:.0f} "
+            f"m/s, which no vehicle is (fastest: {length[worst]:.1f} m at {speed[worst]:.3g} m/s, "
+            f"at {trajectory.gps_time[worst]:.3f} s): an epoch is wrong, or the units are not m "
+            "and s. Remove it, or export the trajectory anew."
+        )
+    return trajectory
+
+
 def _check_heading(path, gps_time, position, angles):
     """Compare the heading with the course over ground where the vehicle moves.
 
@@ -175,9 +172,10 @@ def _check_heading(path, gps_time, position, angles):
     if len(course) < 10:
         return
     misfit = _median_difference(np.radians(heading), course)
-    if misfit < COURSE_DISAGREES:
+    tolerance = np.radians(SETTINGS.course_tolerance)
+    if misfit < tolerance:
         return
-    if np.abs(angles).max() <= 2 * np.pi and _median_difference(heading, course) < COURSE_AGREES:
+    if np.abs(angles).max() <= 2 * np.pi and _median_difference(heading, course) < tolerance:
         raise ValueError(
             f"The angles of {path} seem to be radians where degrees belong: none exceeds 2 pi, "
             f"and the heading fits the course over ground to "
@@ -197,11 +195,12 @@ def _heading_and_course(gps_time, position, heading):
     steps = np.diff(gps_time)
     if len(steps) == 0 or (steps <= 0).any():  # Trajectory says what is wrong
         return np.empty(0), np.empty(0)
-    stride = max(1, round(BASELINE / np.median(steps)))
+    stride = max(1, round(SETTINGS.baseline / np.median(steps)))
     start, end = np.arange(0, len(gps_time) - stride), np.arange(stride, len(gps_time))
     moved = position[end] - position[start]
     seconds = gps_time[end] - gps_time[start]
-    moving = np.hypot(moved[:, 0], moved[:, 1]) > MOVING * np.maximum(seconds, BASELINE)
+    distance = np.hypot(moved[:, 0], moved[:, 1])
+    moving = distance > SETTINGS.moving * np.maximum(seconds, SETTINGS.baseline)
     moving &= seconds < 10 * stride * np.median(steps)  # not across a gap
     return heading[start + stride // 2][moving], np.arctan2(moved[:, 0], moved[:, 1])[moving]
 

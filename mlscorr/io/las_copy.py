@@ -1,0 +1,220 @@
+"""Corrected copies of LAS and LAZ files, in which only what a correction changes is new."""
+
+import io
+import os
+import shutil
+import struct
+import warnings
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+import lazrs
+import numpy as np
+
+from mlscorr.correction.point_sigma import PointSigma
+from mlscorr.io.extra_bytes import add_sigma_fields, with_sigmas
+from mlscorr.io.las import read_records, times_at
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.las_layout import LASZIP
+from mlscorr.io.output import PART, output_file
+from mlscorr.io.settings import SETTINGS
+from mlscorr.survey import CloudFile, PointCloud
+
+LASZIP_RECORD = 22204  # of the VLR that says how points are compressed
+INTEGER_LIMIT = np.iinfo(np.int32).max  # of the coordinates in a file
+
+
+class SupportsApply(Protocol):
+    """A correction, or any other method that moves points."""
+
+    def apply(self, cloud: PointCloud) -> PointCloud:
+        """The cloud with other coordinates."""
+
+
+def write_corrected(
+    cloud_file: CloudFile,
+    target: str | Path,
+    correction: SupportsApply,
+    watch: Callable[[np.ndarray], object] | None = None,
+    sigma: PointSigma | None = None,
+) -> int:
+    """Copy a CloudFile with corrected coordinates; all else stays as it was, byte for byte.
+
+    What changes: X, Y, Z of each point, the bounds in the header, and where it must, the
+    position of what follows the points. The target's suffix says whether it is compressed. It
+    appears whole or not at all: it is written beside its place as ``.part``, and read again
+    before it takes its name. A file there is replaced.
+
+    Parameters
+    ----------
+    cloud_file : CloudFile
+    target : path
+        ``.las`` or ``.laz``, not the input.
+    correction : Correction, or anything else with ``apply(cloud) -> cloud``
+    watch : function, optional
+        Called with the gps_time (n,) of each chunk that is done, in the trajectory's system.
+    sigma : PointSigma, optional
+        Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
+
+    Returns
+    -------
+    int
+        Number of points outside the trajectory, which are unchanged.
+
+    Raises
+    ------
+    ValueError
+        For bad input, a target that is the input, coordinates that overflow, and LAZ files with
+        waveforms (formats 9 and 10) of several scanner channels, which lazrs would damage.
+    OSError
+        When the target cannot be written.
+    """
+    layout, target = read_layout(cloud_file.path), Path(target)
+    _check_target(layout.path, target)
+    shift = getattr(correction, "shift_integers", None) or partial(_shift_integers, correction)
+    with output_file(target) as part:
+        with _Output(part) as output, open(layout.path, "rb") as file:
+            written = layout if sigma is None else add_sigma_fields(layout)
+            head, encoder = _start(written, output, target.suffix.lower() == ".laz")
+            outside, untimed, low, high = 0, 0, np.full(3, np.inf), np.full(3, -np.inf)
+            for records in read_records(layout, SETTINGS.chunk_points):
+                _check_channels(layout, target, records)
+                xyz = [records[name] for name in "XYZ"]
+                scaled = layout.scale, layout.offset, records["gps_time"], cloud_file.time_constant
+                try:
+                    outside += shift(xyz, *scaled)
+                except ValueError as error:
+                    raise ValueError(f"{layout.path}: {error}") from None
+                untimed += np.count_nonzero(~np.isfinite(records["gps_time"]))
+                low = np.minimum(low, [v.min() for v in xyz])
+                high = np.maximum(high, [v.max() for v in xyz])
+                raw = records.view(np.uint8)
+                if sigma is not None:
+                    raw = with_sigmas(records, sigma.of_integers(xyz, *scaled))
+                output.encode(encoder.compress_many, raw)
+                if watch is not None:
+                    watch(records["gps_time"] + cloud_file.time_constant)
+            output.encode(encoder.done)
+            _finish(written, head, np.stack([high, low]), file, output)
+        _check_copy(layout, part)
+    if untimed:
+        warnings.warn(
+            f"{untimed} of {layout.points} points of {layout.path} have a gps_time that is not a "
+            "number. They can't be placed on the trajectory and were left as they were.",
+            stacklevel=2,
+        )
+    return outside
+
+
+def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
+    """Correction.shift_integers for what has only ``apply``; no point lies outside of that."""
+    old = np.column_stack(xyz)
+    places = old * scale + offset
+    cloud = PointCloud(places, gps_time + time_constant, np.zeros(len(gps_time)))
+    new = old + np.rint((correction.apply(cloud).xyz - places) / scale)
+    overflow = int((np.abs(new) > INTEGER_LIMIT).any(axis=1).sum())
+    if overflow:
+        raise ValueError(
+            f"{overflow} corrected points do not fit the file's scale {scale} m and offset "
+            f"{offset} m: the correction or the file's header is wrong by kilometres."
+        )
+    for values, corrected in zip(xyz, new.T, strict=True):
+        values[:] = corrected
+    return 0
+
+
+def _check_channels(layout, target, records):
+    """That lazrs keeps the waveforms: it mixes them up where scanner channels alternate."""
+    is_laz = layout.is_compressed or target.suffix.lower() == ".laz"
+    if not is_laz or layout.point_format not in (9, 10):
+        return
+    channel = records.view(np.uint8).reshape(len(records), -1)[:, 15] >> 4 & 3
+    if np.ptp(channel):
+        raise ValueError(
+            f"{layout.path} has waveforms (point format {layout.point_format}) of "
+            f"{len(np.unique(channel))} scanner channels, which lazrs does not compress without "
+            "loss. Use LAS for input and output, or one file for each channel."
+        )
+
+
+class _Output(io.BufferedWriter):
+    """A new file that keeps what interrupts its writing; lazrs hides it behind its own error."""
+
+    def __init__(self, path):
+        super().__init__(io.FileIO(path, "wb"), SETTINGS.copied_bytes)
+        self.interruption = None
+
+    def write(self, data):
+        try:
+            return super().write(data)
+        except BaseException as error:
+            self.interruption = error
+            raise
+
+    def encode(self, function, *arguments):
+        """Let lazrs write here; raises what the system raised."""
+        try:
+            function(*arguments)
+        except lazrs.LazrsError as error:
+            raise self.interruption or OSError(f"{self.name}: {error}") from error
+
+
+class _PlainEncoder:
+    """Writes points uncompressed, with the interface of lazrs."""
+
+    def __init__(self, output):
+        self.compress_many = output.write
+
+    def done(self):
+        pass
+
+
+def _check_target(source, target):
+    if target.suffix.lower() not in (".las", ".laz"):
+        raise ValueError(f"The corrected file {target} must end in .las or .laz.")
+    for path in (target, target.with_name(target.name + PART)):
+        if path.exists() and path.samefile(source):
+            raise ValueError(
+                f"The corrected file {path} is the input itself, which would be lost. Choose "
+                "another output folder."
+            )
+
+
+def _start(layout, output, compress):
+    """Write header and VLRs; returns them, to be completed, and what encodes the points."""
+    laszip = lazrs.LazVlr.new_for_compression(layout.point_format, layout.extra_bytes)
+    data = bytes(laszip.record_data()) if compress else None
+    head = bytearray(layout.head_with(LASZIP, LASZIP_RECORD, data, b"http://laszip.org"))
+    head[104] = layout.point_format | (0x80 if compress else 0)
+    output.write(head)
+    encoder = lazrs.ParLasZipCompressor(output, laszip) if compress else _PlainEncoder(output)
+    return head, encoder
+
+
+def _finish(layout, head, bounds, file, output):
+    """Copy what follows the points; write the header again with bounds (2, 3) and positions."""
+    output.seek(0, io.SEEK_END)
+    moved = output.tell() - layout.tail
+    file.seek(layout.tail)
+    shutil.copyfileobj(file, output, SETTINGS.copied_bytes)
+    positions = {(1, 3): (227,), (1, 4): (227, 235)}.get(layout.version, ())  # waveforms, EVLRs
+    for position in positions:
+        value = layout.field("Q", position)[0]
+        if value >= layout.tail:
+            struct.pack_into("<Q", head, position, value + moved)
+    corners = bounds * layout.scale + layout.offset
+    struct.pack_into("<6d", head, 179, *corners.T.ravel())  # max x, min x, max y, ...
+    output.seek(0)
+    output.write(head)
+    output.flush()
+    os.fsync(output.fileno())
+
+
+def _check_copy(layout, part):
+    """That the file just written can be opened and holds the points, up to the last."""
+    copy = read_layout(part)
+    times_at(copy, [copy.points - 1])
+    if copy.points != layout.points:
+        raise OSError(f"{part} was written with {copy.points} of {layout.points} points.")

@@ -1,0 +1,144 @@
+"""What stands in survey.toml, section by section, in its own units (deg)."""
+
+from dataclasses import replace
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
+
+from mlscorr.io.toml_file import TomlSection
+from mlscorr.survey import SEARCH_RADIUS, Mounting, Pos, Scanner
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
+Three = Field(min_length=3, max_length=3)
+Six = Field(min_length=6, max_length=6)
+Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
+
+
+class CloudSection(TomlSection):
+    """Which cloud files, and the system of their times."""
+
+    files: Annotated[list[str], Field(min_length=1)]
+    gps_time: Literal["auto", "week", "standard"] = "auto"
+
+
+class TrajectorySection(TomlSection):
+    """The trajectory's file, and the accuracy of an SBET."""
+
+    file: str
+    accuracy: str | None = None
+
+
+class MountingSection(TomlSection):
+    """Lever arm (m: right, forward, up) and boresight (deg, about x, y, z)."""
+
+    lever_arm: Annotated[list[Meters], Three]
+    boresight: Annotated[list[Degrees], Three]
+
+    def mounting(self) -> Mounting:
+        """R_L^P = Rz(c) Ry(b) Rx(a) for the boresight [a, b, c]."""
+        boresight = Rotation.from_euler("xyz", self.boresight, degrees=True)
+        return Mounting(np.array(self.lever_arm, dtype=float), boresight)
+
+
+class CalibratedMountingSection(MountingSection):
+    """The same, and how well a calibration knows it."""
+
+    lever_arm_sigma: Annotated[list[Positive], Three] | None = None  # m
+    boresight_sigma: Annotated[list[Positive], Three] | None = None  # deg: right, forward, up
+    correlation: Annotated[list[Annotated[list[Share], Six]], Six] | None = None
+
+    @model_validator(mode="after")
+    def _has_both_sigmas(self) -> Self:
+        known = [v is not None for v in (self.lever_arm_sigma, self.boresight_sigma)]
+        if any(known) != all(known) or (self.correlation is not None and not all(known)):
+            raise ValueError("lever_arm_sigma and boresight_sigma are needed both, or neither")
+        if self.correlation is not None:
+            matrix = np.array(self.correlation)
+            rounding = 0.5e-6 * len(matrix)  # of an eigenvalue, where six decimals are written
+            if not np.array_equal(matrix, matrix.T) or np.linalg.eigvalsh(matrix)[0] < -rounding:
+                raise ValueError("correlation is no correlation matrix: lopsided, or impossible")
+        return self
+
+    def mounting(self) -> Mounting:
+        """The Mounting with its covariance."""
+        mounting = super().mounting()
+        if self.lever_arm_sigma is None or self.boresight_sigma is None:
+            return mounting
+        sigma = np.append(self.lever_arm_sigma, np.radians(self.boresight_sigma))
+        correlation = np.eye(6) if self.correlation is None else np.array(self.correlation)
+        return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
+
+
+class ControlSection(TomlSection):
+    """The file of the surveyed points."""
+
+    file: str
+
+
+class ScannerSection(TomlSection):
+    """What is believed of the scanner."""
+
+    range_noise: Positive = Scanner.range_noise  # m
+    angle_noise: Positive = float(np.degrees(Scanner.angle_noise))  # deg
+    lines_per_second: Positive = Scanner.lines_per_second
+
+    def scanner(self) -> Scanner:
+        """The same in radians."""
+        return Scanner(self.range_noise, np.radians(self.angle_noise), self.lines_per_second)
+
+
+class PosSection(TomlSection):
+    """What is believed of the POS where the trajectory has no sigmas."""
+
+    position_sigma: Positive = Pos.position_sigma  # m
+    attitude_sigma: Annotated[list[Positive], Three] = np.degrees(Pos().attitude_sigma).tolist()
+    correlation_time: Positive = Pos.correlation_time  # s
+
+    def pos(self) -> Pos:
+        """The same in radians."""
+        sigma = np.radians(self.attitude_sigma)
+        return Pos(self.position_sigma, sigma, self.correlation_time)
+
+
+class MatchingSection(TomlSection):
+    """How far from its surveyed point a target is looked for."""
+
+    search_radius: Annotated[float, Field(gt=0, le=100)] = SEARCH_RADIUS  # m
+
+
+class TiesSection(TomlSection):
+    """Whether a correction uses what two passes both saw."""
+
+    use: Literal["auto", "off"] = "auto"
+
+
+class SceneSection(TomlSection):
+    """A reference surface."""
+
+    reference: str | None = None
+
+
+class PlannedSurveyFile(TomlSection):
+    """What stands in the survey.toml of a survey that isn't driven yet: it may have no cloud."""
+
+    name: str | None = None
+    crs: str | None = None
+    cloud: CloudSection | None = None
+    trajectory: TrajectorySection
+    mounting: CalibratedMountingSection | None = None
+    control: ControlSection | None = None
+    scanner: ScannerSection = ScannerSection()
+    pos: PosSection = PosSection()
+    matching: MatchingSection = MatchingSection()
+    ties: TiesSection = TiesSection()
+    scene: SceneSection = SceneSection()
+
+
+class SurveyFile(PlannedSurveyFile):
+    """What stands in survey.toml, in its own units (deg)."""
+
+    cloud: CloudSection

@@ -1,0 +1,102 @@
+"""TOML files read into pydantic models, with one sentence on each thing that is wrong in them."""
+
+import tomllib
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class TomlSection(BaseModel):
+    """A part of a TOML file: no unknown keys, no numbers as text."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
+    """The document of a TOML file as a pydantic model; no other file is opened.
+
+    Parameters
+    ----------
+    path : path
+    model : class of pydantic
+    kind : str
+        What the file is, in words.
+
+    Returns
+    -------
+    model
+
+    Raises
+    ------
+    ValueError
+        Names the line of bad TOML, or every key that is unknown (with the nearest known one),
+        missing, or of a value that can't be used.
+    FileNotFoundError
+        Where there is no such file.
+    """
+    if not Path(path).is_file():
+        what = "is a folder" if Path(path).is_dir() else "does not exist"
+        raise FileNotFoundError(f"{path} {what}; {kind} is a TOML file.")
+    try:
+        document = tomllib.loads(Path(path).read_text(encoding=ENCODING))
+    except UnicodeDecodeError:
+        raise ValueError(f"{path} is not a text file in UTF-8.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{path} is not valid TOML: {error}.") from None
+    except (RecursionError, ValueError):
+        raise ValueError(
+            f"{path} can't be read: brackets are nested too deep, or a number has too many digits."
+        ) from None
+    try:
+        validated = model.model_validate(document)
+    except ValidationError as error:
+        sentences = " ".join(_sentence(item, model) for item in _causes(error.errors()))
+        raise ValueError(f"{path}: {sentences}") from None
+    warn_of_cut(path)
+    return validated
+
+
+def _causes(items):
+    """Pydantic's findings without those on a list or section that follow from its own items."""
+
+    def follows(item):
+        depth = len(item["loc"])
+        return any(o["loc"][:depth] == item["loc"] and len(o["loc"]) > depth for o in items)
+
+    return [item for item in items if not follows(item)]
+
+
+def _sentence(item, model):
+    """One sentence on one of pydantic's findings, with the dotted key."""
+    key = ".".join(str(part) for part in item["loc"])
+    if item["type"] == "extra_forbidden":
+        name = ".".join(part for part in item["loc"] if isinstance(part, str))
+        near = nearest(name, _keys(model))
+        return f"{shown(key)} is an unknown key; the nearest known one is {near}."
+    if item["type"] == "missing":
+        return f"{key} is missing."
+    if item["type"] == "value_error":  # raised by a validator of ours, a sentence already
+        message = str(item["ctx"]["error"]).rstrip(".")
+        return f"{key}: {message}." if key else f"{message}."
+    if item["type"] in ("tuple_type", "list_type") and isinstance(item["input"], dict):
+        return f"{key} is a list of sections; write [[{key}]], not [{key}]."
+    message = item["msg"]
+    for kind in ("Input", "List", "Tuple"):
+        message = message.replace(f"{kind} should", "it should")
+    return f"{key} = {shown(repr(item['input']))} can't be used: {message[0].lower()}{message[1:]}."
+
+
+def _keys(model, prefix=""):
+    """Every dotted key of a model, sections included."""
+    keys = []
+    for name, field in model.model_fields.items():
+        keys.append(prefix + name)
+        for kind in getattr(field.annotation, "__args__", (field.annotation,)):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                keys += _keys(kind, f"{prefix}{name}.")
+    return keys
