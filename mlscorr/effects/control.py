@@ -7,52 +7,30 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.effects.effect import Effect, quantity
-
-
-@dataclass(frozen=True)
-class VerticalDatum(Effect):
-    """Control heights are in another datum: recorded = true + magnitude."""
-
-    name: ClassVar = "vertical_datum"
-    stage: ClassVar = "control"
-    magnitude: float = quantity(
-        "m",
-        120.0,
-        "that is more than the geoid's largest height above the ellipsoid",
-        typical=0.03,
-        source="estimate: geoid models hold to a few centimetres",
-    )
-
-    def _change(self, value, reference, rng):
-        return replace(value, position=value.position + np.array([0.0, 0.0, self.magnitude]))
-
-
-@dataclass(frozen=True)
-class HorizontalDatum(Effect):
-    """Control is in another frame, moved in the plane: recorded = true + magnitude (E, N)."""
-
-    name: ClassVar = "horizontal_datum"
-    stage: ClassVar = "control"
-    magnitude: tuple[float, float] = quantity(
-        "m",
-        1000.0,
-        "classical datums lie some hundred metres from WGS 84, not more",
-        count=2,
-        typical=0.05,
-        source="plates move 2-7 cm a year (ITRF2014, Altamimi et al. 2016): an epoch not reduced",
-    )
-
-    def _change(self, value, reference, rng):
-        return replace(value, position=value.position + np.array([*self.magnitude, 0.0]))
+from mlscorr.effects.effect import Effect
+from mlscorr.effects.quantity import quantity
+from mlscorr.effects.stages import EAST_NORTH_UP, MAP
 
 
 @dataclass(frozen=True)
 class MapRotation(Effect):
-    """Control is turned about reference.place, counter-clockwise from above; normals too."""
+    """Control is turned about reference.place, counter-clockwise from above; normals too.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: rad.
+    """
 
     name: ClassVar = "map_rotation"
     stage: ClassVar = "control"
+    title: ClassVar = "Turned frame"
+    meaning: ClassVar = "The frame of the surveyed targets is turned against that of the cloud."
+    sentence: ClassVar = (
+        "The frame of the surveyed targets is turned {side} by {size} against that of the cloud."
+    )
+    remedy: ClassVar = "Check CRS and datum of control and trajectory."
+    sides: ClassVar = ("counter-clockwise", "clockwise")
     magnitude: float = quantity(
         "rad",
         0.1,
@@ -72,10 +50,23 @@ class MapRotation(Effect):
 
 @dataclass(frozen=True)
 class MapScale(Effect):
-    """Control is scaled in the plane about reference.place, by 1 + magnitude; heights are not."""
+    """Control is scaled in the plane about reference.place, by 1 + magnitude; heights are not.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: ratio.
+    """
 
     name: ClassVar = "map_scale"
     stage: ClassVar = "control"
+    title: ClassVar = "Scale of the map"
+    meaning: ClassVar = "The surveyed targets have another map scale than the cloud."
+    sentence: ClassVar = (
+        "The map of the surveyed targets is too {side} by {size}, compared with the cloud."
+    )
+    remedy: ClassVar = "Check CRS and projection scale of control and trajectory."
+    sides: ClassVar = ("large", "small")
     magnitude: float = quantity(
         "ratio",
         0.01,
@@ -84,20 +75,104 @@ class MapScale(Effect):
         source="UTM's scale at the central meridian, 0.9996, not applied",
     )
 
-    def _change(self, value, reference, rng):
+    def _error(self, value, reference, rng):
         arm = (value.position - reference.place) * [1.0, 1.0, 0.0]
-        return replace(value, position=value.position + self.magnitude * arm)
+        return self.magnitude * arm
+
+
+@dataclass(frozen=True)
+class HorizontalDatum(Effect):
+    """Control is in another frame, moved in the plane: recorded = true + magnitude (E, N).
+
+    Parameters
+    ----------
+    magnitude : 2 floats
+        Easting and northing. Units: m.
+    """
+
+    name: ClassVar = "horizontal_datum"
+    stage: ClassVar = "control"
+    title: ClassVar = "Horizontal datum"
+    meaning: ClassVar = (
+        "Surveyed targets and cloud are in different frames, moved against each other."
+    )
+    sentence: ClassVar = (
+        "The surveyed targets and the cloud are in different frames: the targets lie too far "
+        "{size}."
+    )
+    remedy: ClassVar = "Check CRS and datum of control and trajectory."
+    sides: ClassVar = EAST_NORTH_UP[:2]
+    parts: ClassVar = MAP[:2]
+    magnitude: tuple[float, float] = quantity(
+        "m",
+        1000.0,
+        "classical datums lie some hundred metres from WGS 84, not more",
+        count=2,
+        typical=0.05,
+        source="plates move 2-7 cm a year (ITRF2014, Altamimi et al. 2016): an epoch not reduced",
+    )
+
+    def _error(self, value, reference, rng):
+        return np.array([*self.magnitude, 0.0])
+
+
+@dataclass(frozen=True)
+class VerticalDatum(Effect):
+    """Control heights are in another datum: recorded = true + magnitude.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: m.
+    """
+
+    name: ClassVar = "vertical_datum"
+    stage: ClassVar = "control"
+    title: ClassVar = "Vertical datum"
+    meaning: ClassVar = "Heights of the surveyed targets and of the cloud are in different systems."
+    sentence: ClassVar = (
+        "The surveyed heights of the targets lie {size} {side} those of the cloud: two height "
+        "systems."
+    )
+    remedy: ClassVar = "Check the heights' datum and geoid of control and trajectory."
+    sides: ClassVar = ("above", "below")
+    magnitude: float = quantity(
+        "m",
+        120.0,
+        "that is more than the geoid's largest height above the ellipsoid",
+        typical=0.03,
+        source="estimate: geoid models hold to a few centimetres",
+    )
+
+    def _error(self, value, reference, rng):
+        return np.array([0.0, 0.0, self.magnitude])
 
 
 @dataclass(frozen=True)
 class TargetOutlier(Effect):
     """One surveyed target, by its name, is wrong: recorded = true + magnitude.
 
-    Raises ValueError when no target has that name.
+    Parameters
+    ----------
+    magnitude : 3 floats
+        Easting, northing and height. Units: m.
+    target : str
+        Its name.
+
+    Raises
+    ------
+    ValueError
+        When no target has that name.
     """
 
     name: ClassVar = "target_outlier"
     stage: ClassVar = "control"
+    title: ClassVar = "One wrong target"
+    meaning: ClassVar = "The surveyed coordinates of one target are wrong."
+    sentence: ClassVar = "The surveyed coordinates of {where} are wrong: too far {size}."
+    remedy: ClassVar = "Survey that target again, or take it out of the control."
+    sides: ClassVar = EAST_NORTH_UP
+    parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
         "m",
         100.0,
@@ -113,7 +188,7 @@ class TargetOutlier(Effect):
         if not isinstance(self.target, str):
             raise ValueError(f"target of {self.name} of {self.target!r} is not a target's name.")
 
-    def _change(self, value, reference, rng):
+    def _error(self, value, reference, rng):
         if self.target not in value.name:
             near = get_close_matches(self.target, value.name, n=1, cutoff=0.0)[0]
             raise ValueError(
@@ -121,4 +196,4 @@ class TargetOutlier(Effect):
                 f"the nearest name is {near!r}."
             )
         hit = np.array([name == self.target for name in value.name])
-        return replace(value, position=value.position + hit[:, None] * np.array(self.magnitude))
+        return hit[:, None] * np.array(self.magnitude)

@@ -1,135 +1,189 @@
-"""What an effect is: a frozen value with a magnitude, a unit, limits, and a stage it acts on."""
+"""What an effect is: a frozen value that changes one stage of a survey, and says so in words."""
 
-from dataclasses import MISSING, dataclass, field, fields
-from typing import ClassVar
+from dataclasses import MISSING, asdict, dataclass, fields, replace
+from typing import Any, ClassVar
 
 import numpy as np
 
-STAGES = ("beam", "clock", "range", "angle", "return", "pos", "mounting", "control")
-
-
-@dataclass(frozen=True)
-class Reference:
-    """What effects refer to: start and end, first and last gps_time of the survey (s), and the
-    place (3,) about which the map is turned and scaled (m)."""
-
-    start: float
-    end: float
-    place: np.ndarray
-
-
-@dataclass(frozen=True)
-class Returns:
-    """Returns of a scanner in scan order, as the effects see and change them.
-
-    Parameters
-    ----------
-    gps_time : (n,) array
-        By the scanner's clock. Units: s.
-    angle, range : (n,) array
-        From the zero beam in the scan plane. Units: rad, m.
-    intensity : (n,) array
-        Scaled to 16 bits, as in LAS files.
-    incidence : (n,) array
-        Cosine of the angle between beam and surface normal.
-    kept : (n,) bool array
-        False for returns that got lost.
-    """
-
-    gps_time: np.ndarray
-    angle: np.ndarray
-    range: np.ndarray
-    intensity: np.ndarray
-    incidence: np.ndarray
-    kept: np.ndarray
-
-    def __len__(self):
-        return len(self.gps_time)
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A parameter of an effect: unit, how many numbers, limits, its usual size and the source."""
-
-    unit: str
-    largest: float  # of the absolute value; more is refused, because ...
-    why: str
-    typical: float | None = None
-    source: str = ""
-    count: int = 1
-    least: float | None = None  # None: as far below zero as above
-
-    def __str__(self):
-        return self.unit if self.count == 1 else f"{self.count} numbers in {self.unit}"
-
-    def checked(self, label, value):
-        """The value as a float, or as a tuple of several.
-
-        Raises ValueError, opening with the label, for what is no number or beyond the limits.
-        """
-        try:
-            numbers = np.asarray(value)
-        except ValueError:  # lists within lists
-            numbers = np.array(None)
-        shape = () if self.count == 1 else (self.count,)
-        if numbers.dtype.kind not in "iuf" or numbers.shape != shape:
-            raise ValueError(f"{label} of {value!r} can't be used: it must be {self._wanted}.")
-        if not np.isfinite(numbers).all():
-            raise ValueError(f"{label} of {value!r} is not finite; it must be {self._wanted}.")
-        worst = float(numbers.flat[np.argmax(np.abs(numbers))])
-        if abs(worst) > self.largest:
-            raise ValueError(
-                f"{label} of {worst:g} {self.unit} exceeds {self.largest:g} {self.unit}; "
-                f"{self.why}."
-            )
-        if self.least is not None and numbers.min() < self.least:
-            raise ValueError(
-                f"{label} of {numbers.min():g} {self.unit} is less than {self.least:g} {self.unit}."
-            )
-        return float(numbers) if self.count == 1 else tuple(map(float, numbers))
-
-    @property
-    def _wanted(self):
-        return f"one number in {self.unit}" if self.count == 1 else str(self)
-
-
-def quantity(unit, largest, why, default=None, **more):
-    """A dataclass field that is a Quantity; required unless it has a default."""
-    metadata = {"quantity": Quantity(unit, largest, why, **more)}
-    return field(default=MISSING if default is None else default, metadata=metadata)
+from mlscorr.effects.quantity import Quantity
+from mlscorr.effects.stages import STAGES, Reference
+from mlscorr.effects.wording import SizeEstimate, amplitude, known, size, vector
 
 
 @dataclass(frozen=True)
 class Effect:
     """An imperfection that turns what is true into what is recorded, at its stage alone.
 
-    A subclass says name and stage, its parameters (one of them the magnitude) and the change.
-    A magnitude of zero returns the very value that came in. ``random`` ones draw from rng.
-    Raises ValueError for parameters that no survey can have.
+    A subclass is a frozen dataclass too, and says everything about itself in what follows.
+    ``_error`` is what it adds to the field of its stage's value, recorded = true + error; where it
+    does more than add, it has ``_change``. A magnitude of zero changes nothing.
+
+    Parameters
+    ----------
+    magnitude : float or tuple of float
+        By ``quantity``: its unit, limits, usual size and the source of that. Parameters ``time``
+        and ``width`` (s, from Reference.start) make it an event, ``phase`` (rad) a wave, of which
+        both quadratures are estimated, and ``target`` an error of the target of that name.
+    name : str
+        In files, of the class, as all that follow.
+    stage : str
+        Of STAGES.
+    title : str
+        For tables.
+    meaning : str
+        What it is, in a sentence.
+    sentence : str
+        Of a verdict: {size} stands for the number, {side} for its direction, {where} for the place
+        or the time.
+    remedy : str
+        What a surveyor can do about it.
+    random : bool
+        Whether it draws from a random stream.
+    sides : tuple of str, or of pairs of str
+        Words for above and below zero; of a vector, a pair for each part.
+    parts : tuple of str
+        Names of the parts of the magnitude, where a diagnosis estimates more than one.
+    worded_unit : str
+        Of the size in the sentence, where the magnitude's own would be misread.
+
+    Raises
+    ------
+    ValueError
+        For parameters that no survey can have.
     """
+
+    magnitude: float | tuple[float, ...]
 
     name: ClassVar[str]
     stage: ClassVar[str]
+    title: ClassVar[str]
+    meaning: ClassVar[str]
+    sentence: ClassVar[str]
+    remedy: ClassVar[str]
     random: ClassVar[bool] = False
+    sides: ClassVar[tuple] = ("", "")
+    parts: ClassVar[tuple[str, ...]] = ("magnitude",)
+    worded_unit: ClassVar[str] = ""
 
     def __post_init__(self):
         for name, kind in self.quantities().items():
             label = self.name if name == "magnitude" else f"{name} of {self.name}"
             object.__setattr__(self, name, kind.checked(label, getattr(self, name)))
 
-    @classmethod
-    def quantities(cls):
-        """The Quantity of each parameter that is a number, by the parameter's name."""
-        return {f.name: f.metadata["quantity"] for f in fields(cls) if "quantity" in f.metadata}
+    # ---- how it changes the survey
 
     @property
-    def is_nothing(self):
+    def is_nothing(self) -> bool:
         """Whether the magnitude is zero."""
         return not np.any(self.magnitude)
 
-    def apply(self, value, reference, rng=None):
-        """The value of this stage as recorded: an object of the same type."""
+    def apply(
+        self, value: Any, reference: Reference, rng: np.random.Generator | None = None
+    ) -> Any:
+        """The value of this stage as recorded: an object of the same type.
+
+        Parameters
+        ----------
+        value
+            As it is without the effect; see the table of stages in mlscorr.effects.
+        reference : Reference
+        rng : numpy.random.Generator, optional
+            Of a random effect.
+        """
         return value if self.is_nothing else self._change(value, reference, rng)
 
     def _change(self, value, reference, rng):
-        raise NotImplementedError
+        """As apply, of a magnitude that is not zero."""
+        name = STAGES[self.stage]
+        return replace(value, **{name: getattr(value, name) + self._error(value, reference, rng)})
+
+    def _error(self, value, reference, rng):
+        """What is added to the field of the stage's value that STAGES names."""
+        raise NotImplementedError(f"{type(self).__name__} has neither _error nor _change.")
+
+    def document(self) -> dict[str, Any]:
+        """Name and parameters, as scenario.toml has them."""
+        return {"name": self.name, **asdict(self)}
+
+    # ---- how it enters an observation
+
+    @classmethod
+    def quantities(cls) -> dict[str, Quantity]:
+        """The Quantity of each parameter that is a number, by the parameter's name."""
+        return {f.name: f.metadata["quantity"] for f in fields(cls) if "quantity" in f.metadata}
+
+    @classmethod
+    def circumstances(cls) -> tuple[str, ...]:
+        """Names of the parameters that must be known besides the magnitude: when, where."""
+        required = (f.name for f in fields(cls) if f.default is MISSING)
+        return tuple(name for name in required if name != "magnitude")
+
+    @classmethod
+    def moment(cls) -> tuple[str, ...]:
+        """Names of the parameters that say when an event acts; none of what acts always."""
+        return tuple(name for name in ("time", "width") if name in cls.circumstances())
+
+    @classmethod
+    def is_on_target(cls) -> bool:
+        """Whether it acts on one target alone, by the parameter ``target``."""
+        return "target" in cls.circumstances()
+
+    @classmethod
+    def is_wave(cls) -> bool:
+        """Whether it has a phase, and so two quadratures: magnitude cos(phase) and sin(phase)."""
+        return "phase" in cls.quantities()
+
+    @classmethod
+    def is_scatter(cls) -> bool:
+        """Whether it widens or thins out the points, so that no correction takes it off."""
+        return cls.random or cls.stage == "beam"
+
+    @classmethod
+    def is_of_pose(cls) -> bool:
+        """Whether it is noise of the POS, which all that is seen at a moment shares."""
+        return cls.random and cls.stage == "pos"
+
+    @classmethod
+    def needs_mounting(cls) -> bool:
+        """Whether nobody can tell what it does without the mounting, which gives the beams."""
+        return cls.stage in ("range", "angle", "mounting")
+
+    # ---- how a report says it
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """Names of all parameters that a diagnosis may give for it."""
+        return (*cls.parts, *cls.moment())
+
+    @classmethod
+    def describe(cls, parameters: dict[str, SizeEstimate], where: str = "") -> str:
+        """The sentence with its numbers; what it is, where there are none.
+
+        Parameters
+        ----------
+        parameters : dict of SizeEstimate
+            By name.
+        where : str
+            Where or when it acts, in words.
+        """
+        words = cls.size_in_words(parameters) if parameters else None
+        return cls.sentence.format(where=where, **words) if words else cls.meaning
+
+    @classmethod
+    def size_in_words(cls, parameters: dict[str, SizeEstimate]) -> dict[str, str] | None:
+        """What {size} and {side} of the sentence stand for; None where nobody knows.
+
+        Parameters
+        ----------
+        parameters : dict of SizeEstimate
+            By name.
+        """
+        if cls.is_wave():
+            return {"size": amplitude(parameters.values())}
+        if len(cls.parts) > 1:
+            return {"size": vector(parameters, cls.parts, cls.sides)}
+        number = parameters.get("magnitude")
+        if number is None or not known(number.estimate):
+            return None
+        words = size(abs(number.estimate), number.sigma, cls.worded_unit or number.unit)
+        return {"size": words, "side": cls.sides[number.estimate < 0]}

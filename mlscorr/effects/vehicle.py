@@ -1,4 +1,4 @@
-"""Effects of the vehicle: what the POS records, and the mounting of the scanner."""
+"""Effects on what the POS records."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -6,10 +6,11 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.effects.effect import Effect, quantity
-from mlscorr.survey import Mounting
+from mlscorr.effects.effect import Effect
+from mlscorr.effects.quantity import quantity
+from mlscorr.effects.stages import EAST_NORTH_UP, MAP
+from mlscorr.effects.wording import DASH, SizeEstimate, joined, known, size
 
-FIX_STEP = 1.0  # s between GNSS fixes, the paper's; the noise of each is its own
 GNSS_LOST = "a GNSS that far off is known to be lost"
 IN_TIME = "no survey is as long"
 
@@ -19,10 +20,25 @@ class HeadingDrift(Effect):
     """Heading error grows in each pass from zero at its first epoch to magnitude at its last.
 
     A pass is a part of the trajectory without gaps. Recorded heading = true + error, clockwise.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: deg.
     """
 
     name: ClassVar = "heading_drift"
     stage: ClassVar = "pos"
+    title: ClassVar = "Heading drift"
+    meaning: ClassVar = "The heading of the POS drifts away in the course of each pass."
+    sentence: ClassVar = (
+        "The heading of the POS drifts {side} by {size} from start to end of each pass."
+    )
+    remedy: ClassVar = (
+        "Process the trajectory again: a heading that drifts points to GNSS with too few turns,"
+        " or a gyro's bias."
+    )
+    sides: ClassVar = ("to the right", "to the left")
     magnitude: float = quantity(
         "deg",
         10.0,
@@ -33,8 +49,7 @@ class HeadingDrift(Effect):
 
     def _change(self, value, reference, rng):
         number = value.segment(value.gps_time)
-        start = np.append(value.gps_time[0], value.gaps[:, 1])[number]
-        end = np.append(value.gaps[:, 0], value.gps_time[-1])[number]
+        start, end = value.passes[number].T
         share = (value.gps_time - start) / np.where(end > start, end - start, 1.0)
         turn = np.zeros((len(value), 3))
         turn[:, 2] = -np.radians(self.magnitude) * share  # heading is clockwise, Z is up
@@ -45,11 +60,35 @@ class HeadingDrift(Effect):
 class PositionStep(Effect):
     """GNSS jumps: recorded = true + magnitude from a time on to the end of that pass.
 
-    The time counts from reference.start. Raises ValueError when it lies in no pass.
+    The time counts from reference.start.
+
+    Parameters
+    ----------
+    magnitude : 3 floats
+        Easting, northing and height. Units: m.
+    time : float
+        Of the event, from reference.start. Units: s.
+
+    Raises
+    ------
+    ValueError
+        When it lies in no pass.
     """
 
     name: ClassVar = "position_step"
     stage: ClassVar = "pos"
+    title: ClassVar = "GNSS jump"
+    meaning: ClassVar = (
+        "The recorded position jumps at one moment and stays off to the end of the pass."
+    )
+    sentence: ClassVar = (
+        "The recorded position jumps {size}{where}, and stays off to the end of the pass."
+    )
+    remedy: ClassVar = (
+        "Process the trajectory again; mlscorr correct takes such a drift out of the cloud."
+    )
+    sides: ClassVar = EAST_NORTH_UP
+    parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
         "m",
         20.0,
@@ -60,13 +99,13 @@ class PositionStep(Effect):
     )
     time: float = quantity("s", 86_400.0, IN_TIME, least=0.0)
 
-    def _change(self, value, reference, rng):
+    def _error(self, value, reference, rng):
         start = reference.start + self.time
         number = int(value.segment(start))
         if number < 0:
             raise ValueError(_outside(self, value, reference))
         hit = (value.gps_time >= start) & (value.segment(value.gps_time) == number)
-        return replace(value, position=value.position + hit[:, None] * np.array(self.magnitude))
+        return hit[:, None] * np.array(self.magnitude)
 
 
 @dataclass(frozen=True)
@@ -74,11 +113,37 @@ class PositionBump(Effect):
     """A bias comes and goes, as by multipath or a short outage, like a Gaussian in time.
 
     recorded = true + magnitude exp(-(t - time)^2 / (2 width^2)); the time counts from
-    reference.start, the width is one sigma. Raises ValueError when the time is in no pass.
+    reference.start, the width is one sigma.
+
+    Parameters
+    ----------
+    magnitude : 3 floats
+        Easting, northing and height. Units: m.
+    time : float
+        Of the event, from reference.start. Units: s.
+    width : float
+        One sigma of the Gaussian. Units: s.
+
+    Raises
+    ------
+    ValueError
+        When the time is in no pass.
     """
 
     name: ClassVar = "position_bump"
     stage: ClassVar = "pos"
+    title: ClassVar = "Passing GNSS error"
+    meaning: ClassVar = (
+        "The recorded position is off for a while, as by multipath or a short outage."
+    )
+    sentence: ClassVar = (
+        "The recorded position goes astray for a while{where}: {size} at the worst."
+    )
+    remedy: ClassVar = (
+        "Look at GNSS at that time; mlscorr correct takes such a drift out of the cloud."
+    )
+    sides: ClassVar = EAST_NORTH_UP
+    parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
         "m",
         20.0,
@@ -97,26 +162,40 @@ class PositionBump(Effect):
         source="estimate: a house front of 50-100 m passed at 8 m/s",
     )
 
-    def _change(self, value, reference, rng):
+    def _error(self, value, reference, rng):
         middle = reference.start + self.time
         if value.segment(middle) < 0:
             raise ValueError(_outside(self, value, reference))
         shape = np.exp(-0.5 * ((value.gps_time - middle) / self.width) ** 2)
-        return replace(value, position=value.position + shape[:, None] * np.array(self.magnitude))
+        return shape[:, None] * np.array(self.magnitude)
 
 
 @dataclass(frozen=True)
 class PositionNoise(Effect):
     """The position is noisier than its sigmas say: one more sigma, the same in E, N and H.
 
-    The noise is that of GNSS fixes, one a second; between two of them the weight of the one
-    falls as a cosine while the other's grows as a sine, so that the variance is the same at all
-    times. Correlation falls to 1/pi after one second and to nothing after two.
+    The noise is that of GNSS fixes, one a second as the paper's; between two of them the weight of
+    the first falls as a cosine while the other's grows as a sine, so that the variance is the same
+    at all times. Correlation falls to 1/pi after one second and to nothing after two.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: m.
     """
 
     name: ClassVar = "position_noise"
     stage: ClassVar = "pos"
     random: ClassVar = True
+    title: ClassVar = "Noisy positions"
+    meaning: ClassVar = (
+        "The recorded position is noisier, or drifts more, than its stated sigmas say."
+    )
+    sentence: ClassVar = "The positions of the POS are worse than their sigmas say: {size}."
+    remedy: ClassVar = (
+        "Run mlscorr correct, which takes the drift out of the cloud; tell it how well the POS "
+        "is known with the sigmas found."
+    )
     magnitude: float = quantity(
         "m",
         10.0,
@@ -126,55 +205,56 @@ class PositionNoise(Effect):
         least=0.0,
     )
 
-    def _change(self, value, reference, rng):
-        fixes = (value.gps_time - value.gps_time[0]) / FIX_STEP
+    # what a diagnosis says of it besides: of all sigmas, or of windows in which they are larger
+    FACTOR: ClassVar = "factor on sigma"
+    WINDOW: ClassVar = ("start", "length", "largest sigma over the stated")
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """See Effect; those of windows may be numbered."""
+        return (*cls.parts, cls.FACTOR, *cls.WINDOW)
+
+    @classmethod
+    def size_in_words(cls, parameters: dict[str, SizeEstimate]) -> dict[str, str]:
+        """By how much a POS is worse than it says: at all times, or in windows.
+
+        >>> window = {"start": 413205.0, "length": 20.0, "largest sigma over the stated": 12.0}
+        >>> window = {name: SizeEstimate(value, None, "") for name, value in window.items()}
+        >>> PositionNoise.size_in_words(window)
+        {'size': 'up to 12 times as large between gps_time 413205 s and 413225 s'}
+        """
+        if cls.FACTOR in parameters:
+            estimate, sigma, _ = parameters[cls.FACTOR]
+            return {"size": f"{size(estimate, sigma, '')} times as large"}
+        if "magnitude" in parameters:
+            estimate, sigma, unit = parameters["magnitude"]
+            value = abs(estimate) if known(estimate) else None
+            return {"size": f"{size(value, sigma, unit)} of scatter come on top"}
+        return {"size": cls._windows_in_words(parameters)}
+
+    @classmethod
+    def _windows_in_words(cls, parameters):
+        """Two windows with their times, and how many others there are."""
+        starts, lengths, factors = (
+            [number.estimate for name, number in parameters.items() if name.startswith(key)]
+            for key in cls.WINDOW
+        )
+        if not starts or not all(map(known, [*starts, *lengths, *factors])):
+            return DASH
+        spans = [
+            f"between gps_time {start:.0f} s and {start + length:.0f} s"
+            for start, length in zip(starts, lengths, strict=True)
+        ]
+        left = len(spans) - 2
+        more = ["once more"] if left == 1 else [f"{left} times more"] if left > 1 else []
+        return f"up to {max(factors):.0f} times as large {joined([*spans[:2], *more])}"
+
+    def _error(self, value, reference, rng):
+        fixes = value.gps_time - value.gps_time[0]  # one a second
         before = np.floor(fixes).astype(int)
         angle = 0.5 * np.pi * (fixes - before)[:, None]
         noise = self.magnitude * rng.standard_normal((before[-1] + 2, 3))
-        mixed = np.cos(angle) * noise[before] + np.sin(angle) * noise[before + 1]
-        return replace(value, position=value.position + mixed)
-
-
-@dataclass(frozen=True)
-class Boresight(Effect):
-    """The recorded boresight lacks a small rotation: R_true = Exp(magnitude) R_recorded.
-
-    About the body axes right, forward, up (Mao et al. 2015, Eq. 2).
-    """
-
-    name: ClassVar = "boresight"
-    stage: ClassVar = "mounting"
-    magnitude: tuple[float, float, float] = quantity(
-        "deg",
-        10.0,
-        "a mounting is known from its drawing to a degree",
-        count=3,
-        typical=0.05,
-        source="Mao et al. 2015, Table 6: 0.03, 0.06 and 0.21 deg",
-    )
-
-    def _change(self, value, reference, rng):
-        turn = Rotation.from_rotvec(self.magnitude, degrees=True)
-        return Mounting(value.lever_arm, turn.inv() * value.boresight)
-
-
-@dataclass(frozen=True)
-class LeverArm(Effect):
-    """The recorded lever arm lacks magnitude: true = recorded + magnitude, in the body frame."""
-
-    name: ClassVar = "lever_arm"
-    stage: ClassVar = "mounting"
-    magnitude: tuple[float, float, float] = quantity(
-        "m",
-        5.0,
-        "no car is larger",
-        count=3,
-        typical=0.02,
-        source="Mao et al. 2015, Table 6: 0.0005, 0.015 and 0.065 m",
-    )
-
-    def _change(self, value, reference, rng):
-        return Mounting(value.lever_arm - np.array(self.magnitude), value.boresight)
+        return np.cos(angle) * noise[before] + np.sin(angle) * noise[before + 1]
 
 
 def _outside(effect, trajectory, reference):

@@ -1,11 +1,6 @@
-"""Simulated surveys: a street, a drive, scanners, a POS, and their errors.
+"""Simulated surveys: a street, a drive, scanners, a POS, and their errors."""
 
-The package is called as the function it is about: ``mlscorr.simulate(scenario, rng)``.
-"""
-
-import sys
 from importlib import import_module
-from types import ModuleType
 
 from mlscorr.simulate.scenario import DEMO, Scenario
 
@@ -22,14 +17,3 @@ def __getattr__(name):
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'mlscorr.simulate' has no attribute '{name}'")
-
-
-class _Simulate(ModuleType):
-    """This package, callable."""
-
-    def __call__(self, scenario, rng):
-        """SimulatedSurvey of a scenario, as mlscorr.simulate.simulate makes it."""
-        return self.simulate(scenario, rng)
-
-
-sys.modules[__name__].__class__ = _Simulate

@@ -1,27 +1,38 @@
 """What POS, scanner and surveyor record of the truth, with the effects that act on it."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
-from mlscorr.effects import Returns, apply_effects, effect_streams
-from mlscorr.simulate.noise import noise_streams
-from mlscorr.simulate.parallel import pool
-from mlscorr.simulate.pos_error import pos_error, record
-from mlscorr.simulate.scene import sky_elevation
+from mlscorr.effects import Reference, Returns, apply_effects, effect_streams
+from mlscorr.simulate.pos import pos_error, record
+from mlscorr.simulate.scan import Shots, noise_streams, pool
+from mlscorr.simulate.scenario import ScannerScenario, Scenario, TargetScenario
+from mlscorr.simulate.scene import Scene, Targets, sky_elevation
 from mlscorr.survey import ControlPoints, Mounting, Trajectory
 
 CHANGES = {"clock": "gps_time", "angle": "angle", "range": "range", "return": "kept"}  # by stage
 ON_PULSES = ("clock", "angle")  # at which all echoes of a pulse are one
 
 
-def disturb(shots, effects, reference, streams):
+def disturb(shots: Shots, effects: tuple, reference: Reference, streams: tuple) -> Shots:
     """Shots after the effects on clock, angle, range and return.
 
-    Each stage sees what the scanner measured, and changes what it declares. Rows of first echoes
+    Each stage sees what the scanner measured, and changes what it declares. Columns of first echoes
     are all there, seen or not, and later echoes have streams of their own, so that what one effect
     draws doesn't depend on another.
+
+    Parameters
+    ----------
+    shots : Shots
+    effects : tuple of Effect
+    reference : Reference
+        Of the effects.
+    streams : pair of dict
+        Random streams of the effects, on first and on later echoes.
     """
     first, later = (
         Returns(*(getattr(shots, name)[rows] for name in Returns.__dataclass_fields__))
@@ -43,8 +54,18 @@ def disturb(shots, effects, reference, streams):
     return replace(shots, **{CHANGES[stage]: values for stage, values in changed})
 
 
-def recorded_passes(scenario, scene, true_passes, rng):
-    """What the POS records of each pass."""
+def recorded_passes(
+    scenario: Scenario, scene: Scene, true_passes: tuple[Trajectory, ...], rng: Generator
+) -> list[Trajectory]:
+    """What the POS records of each pass.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    scene : Scene
+    true_passes : tuple of Trajectory
+    rng : Generator
+    """
     start = true_passes[0].gps_time[0]
     passes = []
     for true, pass_rng in zip(true_passes, rng.spawn(len(true_passes)), strict=True):
@@ -55,8 +76,20 @@ def recorded_passes(scenario, scene, true_passes, rng):
     return passes
 
 
-def streams_by_file(passes, scanners, scan_rng, effect_rng):
-    """Random streams by file name: a scanner's noise, effects on first and on later echoes."""
+def streams_by_file(passes: int, scanners: int, scan_rng: Generator, effect_rng: Generator) -> dict:
+    """Random streams by file name: a scanner's noise, effects on first and on later echoes.
+
+    Parameters
+    ----------
+    passes : int
+        Number of passes.
+    scanners : int
+        Number of scanners.
+    scan_rng : Generator
+        For their noise.
+    effect_rng : Generator
+        For the effects.
+    """
     streams = {}
     for number, (noise, effect) in enumerate(
         zip(scan_rng.spawn(passes), effect_rng.spawn(passes), strict=True), start=1
@@ -69,15 +102,27 @@ def streams_by_file(passes, scanners, scan_rng, effect_rng):
     return streams
 
 
-def true_mounting(scanner):
+def true_mounting(scanner: ScannerScenario) -> Mounting:
+    """Mounting of a ScannerScenario.
+
+    Parameters
+    ----------
+    scanner : ScannerScenario
+    """
     return Mounting(
         np.array(scanner.lever_arm),
         Rotation.from_euler("xyz", scanner.boresight, degrees=True),
     )
 
 
-def join_passes(passes):
-    """One Trajectory of several that follow each other in time."""
+def join_passes(passes: Sequence[Trajectory]) -> Trajectory:
+    """One Trajectory of several that follow each other in time.
+
+    Parameters
+    ----------
+    passes : sequence of Trajectory
+        In the order of time.
+    """
     if len(passes) == 1:
         return passes[0]
 
@@ -94,8 +139,15 @@ def join_passes(passes):
     )
 
 
-def split_passes(trajectory, lengths):
-    """The passes of a joined Trajectory, by their numbers of epochs."""
+def split_passes(trajectory: Trajectory, lengths: Iterable[int]) -> tuple[Trajectory, ...]:
+    """The passes of a joined Trajectory, by their numbers of epochs.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    lengths : iterable of int
+        Epochs of each pass.
+    """
 
     def part(rows):
         sigmas = (trajectory.position_sigma, trajectory.attitude_sigma)
@@ -111,8 +163,19 @@ def split_passes(trajectory, lengths):
     return tuple(part(slice(end - n, end)) for end, n in zip(ends, lengths, strict=True))
 
 
-def surveyed_targets(targets, centre, scenario, rng):
-    """ControlPoints of all targets, with the noise of the survey."""
+def surveyed_targets(
+    targets: Targets, centre: np.ndarray, scenario: TargetScenario, rng: Generator
+) -> ControlPoints:
+    """ControlPoints of all targets, with the noise of the survey.
+
+    Parameters
+    ----------
+    targets : Targets
+    centre : (n, 3) array
+        True map coordinates. Units: m.
+    scenario : TargetScenario
+    rng : Generator
+    """
     n = len(targets)
     horizontal, vertical = scenario.survey_sigma
     sigma = np.tile([horizontal, horizontal, vertical], (n, 1))
@@ -126,8 +189,16 @@ def surveyed_targets(targets, centre, scenario, rng):
     )
 
 
-def spread_checks(count, check):
-    """Which of the targets are check points: evenly among them, not at the ends, (count,) bool."""
+def spread_checks(count: int, check: int) -> np.ndarray:
+    """Which of the targets are check points: evenly among them, not at the ends, (count,) bool.
+
+    Parameters
+    ----------
+    count : int
+        Of all targets.
+    check : int
+        Of check points.
+    """
     is_check = np.zeros(count, dtype=bool)
     is_check[((np.arange(check) + 0.5) * count / max(check, 1)).astype(int)] = True
     return is_check

@@ -8,9 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from mlscorr.effects import in_order, make_effect
-
-LEAD = 0.05  # s of trajectory before the first and after the last pulse of a pass
+from mlscorr.effects import Effect, in_order, make_effect
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -85,7 +83,7 @@ class DriveScenario(_Part):
 
 
 class ScannerScenario(_Part):
-    """A line scanner, or a spinning one with several rings; mounting of its own."""
+    """A line scanner, or a spinning one with spans_of_key rings; mounting of its own."""
 
     kind: Literal["line", "spinning"] = "line"
     lever_arm: Vector = (0.10, -0.60, 0.40)  # right, forward, up
@@ -121,13 +119,13 @@ class EffectScenario(_Part):
     name: str
 
     @property
-    def effect(self):
+    def effect(self) -> Effect:
         """The effect as a value: an Effect of mlscorr.effects."""
-        return make_effect(self.name, **self.model_extra)
+        return make_effect(self.name, **(self.model_extra or {}))
 
     @model_validator(mode="after")
     def _is_known(self):
-        make_effect(self.name, **self.model_extra)  # refuses what no survey can have
+        make_effect(self.name, **(self.model_extra or {}))  # refuses what no survey can have
         return self
 
 
@@ -146,12 +144,12 @@ class Scenario(_Part):
     effects: tuple[EffectScenario, ...] = ()
 
     @property
-    def imperfections(self):
+    def imperfections(self) -> tuple[Effect, ...]:
         """The effects as values (tuple of Effect), in the order in which they act."""
         return in_order(effect.effect for effect in self.effects)
 
     @property
-    def end(self):
+    def end(self) -> float | None:
         """When the last pass ends, from the start of the drive, at most; None for a given file."""
         if self.drive.file is not None:
             return None
@@ -164,9 +162,9 @@ class Scenario(_Part):
         spans = [("drive.stops", self.drive.stops)]
         spans += [("pos.outages", self.pos.outages), ("pos.canyons", self.pos.canyons)]
         events = [(f"{key} of {length:g} s from", start, start + length)
-                  for key, several in spans for start, length in several]  # fmt: skip
+                  for key, spans_of_key in spans for start, length in spans_of_key]  # fmt: skip
         events += [(f"{e.name} at", e.time, e.time) for e in self.imperfections
-                   if hasattr(e, "time")]  # fmt: skip
+                   if e.moment()]  # fmt: skip
         for what, start, end in events:
             if self.end is not None and end > self.end:
                 raise ValueError(f"{what} {start:g} s lies outside the drive of {self.end:g} s")

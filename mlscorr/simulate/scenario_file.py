@@ -2,23 +2,24 @@
 
 from pathlib import Path
 
-from mlscorr.io.settings import read_settings_file
+from mlscorr.io.toml_file import read_toml
 from mlscorr.simulate.scenario import Scenario
 
 FILES = (("scene", "file"), ("drive", "file"), ("pos", "error_file"))  # that a scenario may name
 
 
-def read_scenario(path):
+def read_scenario(path: Path | str) -> Scenario:
     """Scenario of a TOML file; the files it names stand relative to it.
 
     Raises ValueError for bad TOML, unknown keys (with the nearest known one) and values that no
     survey can have; FileNotFoundError for files that aren't there.
+
+    Parameters
+    ----------
+    path : path
     """
     path = Path(path)
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "does not exist"
-        raise FileNotFoundError(f"{path} {what}; a scenario is a TOML file.")
-    scenario = read_settings_file(path, Scenario)
+    scenario = read_toml(path, Scenario, "a scenario")
     for part, key in FILES:
         section = getattr(scenario, part)
         if (name := getattr(section, key)) is None:
@@ -32,7 +33,12 @@ def read_scenario(path):
     return scenario
 
 
-def scenario_files(scenario):
-    """Paths of the files that a scenario names, which a simulation must not overwrite."""
+def scenario_files(scenario: Scenario) -> list[Path]:
+    """Paths of the files that a scenario names, which a simulation must not overwrite.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    """
     named = (getattr(getattr(scenario, part), key) for part, key in FILES)
     return [file for file in named if file is not None]

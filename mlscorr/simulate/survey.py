@@ -1,15 +1,16 @@
 """A whole survey, simulated: what was recorded, and the truth behind it."""
 
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
+from numpy.random import Generator
 
 from mlscorr.effects import Reference, apply_effects, effect_streams
 from mlscorr.simulate.drive import drive
-from mlscorr.simulate.echoes import Surfaces
-from mlscorr.simulate.rays import Platform
 from mlscorr.simulate.recording import (
     disturb,
     join_passes,
@@ -20,24 +21,23 @@ from mlscorr.simulate.recording import (
     surveyed_targets,
     true_mounting,
 )
-from mlscorr.simulate.scanner import Pulses, pulses_of_a_pass, shoot
+from mlscorr.simulate.scan import MeasuredPulses, Platform, Surfaces, pulses_of_a_pass, shoot
 from mlscorr.simulate.scenario import Scenario
-from mlscorr.simulate.scene import Scene, build_scene
-from mlscorr.simulate.shapes import Mesh
-from mlscorr.simulate.static_scan import static_scan
+from mlscorr.simulate.scene import Mesh, Scene, build_scene, static_scan
 from mlscorr.survey import ControlPoints, Mounting, PointCloud, Trajectory
 
 STREAMS = 7  # drive, scene, scan, POS, control, effects, reference: each leaves all others
 
 
 @dataclass(frozen=True)
-class Block:
+class PulseBlock:
     """Some pulses of one pass and scanner: as measured, and as georeferenced with what was
-    recorded. Of ``fired`` pulses, ``pulses`` are the returns and ``cloud`` their points."""
+    recorded. Of ``fired`` pulses, ``pulses`` are the returns and ``cloud`` their points.
+    """
 
     file: str
     fired: int
-    pulses: Pulses
+    pulses: MeasuredPulses
     cloud: PointCloud
 
 
@@ -89,27 +89,27 @@ class SimulatedSurvey:
     static_scan: Mesh | None = None
 
     @cached_property
-    def true_trajectory(self):
+    def true_trajectory(self) -> Trajectory:
         """The true trajectory of all passes; between them are gaps."""
         return join_passes(self.true_passes)
 
     @cached_property
-    def trajectory(self):
+    def trajectory(self) -> Trajectory:
         """The recorded trajectory of all passes; between them are gaps."""
         return join_passes(self.passes)
 
     @property
-    def mounting(self):
+    def mounting(self) -> Mounting:
         """The first scanner's recorded Mounting."""
         return self.mountings[0]
 
     @property
-    def files(self):
+    def files(self) -> tuple[str, ...]:
         """Names of the cloud files, in the order in which they are written."""
         return tuple(self.streams)
 
     @property
-    def fired(self):
+    def fired(self) -> int:
         """Number of pulses that all scanners fire on all passes."""
         return sum(
             pulses_of_a_pass(trajectory, scanner)
@@ -118,11 +118,11 @@ class SimulatedSurvey:
         )
 
     @cached_property
-    def surfaces(self):
+    def surfaces(self) -> Surfaces:
         """The scene as rays meet it."""
         return Surfaces(self.scene.mesh)
 
-    def blocks(self, **size):
+    def blocks(self, **size: int) -> Iterator[PulseBlock]:
         """Blocks of all files in turn, each file in time order; any number of times the same."""
         scanners = len(self.scenario.scanner)
         for number, file in enumerate(self.files):
@@ -138,7 +138,7 @@ class SimulatedSurvey:
             self.effects, "beam", 1e-3 * scanner.beam_divergence, self.reference, self.beam_streams
         )
         recorded = Platform.of(self.passes[number], self.mountings[k], origin)
-        for shots in shoot(
+        for undisturbed in shoot(
             self.surfaces,
             origin,
             self.true_passes[number],
@@ -148,7 +148,7 @@ class SimulatedSurvey:
             divergence,
             **size,
         ):
-            shots = disturb(shots, self.effects, self.reference, streams)
+            shots = disturb(undisturbed, self.effects, self.reference, streams)
             # what a wrong clock puts outside the trajectory, no one can georeference
             shots.kept[recorded.outside(shots.gps_time)] = False
             pulses = shots.pulses()
@@ -156,38 +156,65 @@ class SimulatedSurvey:
                 pulses.gps_time, pulses.angle, pulses.elevation, pulses.range, origin
             )
             cloud = PointCloud(xyz, pulses.gps_time, pulses.intensity)
-            yield Block(file, shots.fired, pulses, cloud)
+            yield PulseBlock(file, shots.fired, pulses, cloud)
 
     @cached_property
-    def pulses(self):
-        """Pulses of all files; for small surveys."""
-        return Pulses.concatenate([block.pulses for block in self.blocks()])
+    def pulses(self) -> MeasuredPulses:
+        """MeasuredPulses of all files; for small surveys."""
+        return MeasuredPulses.concatenate([block.pulses for block in self.blocks()])
 
     @cached_property
-    def cloud(self):
+    def cloud(self) -> PointCloud:
         """PointCloud of all files, georeferenced with what was recorded; for small surveys."""
         return PointCloud.concatenate([block.cloud for block in self.blocks()])
 
     @property
-    def target(self):
+    def target(self) -> np.ndarray:
         """Which target each point of the cloud truly lies on, board included; -1 for none."""
         return self.scene.target[self.pulses.triangle]
 
-    def write(self, folder, progress=None):
+    def write(
+        self, folder: Path | str, progress: Callable | None = None, overwrite: bool = True
+    ) -> None:
         """Write the survey folder, whole or not at all: survey.toml, clouds, trajectory, control,
         and the truth. ``progress(title, total)`` returns a function of what was just done: pulses
         first, then bytes of their truth.
 
         Raises ValueError when a scanner met nothing on a pass; OSError when writing fails.
+
+        Parameters
+        ----------
+        folder : path
+        progress : function, optional
+            Of a title and a total; returns one of what was just done.
+        overwrite : bool
+            Whether files of the same name are replaced.
+
+        Raises
+        ------
+        ValueError
+            A scanner that met nothing on a pass.
         """
         from mlscorr.simulate.write import write_survey
 
-        write_survey(self, folder, progress)
+        write_survey(self, folder, progress, overwrite)
 
 
-def simulate(scenario, rng):
+def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     """SimulatedSurvey of a scenario; every stage has its own random stream.
 
+    Parameters
+    ----------
+    scenario : Scenario
+    rng : Generator
+
+    Raises
+    ------
+    ValueError
+        A scenario that no survey can have.
+
+    Examples
+    --------
     >>> from mlscorr.simulate.scenario import DriveScenario, ScannerScenario, TargetScenario
     >>> short = Scenario(
     ...     drive=DriveScenario(duration=8.0),

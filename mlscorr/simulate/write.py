@@ -1,32 +1,51 @@
 """The folder of a simulated survey: what was recorded, as the readers expect it, and the truth."""
 
 import json
+from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import date
 from itertools import groupby
+from pathlib import Path
 
 import numpy as np
+import tomlkit
 
+from mlscorr.frames import angles_from_attitude
 from mlscorr.io.las_writer import cloud_writer
-from mlscorr.io.npz import npz_writer
+from mlscorr.io.npz import NpzWriter
 from mlscorr.io.output import output_folder
 from mlscorr.io.ply import write_ply
 from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.survey import Pos, angles_from_attitude
+from mlscorr.simulate.survey import SimulatedSurvey
+from mlscorr.survey import Pos
 
 REFERENCE = "reference.ply"
-ROUNDING = 1e-4  # m, of control.csv: no coordinate in it is better
 CREATED = date(2015, 1, 1)  # in the LAS header, so that a seed gives the same bytes on any day
 
 
-def write_survey(survey, folder, progress=None):
-    """Write a SimulatedSurvey, whole or not at all; see SimulatedSurvey.write."""
-    progress = progress or _silent
+def write_survey(
+    survey: SimulatedSurvey,
+    folder: Path | str,
+    progress: Callable | None = None,
+    overwrite: bool = True,
+) -> None:
+    """Write a SimulatedSurvey, whole or not at all; see SimulatedSurvey.write.
+
+    Parameters
+    ----------
+    survey : SimulatedSurvey
+    folder : path
+    progress : function, optional
+        As of SimulatedSurvey.write.
+    overwrite : bool
+        Whether files of the same name are replaced.
+    """
+    progress = progress or (lambda *_: lambda _done: None)
     done = progress("Simulating pulses", survey.fired)
-    with _disk_errors(folder), output_folder(folder) as part:
+    with _disk_errors(folder), output_folder(folder, overwrite=overwrite) as part:
         points = {}
-        with npz_writer(part / "truth.npz") as truth:
+        with NpzWriter(part / "truth.npz") as truth:
             for file, blocks in groupby(survey.blocks(), key=lambda block: block.file):
                 points[file] = _write_cloud(part / file, survey, blocks, truth, done)
             for name, array in _truth_arrays(survey).items():
@@ -37,12 +56,8 @@ def write_survey(survey, folder, progress=None):
         if survey.static_scan is not None:
             origin = np.array(survey.scenario.origin)
             write_ply(part / REFERENCE, survey.static_scan.triangles + origin)
-        (part / "survey.toml").write_text(_survey_toml(survey))
+        (part / "survey.toml").write_text(_survey_toml(survey), encoding="utf-8")
         (part / "truth.json").write_text(json.dumps(_truth(survey, points), indent=1) + "\n")
-
-
-def _silent(title, total):
-    return lambda done: None
 
 
 @contextmanager
@@ -105,7 +120,7 @@ def _truth(survey, points):
     return {
         "effect": "+".join(dict(effects)) or "none",
         "params": single,
-        "effects": [{"name": name, **parameters} for name, parameters in effects],
+        "effects": [effect.document() for effect in survey.effects],
         "seed": survey.seed,
         "points": points,
         "mountings": {
@@ -132,7 +147,7 @@ def _control_csv(survey):
     for i, name in enumerate(t.name):
         place = ",".join(f"{v:.4f}" for v in t.position[i])
         role = "check" if survey.is_check[i] else "control"
-        horizontal, vertical = np.maximum(t.sigma[i, [0, 2]], ROUNDING)
+        horizontal, vertical = np.maximum(t.sigma[i, [0, 2]], 1e-4)  # m, the rounding here
         rows.append(f"{name},{place},{horizontal},{vertical},{t.kind[i]},{t.size[i]},{role}")
     return "\n".join(rows) + "\n"
 
@@ -140,43 +155,35 @@ def _control_csv(survey):
 def _survey_toml(survey):
     """survey.toml, with the first scanner's mounting and what is believed of scanner and POS."""
     scenario, scanner = survey.scenario, survey.scenario.scanner[0]
-    mounting = _mounting(survey.mounting)
     noise = {"range_noise": scanner.range_noise, "angle_noise": scanner.angle_noise}
-    believed = [f"{name} = {sigma}" for name, sigma in noise.items() if sigma > 0]
     position, attitude = _pos_sigmas(survey.trajectory)
-    others = "".join(
-        f"# pass-N-scanner-{k}.laz: lever_arm = {m['lever_arm']}, boresight = {m['boresight']}\n"
-        for k, m in enumerate(map(_mounting, survey.mountings[1:]), start=2)
-    )
-    lines = "\n".join([*believed, f"lines_per_second = {scanner.lines_per_second}"])
-    given = survey.static_scan is not None
-    scene = f"\n[scene]\nreference = {json.dumps(REFERENCE)}\n" if given else ""
-    return f"""\
-name = {json.dumps(scenario.name)}
-crs = {json.dumps(scenario.crs)}
+    sections = {
+        "name": scenario.name,
+        "crs": scenario.crs,
+        "cloud": {"files": list(survey.files), "gps_time": "week"},
+        "trajectory": {"file": "trajectory.csv"},
+        "mounting": _mounting_section(survey.mountings),
+        "control": {"file": "control.csv"},
+        "scanner": {name: sigma for name, sigma in noise.items() if sigma > 0}
+        | {"lines_per_second": scanner.lines_per_second},
+        "pos": {
+            "position_sigma": position,
+            "attitude_sigma": attitude,
+            "correlation_time": Pos.correlation_time,
+        },
+    }
+    if survey.static_scan is not None:
+        sections["scene"] = {"reference": REFERENCE}
+    return tomlkit.dumps(sections)
 
-[cloud]
-files = {json.dumps(list(survey.files))}
-gps_time = "week"
 
-[trajectory]
-file = "trajectory.csv"
-
-[mounting]
-lever_arm = {mounting["lever_arm"]}
-boresight = {mounting["boresight"]}
-{others}
-[control]
-file = "control.csv"
-
-[scanner]
-{lines}
-
-[pos]
-position_sigma = {position}
-attitude_sigma = {attitude}
-correlation_time = {Pos.correlation_time}
-{scene}"""
+def _mounting_section(mountings):
+    """The first scanner's mounting, and in comments those of the others."""
+    section = tomlkit.item(_mounting(mountings[0]))
+    for k, other in enumerate(map(_mounting, mountings[1:]), start=2):
+        values = ", ".join(f"{key} = {value}" for key, value in other.items())
+        section.add(tomlkit.comment(f"pass-N-scanner-{k}.laz: {values}"))
+    return section
 
 
 def _pos_sigmas(trajectory):

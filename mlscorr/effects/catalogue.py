@@ -1,0 +1,243 @@
+"""All known effects: making them by their names, and applying them in their order."""
+
+from collections.abc import Iterable
+from dataclasses import MISSING, fields
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from mlscorr.effects import control, encoder, mounting, ranging, timing, vehicle
+from mlscorr.effects.effect import Effect
+from mlscorr.effects.stages import STAGES, Reference
+
+EFFECTS = (  # by stage; within one, in the order in which they act
+    ranging.BeamDivergence,
+    timing.TimeOffset,
+    timing.ClockDrift,
+    timing.TimeJitter,
+    ranging.RangeScale,
+    ranging.RangeBias,
+    ranging.RangeWalk,
+    ranging.IncidenceBias,
+    ranging.RangeNoise,
+    encoder.AngleScale,
+    encoder.AngleEccentricity,
+    encoder.AngleNoise,
+    ranging.Dropout,
+    vehicle.HeadingDrift,
+    vehicle.PositionStep,
+    vehicle.PositionBump,
+    vehicle.PositionNoise,
+    mounting.Boresight,
+    mounting.LeverArm,
+    control.MapRotation,
+    control.MapScale,
+    control.HorizontalDatum,
+    control.VerticalDatum,
+    control.TargetOutlier,
+)
+_registered: dict[str, type[Effect]] = {}  # a user's own, which act after these
+
+
+def register(kind: type[Effect]) -> type[Effect]:
+    """Make an effect of one's own known by its name, to simulator, diagnosis and report.
+
+    Parameters
+    ----------
+    kind : class of an Effect
+        A frozen dataclass that says all that Effect asks for. Another of its name takes the place
+        of one that was registered before.
+
+    Returns
+    -------
+    class of an Effect
+        The same, so that this serves as a decorator.
+
+    Raises
+    ------
+    ValueError
+        For what it doesn't say of itself, or a name that an effect of this library has.
+
+    Notes
+    -----
+    A drive that lifts the body by the square of its speed, for all that run in this process::
+
+        @register
+        @dataclass(frozen=True)
+        class Squat(Effect):
+            "The body rises with the square of the speed: recorded = true + magnitude v^2."
+
+            name: ClassVar = "squat"
+            stage: ClassVar = "pos"
+            title: ClassVar = "Squatting vehicle"
+            meaning: ClassVar = "The body of the vehicle rises when it is fast."
+            sentence: ClassVar = "At 1 m/s the body of the vehicle is {size} too {side}."
+            remedy: ClassVar = "Drive at one speed."
+            sides: ClassVar = ("high", "low")
+            magnitude: float = quantity(
+                "m per (m/s)^2", 0.01, "no car flies", typical=1e-4,
+                source="estimate: 1 cm at 10 m/s",
+            )
+
+            def _error(self, value, reference, rng):
+                velocity = np.gradient(value.position, value.gps_time, axis=0)
+                return self.magnitude * (velocity**2).sum(axis=1)[:, None] * [0.0, 0.0, 1.0]
+    """
+    required = ("name", "stage", "title", "meaning", "sentence", "remedy")
+    missing = [key for key in required if not getattr(kind, key, "")]
+    if missing:
+        raise ValueError(f"{kind.__name__} doesn't say its {', '.join(missing)}; see Effect.")
+    size = kind.quantities().get("magnitude")
+    if size is None or not size.typical or not size.source:
+        raise ValueError(f"{kind.name} has no magnitude with unit, typical size and its source.")
+    if kind.name in {known.name for known in EFFECTS}:
+        raise ValueError(f"{kind.name} is an effect of mlscorr already; take another name.")
+    _known_stage(kind.stage)
+    count = 2 if kind.is_wave() else size.count
+    if len(kind.parts) != count or (count == size.count > 1 and len(kind.sides) != count):
+        raise ValueError(f"{kind.name} names {len(kind.parts)} parts and sides of {count}.")
+    _registered[kind.name] = kind
+    return kind
+
+
+def known_effects() -> tuple[type[Effect], ...]:
+    """Classes of all effects: EFFECTS, and those that were registered, in their order."""
+    return (*EFFECTS, *_registered.values())
+
+
+def effect_class(name: str) -> type[Effect]:
+    """The class of an effect by its name.
+
+    Parameters
+    ----------
+    name : str
+
+    Raises
+    ------
+    ValueError
+        For an unknown name, with the nearest known one.
+    """
+    by_name = {kind.name: kind for kind in known_effects()}
+    if name not in by_name:
+        near = get_close_matches(str(name), by_name, n=1, cutoff=0.0)[0]
+        raise ValueError(f"{name!r} is an unknown effect; the nearest known one is {near}.")
+    return by_name[name]
+
+
+def make_effect(name: str, **parameters: Any) -> Effect:
+    """The effect of a name with its parameters, in the units that its class states.
+
+    Parameters
+    ----------
+    name : str
+    **parameters
+        As the class names them.
+
+    Raises
+    ------
+    ValueError
+        In one sentence for an unknown name (with the nearest known one), unknown or missing
+        parameters, and values beyond the largest credible one.
+
+    Examples
+    --------
+    >>> make_effect("time_offset", magnitude=0.002)
+    TimeOffset(magnitude=0.002)
+    >>> make_effect("boresight", magnitude=[200, 0, 0])
+    Traceback (most recent call last):
+    ValueError: boresight of 200 deg exceeds 10 deg; a mounting is known from its drawing to a
+    degree.
+    """
+    kind = effect_class(name)
+    known = {field.name: field for field in fields(kind)}
+    unknown = [key for key in parameters if key not in known]
+    missing = [key for key, f in known.items() if f.default is MISSING and key not in parameters]
+    if unknown or missing:
+        fault = f"has no parameter {unknown[0]!r}" if unknown else f"lacks {missing[0]}"
+        raise ValueError(f"{name} {fault}; its parameters are {_describe(kind)}.")
+    return kind(**parameters)
+
+
+def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Effects in the order in which they act, however they were listed.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        Known ones.
+
+    Raises
+    ------
+    ValueError
+        When a random one is there twice: both would draw from one stream.
+    """
+    order = {kind.name: number for number, kind in enumerate(known_effects())}
+    stages = list(STAGES)
+    ordered = sorted(effects, key=lambda e: (stages.index(e.stage), order[e.name], repr(e)))
+    random = [effect.name for effect in ordered if effect.random]
+    for name in random:
+        if random.count(name) > 1:
+            raise ValueError(
+                f"{name} is listed {random.count(name)} times; give one, with the root of the sum "
+                "of squares of the magnitudes."
+            )
+    return tuple(ordered)
+
+
+def apply_effects(
+    effects: Iterable[Effect],
+    stage: str,
+    value: Any,
+    reference: Reference,
+    streams: dict[str, np.random.Generator],
+) -> Any:
+    """A stage's value after all effects of that stage, in their fixed order.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+    stage : str
+        One of STAGES.
+    value
+        What the stage works on; see the table of stages in mlscorr.effects.
+    reference : Reference
+    streams : dict
+        Generator of each effect's name, as effect_streams gives them; they go on from block to
+        block, so that blocks of any size give the same.
+
+    Raises
+    ------
+    ValueError
+        For an unknown stage.
+    """
+    _known_stage(stage)
+    for effect in in_order(effects):
+        if effect.stage == stage:
+            value = effect.apply(value, reference, streams[effect.name])
+    return value
+
+
+def effect_streams(rng: np.random.Generator) -> dict[str, np.random.Generator]:
+    """A random stream for every known effect by its name, whether it is used or not.
+
+    Those of registered effects stem from the last of the others, whose draws they leave alone.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    """
+    streams = rng.spawn(len(EFFECTS))
+    streams += streams[-1].spawn(len(_registered))
+    return {kind.name: s for kind, s in zip(known_effects(), streams, strict=True)}
+
+
+def _known_stage(stage):
+    if stage not in STAGES:
+        raise ValueError(f"{stage!r} is an unknown stage; known are {', '.join(STAGES)}.")
+
+
+def _describe(kind):
+    """Parameters of an effect with their units: "magnitude (m), time (s)"."""
+    kinds = kind.quantities()
+    return ", ".join(f"{f.name} ({kinds.get(f.name, 'a name')})" for f in fields(kind))

@@ -1,0 +1,85 @@
+"""Effects of a mounting of the scanner that is recorded otherwise than it is."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.effects.effect import Effect
+from mlscorr.effects.quantity import quantity
+from mlscorr.effects.stages import BODY
+from mlscorr.survey import Mounting
+
+
+@dataclass(frozen=True)
+class Boresight(Effect):
+    """The recorded boresight lacks a small rotation: R_true = Exp(magnitude) R_recorded.
+
+    About the body axes right, forward, up (Mao et al. 2015, Eq. 2).
+
+    Parameters
+    ----------
+    magnitude : 3 floats
+        Right, forward and up. Units: deg.
+    """
+
+    name: ClassVar = "boresight"
+    stage: ClassVar = "mounting"
+    title: ClassVar = "Boresight"
+    meaning: ClassVar = "The scanner is turned otherwise than the recorded mounting says."
+    sentence: ClassVar = "The recorded boresight is wrong: the scanner is really turned {size}."
+    remedy: ClassVar = "Run mlscorr calibrate, which estimates the mounting from the targets."
+    sides: ClassVar = (
+        ("nose up", "nose down"),
+        ("right side down", "left side down"),
+        ("to the left", "to the right"),
+    )
+    parts: ClassVar = BODY
+    magnitude: tuple[float, float, float] = quantity(
+        "deg",
+        10.0,
+        "a mounting is known from its drawing to a degree",
+        count=3,
+        typical=0.05,
+        source="Mao et al. 2015, Table 6: 0.03, 0.06 and 0.21 deg",
+    )
+
+    def _change(self, value, reference, rng):
+        turn = Rotation.from_rotvec(self.magnitude, degrees=True)
+        return Mounting(value.lever_arm, turn.inv() * value.boresight)
+
+
+@dataclass(frozen=True)
+class LeverArm(Effect):
+    """The recorded lever arm lacks magnitude: true = recorded + magnitude, in the body frame.
+
+    Parameters
+    ----------
+    magnitude : 3 floats
+        Right, forward and up. Units: m.
+    """
+
+    name: ClassVar = "lever_arm"
+    stage: ClassVar = "mounting"
+    title: ClassVar = "Lever arm"
+    meaning: ClassVar = "The scanner sits elsewhere on the vehicle than the recorded mounting says."
+    sentence: ClassVar = "The recorded lever arm is wrong: the scanner really sits {size}."
+    remedy: ClassVar = "Run mlscorr calibrate, which estimates the mounting from the targets."
+    sides: ClassVar = (
+        ("farther right", "farther left"),
+        ("farther forward", "farther back"),
+        ("higher", "lower"),
+    )
+    parts: ClassVar = BODY
+    magnitude: tuple[float, float, float] = quantity(
+        "m",
+        5.0,
+        "no car is larger",
+        count=3,
+        typical=0.02,
+        source="Mao et al. 2015, Table 6: 0.0005, 0.015 and 0.065 m",
+    )
+
+    def _change(self, value, reference, rng):
+        return Mounting(value.lever_arm - np.array(self.magnitude), value.boresight)

@@ -1,0 +1,243 @@
+"""Effects of the scanner's beam and its ranges, and lost returns."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from mlscorr.effects.effect import Effect
+from mlscorr.effects.quantity import quantity
+from mlscorr.effects.settings import SETTINGS
+
+
+@dataclass(frozen=True)
+class BeamDivergence(Effect):
+    """The beam is wider than stated: full divergence (rad) = stated + magnitude.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: mrad.
+    """
+
+    name: ClassVar = "beam_divergence"
+    stage: ClassVar = "beam"
+    title: ClassVar = "Wide beam"
+    meaning: ClassVar = "The laser's footprint is wider than stated."
+    sentence: ClassVar = "The laser beam is {size} wider than stated."
+    remedy: ClassVar = "Ask the maker for the width of the scanner's beam."
+    magnitude: float = quantity(
+        "mrad",
+        20.0,
+        "a footprint of 20 cm at 10 m is no laser scanner's",
+        typical=0.35,
+        source="RIEGL VQ-250 data sheet: 0.35 mrad",
+        least=0.0,
+    )
+
+    def _change(self, value, reference, rng):
+        return value + 1e-3 * self.magnitude
+
+
+@dataclass(frozen=True)
+class RangeScale(Effect):
+    """Ranges are too long in proportion: recorded = true (1 + magnitude).
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: ratio.
+    """
+
+    name: ClassVar = "range_scale"
+    stage: ClassVar = "range"
+    title: ClassVar = "Range scale"
+    meaning: ClassVar = "Distances are wrong in proportion to their length."
+    sentence: ClassVar = "The scanner's distances are too {side} by {size} of their length."
+    remedy: ClassVar = "Check temperature and pressure in the scanner's range correction."
+    sides: ClassVar = ("long", "short")
+    magnitude: float = quantity(
+        "ratio",
+        0.01,
+        "a counter or a refractive index can't be wrong by a hundredth",
+        typical=5e-5,
+        source="estimate: quartz of the counter 20-50 ppm, air 1 ppm/K (Rueeger 1990)",
+    )
+
+    def _error(self, value, reference, rng):
+        return self.magnitude * value.range
+
+
+@dataclass(frozen=True)
+class RangeBias(Effect):
+    """Every range is too long: recorded = true + magnitude.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: m.
+    """
+
+    name: ClassVar = "range_bias"
+    stage: ClassVar = "range"
+    title: ClassVar = "Range bias"
+    meaning: ClassVar = "All distances that the scanner measures are wrong by a constant."
+    sentence: ClassVar = "Every distance of the scanner is {size} too {side}."
+    remedy: ClassVar = "Have the scanner's zero range checked on a base line."
+    sides: ClassVar = ("long", "short")
+    magnitude: float = quantity(
+        "m",
+        1.0,
+        "the manufacturer's calibration can't miss a metre",
+        typical=0.010,
+        source="RIEGL VQ-250 data sheet: accuracy 10 mm",
+    )
+
+    def _error(self, value, reference, rng):
+        return self.magnitude
+
+
+@dataclass(frozen=True)
+class RangeWalk(Effect):
+    """Range depends on the received intensity.
+
+    recorded = true + magnitude log10(intensity / reference_intensity); an intensity below one
+    count is taken as one.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: m per decade.
+    reference_intensity : float
+        At which nothing is added. Units: counts of 16 bits.
+    """
+
+    name: ClassVar = "range_walk"
+    stage: ClassVar = "range"
+    title: ClassVar = "Range walk"
+    meaning: ClassVar = "Distances depend on how bright the return is."
+    sentence: ClassVar = (
+        "Bright surfaces are measured {side} than dark ones: {size} for ten times the intensity."
+    )
+    remedy: ClassVar = "Ask the maker for the scanner's range correction by intensity."
+    sides: ClassVar = ("farther", "nearer")
+    worded_unit: ClassVar = "m"
+    magnitude: float = quantity(
+        "m per decade",
+        0.2,
+        "a pulse of 1 ns is 15 cm long, and its edge can't walk further",
+        typical=0.005,
+        source="estimate: a thirtieth of the 15 cm of a pulse of 1 ns, left by calibration",
+    )
+    reference_intensity: float = quantity(
+        "counts of 16 bits",
+        65535.0,
+        "that is the full scale",
+        default=6553.5,  # a tenth of the full scale: asphalt and plaster of a street
+        least=1.0,
+    )
+
+    def _error(self, value, reference, rng):
+        decades = np.log10(np.maximum(value.intensity, 1.0) / self.reference_intensity)
+        return self.magnitude * decades
+
+
+@dataclass(frozen=True)
+class IncidenceBias(Effect):
+    """Range depends on the angle of incidence a: recorded = true + magnitude (1 / cos a - 1).
+
+    A threshold on the straight edge of a pulse is reached later by a time in proportion to the
+    threshold over the amplitude, and by Lambert's law the amplitude goes with cos a. So the
+    magnitude is the bias at 60 deg; beyond 84 deg it stays as it is.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: m.
+    """
+
+    name: ClassVar = "incidence_bias"
+    stage: ClassVar = "range"
+    title: ClassVar = "Incidence bias"
+    meaning: ClassVar = "Distances depend on the angle at which the beam meets the surface."
+    sentence: ClassVar = (
+        "Where the beam meets a surface at a slant, distances are too {side}: by {size} at 60°."
+    )
+    remedy: ClassVar = "Check ranges at grazing incidence against a known plane."
+    sides: ClassVar = ("long", "short")
+    magnitude: float = quantity(
+        "m",
+        0.1,
+        "it acts ninefold at grazing incidence, and would show to the eye",
+        typical=0.003,
+        source="estimate: millimetres, as the noise that Soudarissanane et al. 2009 find at 60 deg",
+    )
+
+    def _error(self, value, reference, rng):
+        lateness = 1.0 / np.maximum(value.incidence, SETTINGS.grazing_cosine) - 1.0
+        return self.magnitude * lateness
+
+
+@dataclass(frozen=True)
+class RangeNoise(Effect):
+    """Ranges are noisier than stated: white noise of one more sigma, for each return.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: m.
+    """
+
+    name: ClassVar = "range_noise"
+    stage: ClassVar = "range"
+    random: ClassVar = True
+    title: ClassVar = "Noisy ranges"
+    meaning: ClassVar = "Distances are noisier than stated."
+    sentence: ClassVar = (
+        "The scanner's distances are noisier than stated: {size} of scatter come on top."
+    )
+    remedy: ClassVar = (
+        "State the scanner's range noise in survey.toml as large as found, or have the scanner "
+        "checked."
+    )
+    magnitude: float = quantity(
+        "m",
+        1.0,
+        "no surveying scanner is as noisy",
+        typical=0.005,
+        source="RIEGL VQ-250 data sheet: precision 5 mm",
+        least=0.0,
+    )
+
+    def _error(self, value, reference, rng):
+        return self.magnitude * rng.standard_normal(len(value))
+
+
+@dataclass(frozen=True)
+class Dropout(Effect):
+    """A share of the returns is lost, each by its own chance.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: ratio.
+    """
+
+    name: ClassVar = "dropout"
+    stage: ClassVar = "return"
+    random: ClassVar = True
+    title: ClassVar = "Lost returns"
+    meaning: ClassVar = "Pulses that should return are lost."
+    sentence: ClassVar = "{size} of the pulses that should come back are lost."
+    remedy: ClassVar = "Look for wet or dark surfaces, or a dirty window of the scanner."
+    magnitude: float = quantity(
+        "ratio",
+        0.99,
+        "nothing to work with would be left",
+        typical=0.05,
+        source="estimate: dark or wet surfaces return nothing for one pulse in twenty",
+        least=0.0,
+    )
+
+    def _change(self, value, reference, rng):
+        return replace(value, kept=value.kept & (rng.random(len(value)) >= self.magnitude))

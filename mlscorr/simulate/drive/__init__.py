@@ -1,0 +1,3 @@
+"""How the vehicle moves."""
+
+from mlscorr.simulate.drive.passes import drive

@@ -1,0 +1,202 @@
+"""Scenarios of all sorts, small enough to be made by the hundred in seconds each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+
+from mlscorr.simulate.scenario import Scenario
+from mlscorr.simulate.survey import SimulatedSurvey, simulate
+
+
+@dataclass(frozen=True)
+class Mix:
+    """Of what scenarios are mixed, so that each is made in seconds.
+
+    Parameters
+    ----------
+    rivers, spinning, two_passes, references : float
+        Shares of river banks, of spinning scanners on streets, of surveys with two passes and with
+        a reference surface.
+    canyons, outages : float
+        Shares with few satellites, and with none, for some seconds.
+    pulses : float
+        Of a survey of a street at most: some 1.6 million points.
+    duration : tuple
+        Shortest and longest pass. Units: s.
+    lines : tuple
+        Slowest and fastest scanner. Units: 1/s.
+    spacing : float
+        Of the way that each target needs, at least. Units: m.
+    heavy_tails, freedom : float
+        Share of surveys whose targets err by Student's t, and its degrees of freedom.
+    attempts : int
+        At a scenario: along some ways targets find no place.
+    """
+
+    rivers: float = 0.2
+    spinning: float = 0.12
+    two_passes: float = 0.5
+    references: float = 2 / 3
+    canyons: float = 0.3
+    outages: float = 0.2
+    pulses: float = 2.2e6
+    duration: tuple[float, float] = (40.0, 70.0)
+    lines: tuple[float, float] = (75.0, 150.0)
+    spacing: float = 8.0
+    heavy_tails: float = 0.25
+    freedom: float = 5.0
+    attempts: int = 20
+
+
+MIX = Mix()
+
+
+def random_survey(
+    entropy: Sequence[int], name: str = "survey", effects: Sequence[dict] = ()
+) -> SimulatedSurvey:
+    """SimulatedSurvey of a random scenario; the same entropy gives the same survey.
+
+    Effects, each a dict of its name and parameters as in scenario.toml, change nothing else.
+
+    Parameters
+    ----------
+    entropy : sequence of int
+    name : str
+    effects : sequence of dict
+    """
+    *streams, tails = np.random.SeedSequence(entropy).spawn(MIX.attempts + 1)
+    for number, stream in enumerate(streams):
+        choice, world = stream.spawn(2)
+        scenario = random_scenario(np.random.default_rng(choice), name)
+        seed = world.generate_state(4)  # a SeedSequence would go on where the first survey stopped
+        try:
+            made = simulate(scenario, np.random.default_rng(seed))
+            break
+        except ValueError:  # targets that find no place beside this way
+            if number == MIX.attempts - 1:
+                raise
+    more = _heavier(made, np.random.default_rng(tails))
+    if effects:
+        scenario = Scenario(**{**scenario.model_dump(), "effects": list(effects)})
+        made = simulate(scenario, np.random.default_rng(seed))
+    targets = replace(made.targets, position=made.targets.position + more)
+    return replace(made, targets=targets)
+
+
+def random_scenario(rng: Generator, name: str = "survey") -> Scenario:
+    """Scenario of a street or a river bank with one or two passes, no two alike.
+
+    Parameters
+    ----------
+    rng : Generator
+    name : str
+    """
+    river, two = rng.random() < MIX.rivers, rng.random() < MIX.two_passes
+    budget = MIX.pulses / (1 + two)  # pulses of a pass
+    scanner = _river_scanner(rng) if river else _street_scanner(rng, budget / MIX.duration[0])
+    duration, speed = rng.uniform(*MIX.duration), rng.uniform(4.0, 6.0)
+    rate = scanner["lines_per_second"] * scanner["points_per_line"]
+    rate *= len(scanner.get("rings", (0.0,)))
+    if not river:
+        duration = min(duration, max(MIX.duration[0], budget / rate))
+    room = int(duration * speed / MIX.spacing)
+    check = int(np.clip(rng.integers(4, 9), 4, max(4, room - 12)))
+    control = int(np.clip(rng.integers(12, 25), 12, max(12, room - check)))
+    end = 2 * duration + 30.0 if two else duration
+    place = rng.uniform([400e3, 3.2e6], [600e3, 3.5e6])
+    parts = {
+        "name": name,
+        "origin": (*place.round(), round(rng.uniform(5, 300))),
+        "start_time": round(rng.uniform(2e4, 5.8e5)),
+        "scene": {
+            "kind": "river" if river else "street",
+            "reference": bool(rng.random() < MIX.references),
+            "gaps": rng.uniform(0.2, 0.6),
+            "trees": rng.uniform(0.0, 6.0),
+            "cars": rng.uniform(0.0, 6.0),
+        },
+        "targets": _targets(rng, river, control, check),
+        "drive": {
+            "duration": duration,
+            "speed": speed,
+            "turns": rng.uniform(3.0, 8.0) if river else rng.uniform(5.0, 40.0),
+            "passes": _passes(rng, river, two),
+        },
+        "scanner": [scanner],
+        "pos": {
+            "canyons": _spans(rng, MIX.canyons, end, 10.0, 30.0),
+            "outages": _spans(rng, MIX.outages, end, 5.0, 20.0),
+        },
+    }
+    return Scenario.model_validate(parts)
+
+
+def _targets(rng, river, control, check):
+    sigma = rng.choice([0.002, 0.003, 0.005])
+    more = {"size": 0.9, "supports": ("post", "wall"), "kinds": ("circle",)} if river else {}
+    return {"control": control, "check": check, "survey_sigma": (sigma, sigma), **more}
+
+
+def _passes(rng, river, two):
+    """One pass, or a second one: back on the other lane, or a boat's along the same bank."""
+    if not two:
+        return ({},)
+    lateral, pause = rng.uniform(0.9, 1.4), rng.uniform(20.0, 60.0)
+    way = "forward" if river else "back"
+    return ({"lateral": lateral}, {"direction": way, "lateral": -lateral, "pause": pause})
+
+
+def _mounting(rng, boresight):
+    """Lever arm and boresight as a drawing has them: no two vehicles are built alike."""
+    lever_arm = np.array([0.1, -0.6, 0.4]) + rng.uniform(-0.3, 0.3, 3)
+    turned = np.array(boresight) + rng.uniform(-3.0, 3.0, 3)
+    return {"lever_arm": tuple(lever_arm.round(4)), "boresight": tuple(turned.round(3))}
+
+
+def _noises(rng):
+    return {"range_noise": rng.uniform(0.003, 0.006), "angle_noise": rng.uniform(0.001, 0.003)}
+
+
+def _street_scanner(rng, fastest):
+    """A line scanner askew, or now and then a spinning one with a few rings, of so many pulses a
+    second at most.
+    """
+    pulses = int(rng.integers(300, 501))
+    common = {"points_per_line": pulses, **_noises(rng)}
+    common |= _mounting(rng, (90.0, 0.0, rng.choice([-1, 1]) * rng.uniform(20.0, 45.0)))
+    if rng.random() < MIX.spinning:
+        rings = np.arange(4) * 4.0 - 6.0
+        turns = rng.uniform(18.0, 20.0)
+        return {**common, "kind": "spinning", "rings": tuple(rings), "lines_per_second": turns}
+    fast = np.clip(fastest / pulses, *MIX.lines)
+    return {**common, "lines_per_second": rng.uniform(MIX.lines[0], fast)}
+
+
+def _river_scanner(rng):
+    """A line scanner that looks to the bank alone, by as many pulses a line."""
+    around = 360.0 / 150.0
+    return {
+        "points_per_line": int(rng.integers(400, 501) * around),
+        "lines_per_second": rng.uniform(MIX.lines[0], 100.0),
+        "field_of_view": (-60.0, 90.0),
+        **_noises(rng),
+        **_mounting(rng, (90.0, 0.0, rng.uniform(0.0, 20.0))),
+    }
+
+
+def _spans(rng, share, end, shortest, longest):
+    """One span (start, duration) within a drive, or none. Units: s."""
+    happens, start, length = rng.random() < share, rng.random(), rng.uniform(shortest, longest)
+    return (((end - length) * start, length),) if happens else ()
+
+
+def _heavier(survey, rng):
+    """What is to be added to the surveyed targets (n, 3) of a survey without effects, so that
+    their errors have the tails of Student's t and the same variance. Units: m.
+    """
+    happens, n = rng.random() < MIX.heavy_tails, len(survey.targets)
+    stretch = np.sqrt((MIX.freedom - 2.0) / rng.chisquare(MIX.freedom, (n, 1)))
+    error = survey.targets.position - survey.true_centre
+    return happens * (stretch - 1.0) * error

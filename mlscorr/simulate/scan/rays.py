@@ -1,0 +1,292 @@
+"""Where each pulse starts and points, and where each measurement lies on the map: Eq. 1, fast.
+
+The same as georeference(), which a test compares, in compiled loops: poses by walking along the
+epochs instead of searching, rotations by Rodrigues' formula instead of Slerp objects. The loops
+name every element, as a row taken from an array would be counted by all threads in turn.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, sin
+
+import numpy as np
+from numba import njit
+
+from mlscorr.simulate.scan.threads import Workspace, in_slices
+from mlscorr.survey import Mounting, Trajectory
+
+
+@dataclass(frozen=True)
+class Turn:
+    """The pulses that one turn of a scanner fires.
+
+    Parameters
+    ----------
+    turned : (m,) array
+        When, from 0 to 1.
+    angle, elevation : (m,) array
+        From the zero beam, and out of the scan plane. Units: rad.
+    rate : float
+        Turns a second. Units: 1/s.
+    """
+
+    turned: np.ndarray
+    angle: np.ndarray
+    elevation: np.ndarray
+    rate: float
+
+    def __len__(self):
+        return len(self.turned)
+
+    @cached_property
+    def beams(self) -> np.ndarray:
+        """Unit directions, and the directions in which they sweep (m, 2, 3), in its frame."""
+        flat, zero = np.cos(self.elevation), np.zeros(len(self))
+        x, y = np.cos(self.angle), np.sin(self.angle)
+        beam = np.column_stack([flat * x, flat * y, np.sin(self.elevation)])
+        return np.stack([beam, np.column_stack([-y, x, zero])], axis=1)
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Pulses as they are fired.
+
+    Parameters
+    ----------
+    gps_time, angle, elevation : (n,) array
+        Units: s, rad, rad.
+    ray : (n, 9) array
+        Start about the local origin (m), unit direction, and the direction in which it sweeps.
+    single : (n, 6) float32 array
+        Start and direction.
+    """
+
+    gps_time: np.ndarray
+    angle: np.ndarray
+    elevation: np.ndarray
+    ray: np.ndarray
+    single: np.ndarray
+
+    def __len__(self):
+        return len(self.gps_time)
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A mounting on a trajectory without gaps, ready for compiled loops.
+
+    Parameters
+    ----------
+    epochs : (n,) array
+        Units: s.
+    table : (n, 16) array
+        Per epoch: position about the origin (m), rotation matrix row by row, unit axis and angle
+        (rad) of the turn to the next epoch.
+    boresight : (3, 3) array
+    lever_arm : (3,) array
+        Units: m.
+    """
+
+    epochs: np.ndarray
+    table: np.ndarray
+    boresight: np.ndarray
+    lever_arm: np.ndarray
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, mounting: Mounting, origin: np.ndarray) -> "Platform":
+        """Platform with positions about an origin (3,) in m.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+        mounting : Mounting
+        origin : (3,) array
+            Map coordinates of the local origin. Units: m.
+        """
+        attitude = trajectory.attitude
+        turn = np.vstack([(attitude[:-1].inv() * attitude[1:]).as_rotvec(), np.zeros(3)])
+        angle = np.linalg.norm(turn, axis=1, keepdims=True)
+        axis = turn / np.where(angle > 0, angle, 1.0)
+        matrix = attitude.as_matrix().reshape(-1, 9)
+        return cls(
+            np.ascontiguousarray(trajectory.gps_time, dtype=float),
+            np.hstack([trajectory.position - origin, matrix, axis, angle]),
+            np.ascontiguousarray(mounting.boresight.as_matrix()),
+            np.array(mounting.lever_arm, dtype=float),
+        )
+
+    def outside(self, gps_time: np.ndarray) -> np.ndarray:
+        """Which times (n,) lie before the first or after the last epoch.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        """
+        return (gps_time < self.epochs[0]) | (gps_time > self.epochs[-1])
+
+    def aim(
+        self, number: np.ndarray, turn: Turn, start: float, room: Workspace, wide: bool = True
+    ) -> Rays:
+        """Rays of the pulses of a number (n,) since a start (s), by the scanner's Turn.
+
+        The direction of the sweep is left open where beams are not wide.
+
+        Parameters
+        ----------
+        number : (n,) int array
+            Of each pulse since the start.
+        turn : Turn
+            The scanner's.
+        start : float
+            Units: s.
+        room : Workspace
+            In which the Rays stay until the next ones.
+        wide : bool
+            Whether beams need the direction of their sweep.
+        """
+        n = len(number)
+        names = ("gps_time", "angle", "elevation")
+        rays = Rays(
+            **{name: room.array(name, n) for name in names},
+            ray=room.array("ray", n, 9),
+            single=room.array("single", n, 6, dtype=np.float32),
+        )
+        rows = number, rays.gps_time, rays.angle, rays.elevation, rays.ray, rays.single
+        timing = turn.turned, turn.angle, turn.elevation, turn.rate, float(start)
+        beams = turn.beams @ self.boresight.T
+        constants = *timing, beams, self.epochs, self.table, self.lever_arm, wide
+        in_slices(n, _aim, rows, constants)
+        return rays
+
+    def place(
+        self,
+        gps_time: np.ndarray,
+        angle: np.ndarray,
+        elevation: np.ndarray,
+        distance: np.ndarray,
+        origin: np.ndarray,
+    ) -> np.ndarray:
+        """Map coordinates (n, 3) of measurements, Eq. 1; all times must lie within the epochs.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        angle : (n,) array
+            From the zero beam. Units: rad.
+        elevation : (n,) array
+            Out of the scan plane. Units: rad.
+        distance : (n,) array
+            Range. Units: m.
+        origin : (3,) array
+            Map coordinates of the local origin. Units: m.
+        """
+        xyz = np.empty((len(gps_time), 3))
+        rows = (gps_time, angle, elevation, distance, xyz)
+        parts = self.epochs, self.table, self.boresight, self.lever_arm
+        in_slices(len(xyz), _place, rows, (np.asarray(origin, dtype=float), *parts))
+        return xyz
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _times(m, x, y, z):
+    """Matrix (3, 3) times vector."""
+    return (
+        m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
+        m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
+        m[2, 0] * x + m[2, 1] * y + m[2, 2] * z,
+    )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _sine(angle):
+    """Sine, and 1 - cosine: by their series for the small turns from one epoch to the next."""
+    if abs(angle) > 0.02:  # rad, where the first term that is left out is 1e-16 of the result
+        return sin(angle), 1.0 - cos(angle)
+    square = angle * angle
+    return (
+        angle * (1.0 - square * (1 / 6 - square * (1 / 120 - square / 5040))),
+        square * (1 / 2 - square * (1 / 24 - square * (1 / 720 - square / 40320))),
+    )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _turn(table, i, s, c, x, y, z):
+    """R Exp(angle axis) times a vector, with s, c the angle's sine and 1 - cosine (Rodrigues)."""
+    kx, ky, kz = table[i, 12], table[i, 13], table[i, 14]
+    ax, ay, az = ky * z - kz * y, kz * x - kx * z, kx * y - ky * x
+    bx, by, bz = ky * az - kz * ay, kz * ax - kx * az, kx * ay - ky * ax
+    x, y, z = x + s * ax + c * bx, y + s * ay + c * by, z + s * az + c * bz
+    return (
+        table[i, 3] * x + table[i, 4] * y + table[i, 5] * z,
+        table[i, 6] * x + table[i, 7] * y + table[i, 8] * z,
+        table[i, 9] * x + table[i, 10] * y + table[i, 11] * z,
+    )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _position(table, i, weight, axis):
+    """Position on one axis between two epochs."""
+    return table[i, axis] + weight * (table[i + 1, axis] - table[i, axis])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _walk(epochs, time, i):
+    """Index of the step that holds a time, from that of the time before."""
+    while i < epochs.size - 2 and time > epochs[i + 1]:
+        i += 1
+    while i > 0 and time < epochs[i]:
+        i -= 1
+    return i
+
+
+@njit(cache=True, nogil=True)
+def _aim(number, gps_time, angle, elevation, rays, single, turned, angles, elevations, rate, start,
+         beams, epochs, table, lever, wide):  # fmt: skip
+    if number.size == 0:
+        return
+    turn, slot = divmod(number[0], turned.size)
+    i = np.searchsorted(epochs, start + turn / rate) - 1
+    i = min(max(i, 0), epochs.size - 2)
+    for p in range(number.size):
+        time = start + (turn + turned[slot]) / rate
+        gps_time[p], angle[p], elevation[p] = time, angles[slot], elevations[slot]
+        i = _walk(epochs, time, i)
+        weight = (time - epochs[i]) / (epochs[i + 1] - epochs[i])
+        s, c = _sine(weight * table[i, 15])
+        x, y, z = _turn(table, i, s, c, lever[0], lever[1], lever[2])
+        rays[p, 0] = _position(table, i, weight, 0) + x
+        rays[p, 1] = _position(table, i, weight, 1) + y
+        rays[p, 2] = _position(table, i, weight, 2) + z
+        x, y, z = _turn(table, i, s, c, beams[slot, 0, 0], beams[slot, 0, 1], beams[slot, 0, 2])
+        rays[p, 3], rays[p, 4], rays[p, 5] = x, y, z
+        if wide:
+            x, y, z = _turn(table, i, s, c, beams[slot, 1, 0], beams[slot, 1, 1], beams[slot, 1, 2])
+            rays[p, 6], rays[p, 7], rays[p, 8] = x, y, z
+        for column in range(6):
+            single[p, column] = rays[p, column]
+        slot += 1
+        if slot == turned.size:
+            turn, slot = turn + 1, 0
+
+
+@njit(cache=True, nogil=True)
+def _place(gps_time, angle, elevation, distance, xyz, origin, epochs, table, boresight, lever):
+    if gps_time.size == 0:
+        return
+    i = min(max(np.searchsorted(epochs, gps_time[0]) - 1, 0), epochs.size - 2)
+    for p in range(gps_time.size):
+        i = _walk(epochs, gps_time[p], i)
+        weight = (gps_time[p] - epochs[i]) / (epochs[i + 1] - epochs[i])
+        s, c = _sine(weight * table[i, 15])
+        r = distance[p]
+        z = 0.0
+        if elevation[p] != 0.0:
+            z = r * sin(elevation[p])
+            r *= cos(elevation[p])
+        x, y, z = _times(boresight, r * cos(angle[p]), r * sin(angle[p]), z)
+        x, y, z = _turn(table, i, s, c, x + lever[0], y + lever[1], z + lever[2])
+        xyz[p, 0] = origin[0] + (_position(table, i, weight, 0) + x)
+        xyz[p, 1] = origin[1] + (_position(table, i, weight, 1) + y)
+        xyz[p, 2] = origin[2] + (_position(table, i, weight, 2) + z)

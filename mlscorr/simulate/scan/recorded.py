@@ -1,0 +1,112 @@
+"""Pulses of a survey as they were recorded: worked out of points, trajectory and mounting."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.simulate.scan.rays import Platform
+from mlscorr.survey import Mounting, PointCloud, Survey
+from mlscorr.survey.columns import Columns
+
+NO_MOUNTING = Mounting(np.zeros(3), Rotation.identity())  # beams from the navigation centre
+
+
+@dataclass(frozen=True)
+class RecordedPulses(Columns):
+    """Pulses of a survey as they were recorded.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    angle, elevation, range : (n,) array
+        From the zero beam, out of the scan plane, along the beam, by the recorded mounting.
+        Units: rad, m.
+    intensity : (n,) array
+        Counts of 16 bits.
+    incidence : (n,) array
+        Cosine of the angle between beam and surface normal.
+    """
+
+    gps_time: np.ndarray
+    angle: np.ndarray
+    elevation: np.ndarray
+    range: np.ndarray
+    intensity: np.ndarray
+    incidence: np.ndarray
+
+
+def recorded_mounting(survey: Survey) -> Mounting:
+    """The survey's mounting; where it is not known, beams are from the navigation centre, in the
+    body frame.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    return NO_MOUNTING if survey.mounting is None else survey.mounting
+
+
+def aim(
+    platform: Platform, gps_time: np.ndarray, angle: np.ndarray, elevation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Start (n, 3) about the platform's origin, in m, and unit direction (n, 3) of pulses.
+
+    Parameters
+    ----------
+    platform : Platform
+    gps_time : (n,) array
+        Units: s.
+    angle : (n,) array
+        From the zero beam. Units: rad.
+    elevation : (n,) array
+        Out of the scan plane. Units: rad.
+    """
+    nothing, zero = np.zeros(len(gps_time)), np.zeros(3)
+    start = platform.place(gps_time, angle, elevation, nothing, zero)
+    return start, platform.place(gps_time, angle, elevation, nothing + 1.0, zero) - start
+
+
+def recorded_platform(survey: Survey, origin: np.ndarray) -> Platform:
+    """Platform of the trajectory and mounting as they were recorded, about an origin (3,) in m.
+
+    Parameters
+    ----------
+    survey : Survey
+    origin : (3,) array
+        Map coordinates of the local origin. Units: m.
+    """
+    return Platform.of(survey.trajectory, recorded_mounting(survey), np.asarray(origin, float))
+
+
+def recorded_pulses(
+    platform: Platform, cloud: PointCloud, origin: np.ndarray, normal: np.ndarray
+) -> RecordedPulses:
+    """RecordedPulses of points within the trajectory.
+
+    Parameters
+    ----------
+    platform : Platform
+        As recorded_platform gives it, about the origin.
+    cloud : PointCloud
+    origin : (3,) array
+        Units: m.
+    normal : (n, 3) array, or (3,) of all
+        Unit normals of the surfaces they lie on.
+    """
+    time, level, quarter = cloud.gps_time, np.zeros(len(cloud)), np.full(len(cloud), np.pi / 2)
+    start, x = aim(platform, time, level, level)
+    axes = x, aim(platform, time, quarter, level)[1], aim(platform, time, level, quarter)[1]
+    sight = cloud.xyz - origin - start
+    x, y, z = (np.einsum("ni,ni->n", sight, axis) for axis in axes)
+    away = np.sqrt(x**2 + y**2 + z**2)
+    slant = np.einsum("ni,ni->n", sight, np.broadcast_to(normal, sight.shape)) / away
+    return RecordedPulses(
+        gps_time=time,
+        angle=np.arctan2(y, x),
+        elevation=np.arcsin(np.clip(z / away, -1.0, 1.0)),
+        range=away,
+        intensity=cloud.intensity.astype(float),
+        incidence=np.abs(slant),
+    )

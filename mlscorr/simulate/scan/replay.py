@@ -1,0 +1,224 @@
+"""The simulator run again on the pulses that a survey recorded.
+
+Effects turn truth into record, so here they are taken off what was recorded: the true time, angle,
+pose and mounting. From there each pulse is cast into a world (see worlds.py); what it meets goes
+through the effects on range and return, and lies on the map by what was recorded.
+
+Random effects on the pose are not realised: what the POS errs by is in the record already, and
+its variance is for who compares to know. The beam is thin, whatever its divergence.
+"""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from mlscorr.effects import Reference, Returns, apply_effects, effect_streams
+from mlscorr.simulate.scan.rays import Platform
+from mlscorr.simulate.scan.recorded import RecordedPulses, aim, recorded_mounting, recorded_platform
+from mlscorr.survey import ControlPoints, Mounting, Survey, Trajectory
+from mlscorr.survey.columns import Columns
+
+
+@dataclass(frozen=True)
+class Met(Columns):
+    """What each pulse meets: range (n,) in m, NaN for nothing; cosine of incidence (n,); intensity
+    (n,) in counts of 16 bits.
+    """
+
+    range: np.ndarray
+    incidence: np.ndarray
+    intensity: np.ndarray
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Random numbers of one run, drawn before anything depends on the effects: unit noise (n,) of
+    range and angle, and the streams of random effects by their names.
+    """
+
+    range: np.ndarray
+    angle: np.ndarray
+    streams: dict
+
+    @classmethod
+    def of(cls, n: int, rng: Generator) -> "Draws":
+        """Draws for n pulses; the same seed gives the same, whatever the effects are.
+
+        Parameters
+        ----------
+        n : int
+            Pulses.
+        rng : Generator
+        """
+        ranges, angles, streams = rng.spawn(3)
+        return cls(ranges.standard_normal(n), angles.standard_normal(n), effect_streams(streams))
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Recorded pulses that a simulator with some effects fires again.
+
+    Parameters
+    ----------
+    survey : Survey
+        As recorded; its Scanner says what noise the simulator makes.
+    pulses : RecordedPulses
+    effects : iterable of Effect
+    reference : Reference
+        Of the effects.
+    draws : Draws
+    origin : (3,) array
+        Map coordinates of the local origin. Units: m.
+    """
+
+    survey: Survey
+    pulses: RecordedPulses
+    effects: tuple
+    reference: Reference
+    draws: Draws
+    origin: np.ndarray
+
+    @cached_property
+    def beams(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where each pulse truly starts (n, 3), about the origin, and its unit direction (n, 3)."""
+        platform = Platform.of(self._trajectory, self._mounting, self.origin)
+        noise = self.survey.scanner.angle_noise * self.draws.angle
+        return aim(platform, self._time, self._angle - noise, self.pulses.elevation)
+
+    def measure(self, met: Met) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n, 3) on the map where the recorded ones would lie, NaN where nothing is met,
+        and whether they are kept (n,).
+
+        Parameters
+        ----------
+        met : Met
+        """
+        noise = self.survey.scanner.range_noise * self.draws.range
+        returns = Returns(
+            gps_time=self._time,
+            angle=self._angle,
+            range=met.range + noise,
+            intensity=met.intensity,
+            incidence=met.incidence,
+            kept=np.isfinite(met.range),
+        )
+        measured = self._changed("range", returns).range
+        kept = self._changed("return", returns).kept
+        pulses = self.pulses
+        place = pulses.gps_time, pulses.angle, pulses.elevation, measured, self.origin
+        return self._recorded.place(*place), kept
+
+    @cached_property
+    def _recorded(self):
+        return recorded_platform(self.survey, self.origin)
+
+    def _changed(self, stage, value):
+        """The value after the effects of a stage, with the same random numbers each time."""
+        streams = self.draws.streams
+        used = {effect.name for effect in self.effects if effect.stage == stage}
+        streams = {name: deepcopy(streams[name]) for name in used}
+        return apply_effects(self.effects, stage, value, self.reference, streams)
+
+    def _has(self, stage):
+        return any(effect.stage == stage for effect in self.effects)
+
+    @cached_property
+    def _time(self):
+        """True times (n,), held within the pass."""
+        if not self._has("clock"):
+            return self.pulses.gps_time
+        trajectory, recorded = self.survey.trajectory, self.pulses.gps_time
+        starts, ends = trajectory.passes.T
+        number = trajectory.segment(recorded)
+        return np.clip(self._undone("clock", "gps_time"), starts[number], ends[number])
+
+    @cached_property
+    def _angle(self):
+        """Angles (n,) as measured, with noise. Units: rad."""
+        return self._undone("angle", "angle") if self._has("angle") else self.pulses.angle
+
+    def _undone(self, stage, name):
+        """A field of the pulses without the effects of a stage."""
+        recorded = getattr(self.pulses, name)
+        values = {field.name: getattr(self.pulses, field.name) for field in fields(RecordedPulses)}
+        del values["elevation"]
+        true = Returns(**values, kept=np.ones(len(self.pulses), dtype=bool))
+        for _ in range(2):  # true = recorded - effect(true): of 1e-2, 1e-6 is left
+            error = getattr(self._changed(stage, true), name) - getattr(true, name)
+            true = replace(true, **{name: recorded - error})
+        return getattr(true, name)
+
+    @cached_property
+    def _trajectory(self):
+        """The true trajectory, as far as systematic effects tell."""
+        effects = [e for e in self.effects if e.stage == "pos" and not e.random]
+        return without(self.survey.trajectory, effects, "pos", self.reference, _without_pose)
+
+    @cached_property
+    def _mounting(self):
+        recorded = recorded_mounting(self.survey)
+        return without(recorded, self.effects, "mounting", self.reference, _without_mount)
+
+
+def without(
+    recorded: Any, effects: tuple, stage: str, reference: Reference, take_off: Callable
+) -> Any:
+    """What is true, of a value (Trajectory, Mounting, ControlPoints) as it was recorded.
+
+    ``take_off(recorded, true, changed)`` is what `recorded` is without the way from `true` to
+    `changed`; random effects must not be among these.
+
+    Parameters
+    ----------
+    recorded : Trajectory, Mounting or ControlPoints
+    effects : tuple of Effect
+    stage : str
+        At which effects act.
+    reference : Reference
+        Of the effects.
+    take_off : function
+        Of recorded, true, changed: what recorded is without the way from true to changed.
+    """
+    effects, true = [effect for effect in effects if effect.stage == stage], recorded
+    nothing: Any = {effect.name: None for effect in effects}
+    for _ in range(2 if effects else 0):
+        changed = apply_effects(effects, stage, true, reference, nothing)
+        true = take_off(recorded, true, changed)
+    return true
+
+
+def _without_pose(recorded, true, changed):
+    attitude = recorded.attitude
+    if changed.attitude is not true.attitude:
+        attitude = true.attitude * changed.attitude.inv() * attitude
+    position = recorded.position - (changed.position - true.position)
+    return Trajectory(recorded.gps_time, position, attitude)
+
+
+def _without_mount(recorded, true, changed):
+    lever_arm = recorded.lever_arm - (changed.lever_arm - true.lever_arm)
+    boresight = true.boresight * changed.boresight.inv() * recorded.boresight
+    return Mounting(lever_arm, boresight)
+
+
+def true_targets(targets: ControlPoints, effects: tuple, reference: Reference) -> ControlPoints:
+    """ControlPoints where they truly are, of those that were surveyed.
+
+    Parameters
+    ----------
+    targets : ControlPoints
+        As surveyed.
+    effects : tuple of Effect
+    reference : Reference
+        Of the effects.
+    """
+    return without(targets, effects, "control", reference, _without_control)
+
+
+def _without_control(recorded, true, changed):
+    return replace(recorded, position=recorded.position - (changed.position - true.position))

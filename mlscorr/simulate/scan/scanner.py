@@ -1,0 +1,233 @@
+"""Scanners on a moving vehicle: pulses one by one, cast into the scene.
+
+A line scanner turns one beam about its Z axis; a spinning one turns a fan of beams (rings), each
+at its elevation out of the scan plane, and fires them in turn while it turns on.
+"""
+
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from mlscorr.simulate.scan.echoes import POWER, Surfaces
+from mlscorr.simulate.scan.noise import ScannerNoise
+from mlscorr.simulate.scan.rays import Platform, Turn
+from mlscorr.simulate.scan.threads import Workspace, pool
+from mlscorr.simulate.scenario import ScannerScenario
+from mlscorr.simulate.settings import SETTINGS
+from mlscorr.survey import Mounting, Trajectory
+from mlscorr.survey.columns import Columns
+
+
+@dataclass(frozen=True)
+class MeasuredPulses(Columns):
+    """Measured returns in scan order, and what they truly hit.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    angle, elevation, range : (n,) array
+        As measured: from the zero beam, out of the scan plane, and along the beam. Units: rad, m.
+    intensity : (n,) uint16 array
+    incidence : (n,) array
+        Cosine of the angle between beam and surface normal.
+    return_number, number_of_returns : (n,) uint8 array
+        Of the pulse, from 1.
+    point : (n, 3) array
+        True point in map coordinates: where no noise would have put it. Units: m.
+    triangle : (n,) int array
+        Triangle of the scene that was hit; of a mixed return, the strongest.
+    """
+
+    gps_time: np.ndarray
+    angle: np.ndarray
+    elevation: np.ndarray
+    range: np.ndarray
+    intensity: np.ndarray
+    incidence: np.ndarray
+    return_number: np.ndarray
+    number_of_returns: np.ndarray
+    point: np.ndarray
+    triangle: np.ndarray
+
+    @property
+    def scanner_xyz(self) -> np.ndarray:
+        """X_L (n, 3) = range (cos e cos a, cos e sin a, sin e). Units: m."""
+        flat = self.range * np.cos(self.elevation)
+        return np.column_stack(
+            [
+                flat * np.cos(self.angle),
+                flat * np.sin(self.angle),
+                self.range * np.sin(self.elevation),
+            ]
+        )
+
+    @property
+    def scan_angle(self) -> np.ndarray:
+        """Measured angle (n,) from -180 to 180 deg."""
+        return np.degrees(np.mod(self.angle + np.pi, 2 * np.pi) - np.pi)
+
+
+@dataclass(frozen=True)
+class Shots:
+    """One block of n fired pulses: a row for the first echo of each of them, then m later echoes.
+
+    ``kept`` (n + m,) tells which rows are returns: so that rows, and with them random draws, don't
+    depend on what is lost. ``pulse`` (m,) is which of the n each later echo belongs to. Other
+    fields (n + m, ...) as in MeasuredPulses.
+    """
+
+    gps_time: np.ndarray
+    angle: np.ndarray
+    elevation: np.ndarray
+    range: np.ndarray
+    intensity: np.ndarray
+    incidence: np.ndarray
+    point: np.ndarray
+    triangle: np.ndarray
+    kept: np.ndarray
+    pulse: np.ndarray
+
+    @property
+    def fired(self) -> int:
+        """Number n of pulses."""
+        return len(self.kept) - len(self.pulse)
+
+    def pulses(self) -> MeasuredPulses:
+        """MeasuredPulses of the returns, in scan order, the echoes of a pulse numbered by range."""
+        rows = np.flatnonzero(self.kept)
+        number = count = np.ones(len(rows), np.uint8)
+        if len(self.pulse):
+            pulse = np.append(np.arange(self.fired), self.pulse)[rows]
+            order = np.argsort(pulse, kind="stable")
+            rows, pulse = rows[order], pulse[order]
+            number = (np.arange(len(rows)) - np.searchsorted(pulse, pulse) + 1).astype(np.uint8)
+            count = np.bincount(pulse, minlength=self.fired)[pulse].astype(np.uint8)
+        names = [field.name for field in fields(MeasuredPulses) if hasattr(self, field.name)]
+        taken = pool().map(lambda name: np.take(getattr(self, name), rows, axis=0), names)
+        columns = dict(zip(names, taken, strict=True))
+        return MeasuredPulses(**columns, return_number=number, number_of_returns=count)
+
+
+def turn_of(scanner: ScannerScenario) -> Turn:
+    """Turn of a scanner: points_per_line steps, each of which fires all rings, one after another.
+
+    What lies outside the field of view is not fired.
+
+    Parameters
+    ----------
+    scanner : ScannerScenario
+    """
+    rings = (0.0,) if scanner.kind == "line" else scanner.rings
+    count = scanner.points_per_line * len(rings)
+    turned = np.arange(count) / count
+    low, high = scanner.field_of_view
+    in_view = np.mod(360.0 * turned - low, 360.0) <= high - low
+    elevation = np.tile(np.radians(rings), scanner.points_per_line)
+    return Turn(
+        turned[in_view],
+        2 * np.pi * turned[in_view],
+        elevation[in_view],
+        float(scanner.lines_per_second),
+    )
+
+
+def turns_of_a_pass(trajectory: Trajectory, scanner: ScannerScenario) -> int:
+    """Whole turns of a scanner between the leads of a trajectory.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    scanner : ScannerScenario
+    """
+    duration = trajectory.gps_time[-1] - trajectory.gps_time[0] - 2 * SETTINGS.lead
+    return int(duration * scanner.lines_per_second + 1e-6)  # times are known to 1e-10 s
+
+
+def pulses_of_a_pass(trajectory: Trajectory, scanner: ScannerScenario) -> int:
+    """Number of pulses that a scanner fires along a trajectory.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    scanner : ScannerScenario
+    """
+    return turns_of_a_pass(trajectory, scanner) * len(turn_of(scanner))
+
+
+def shoot(
+    surfaces: Surfaces,
+    origin: np.ndarray,
+    trajectory: Trajectory,
+    mounting: Mounting,
+    scanner: ScannerScenario,
+    streams: tuple,
+    divergence: float | None = None,
+    block: int | None = None,
+) -> Iterator[Shots]:
+    """Blocks of Shots of one pass, in time order, with the scanner's noise.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene, about its local origin.
+    origin : (3,) array
+        Map coordinates of the local origin. Units: m.
+    trajectory : Trajectory
+        Where the vehicle truly is, without gaps.
+    mounting : Mounting
+        Of this scanner, as it truly is.
+    scanner : ScannerScenario
+    streams : tuple of dict
+        As noise_streams gives them; drawn from copies, so that it can be done again.
+    divergence : float, optional
+        Full angle of the beam, the scanner's when not given. Units: rad.
+    block : int, optional
+        Rays in memory at a time; leaves no trace in the result.
+
+    Yields
+    ------
+    Shots
+        Each lasts until the next one.
+    """
+    block = block or SETTINGS.block_rays
+    if divergence is None:
+        divergence = 1e-3 * scanner.beam_divergence
+    streams = deepcopy(streams)
+    platform, turn = Platform.of(trajectory, mounting, origin), turn_of(scanner)
+    total = turns_of_a_pass(trajectory, scanner) * len(turn)
+    start = trajectory.gps_time[0] + SETTINGS.lead
+    step = block if divergence == 0 else max(1, block // len(POWER))
+    sizes = [min(step, total - first) for first in range(0, total, step)]
+    room, ahead = Workspace(), ScannerNoise(scanner, streams, sizes[0]) if sizes else None
+    for i, size in enumerate(sizes):
+        rays = platform.aim(np.arange(i * step, i * step + size), turn, start, room, divergence > 0)
+        hits = surfaces.hits(rays, origin, divergence, scanner.max_range, room)
+        # the next block's noise is drawn while this one is used
+        noise, ahead = (
+            ahead,
+            ScannerNoise(scanner, streams, sizes[i + 1]) if i + 1 < len(sizes) else None,
+        )
+        yield _measure(rays, hits, noise)
+
+
+def _measure(rays, hits, noise):
+    """Shots: what was hit, with noise. All echoes of a pulse share its measured angle."""
+
+    def all_rows(values):
+        return np.append(values, values[hits.pulse]) if len(hits.pulse) else values
+
+    return Shots(
+        gps_time=all_rows(rays.gps_time),
+        angle=all_rows(noise.angle(rays.angle)),
+        elevation=all_rows(rays.elevation),
+        range=noise.range(hits),
+        intensity=noise.intensity(hits),
+        incidence=hits.incidence,
+        point=hits.point,
+        triangle=hits.triangle,
+        kept=noise.kept(hits),
+        pulse=hits.pulse,
+    )

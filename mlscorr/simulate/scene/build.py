@@ -1,0 +1,123 @@
+"""All that a scanner can hit: a street, a river bank or the user's mesh, and surveyed targets."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from scipy.spatial.transform import Rotation
+
+from mlscorr.simulate.scenario import Scenario
+from mlscorr.simulate.scene.centre_line import CentreLine
+from mlscorr.simulate.scene.mesh import MeshSite
+from mlscorr.simulate.scene.placing import Targets, place_targets
+from mlscorr.simulate.scene.river import River
+from mlscorr.simulate.scene.shapes import UP, Mesh, join
+from mlscorr.simulate.scene.street import Street
+from mlscorr.survey import Trajectory
+
+SITES: dict[str, Any] = {"street": Street, "river": River, "mesh": MeshSite}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that a scanner can hit.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    target : (n,) int array
+        Which target each triangle belongs to, -1 for none.
+    targets : Targets
+    centre_line : CentreLine
+    fixed : int
+        The first so many triangles are ground and walls.
+    """
+
+    mesh: Mesh
+    target: np.ndarray
+    targets: Targets
+    centre_line: CentreLine
+    fixed: int
+
+
+def build_scene(scenario: Scenario, line: CentreLine, length: float, rng: Generator) -> Scene:
+    """Scene of a Scenario along a centre line, on which the drive is `length` (m) long.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    line : CentreLine
+    length : float
+        Of the drive along the line. Units: m.
+    rng : Generator
+
+    Raises
+    ------
+    ValueError
+        Targets that find no place, or a mesh that cannot be used.
+    """
+    site_rng, target_rng = rng.spawn(2)
+    site = SITES[scenario.scene.kind](scenario, line, length, site_rng)
+    placed = place_targets(scenario.targets, length, site, _yaw(scenario.scanner), target_rng)
+    surroundings = join([site.mesh, site.furniture(placed)])
+    number = np.repeat(np.arange(len(placed.targets)), [len(mesh) for mesh in placed.meshes])
+    return Scene(
+        join([surroundings, *placed.meshes]),
+        np.concatenate([np.full(len(surroundings), -1), number]),
+        placed.targets,
+        line,
+        len(site.mesh),
+    )
+
+
+def _yaw(scanners):
+    """Mean turn of the scan planes against the vehicle's cross-section, 0 for level ones. rad."""
+    turns = []
+    for scanner in scanners:
+        across = Rotation.from_euler("xyz", scanner.boresight, degrees=True).apply(UP)
+        level = np.hypot(across[0], across[1]) < 0.5
+        turns.append(0.0 if level else np.arctan(-across[0] / across[1]) if across[1] else 0.0)
+    return float(np.mean(turns))
+
+
+def sky_elevation(
+    scene: Scene, trajectory: Trajectory, origin: np.ndarray, rate: float = 2.0
+) -> np.ndarray:
+    """Elevation (n, 2) below which the sky is hidden to the left and the right. Units: rad.
+
+    Parameters
+    ----------
+    scene : Scene
+    trajectory : Trajectory
+        A true one, in map coordinates.
+    origin : (3,) array
+        Map coordinates of the scene's local origin. Units: m.
+    rate : float
+        At which it is looked at, to be interpolated. Units: Hz.
+    """
+    fan = np.radians([-40.0, -20.0, 0.0, 20.0, 40.0])  # about right and left; the median counts
+    elevation = np.radians(np.arange(0.5, 90.0))
+    start, end = trajectory.gps_time[[0, -1]]
+    times = np.linspace(start, end, max(2, round((end - start) * rate)))
+    pose = trajectory.at(times)
+    forward = pose.attitude.apply([0.0, 1.0, 0.0])
+    heading = np.arctan2(forward[:, 0], forward[:, 1])
+    azimuth = heading[:, None, None] + np.array([-np.pi / 2, np.pi / 2])[:, None] + fan
+    shape = (*azimuth.shape, len(elevation))
+    level = np.cos(elevation)
+    azimuth = azimuth[..., None]
+    direction = np.stack(
+        [
+            np.sin(azimuth) * level,
+            np.cos(azimuth) * level,
+            np.broadcast_to(np.sin(elevation), shape),
+        ],
+        axis=-1,
+    )
+    eye = np.broadcast_to((pose.position - origin)[:, None, None, None], direction.shape)
+    rays = np.concatenate([eye, direction], axis=-1).astype(np.float32)
+    hit = np.isfinite(scene.mesh.caster.cast_rays(rays)["t_hit"].numpy())
+    highest = np.where(hit, elevation + np.radians(0.5), 0.0).max(axis=-1)
+    sky = np.median(highest, axis=-1)
+    return np.column_stack([np.interp(trajectory.gps_time, times, column) for column in sky.T])

@@ -1,0 +1,198 @@
+"""The centre line of a way: a smooth curve by its own length."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.random import Generator
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
+
+from mlscorr.simulate.scene.shapes import UP
+from mlscorr.simulate.settings import SETTINGS
+from mlscorr.simulate.vehicle import VEHICLES
+
+
+@dataclass(frozen=True)
+class CentreLine:
+    """A smooth curve by its length s (m): position (3,) at the ground's level, and heading."""
+
+    curve: CubicSpline
+
+    def frame(self, s: float | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position, unit forward and horizontal unit right vector, each (..., 3), at s (...).
+
+        Parameters
+        ----------
+        s : (...) array
+            Length along the line. Units: m.
+        """
+        forward = self.curve(s, 1)
+        forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
+        right = np.cross(forward, UP)
+        return self.curve(s), forward, right / np.linalg.norm(right, axis=-1, keepdims=True)
+
+    def place(
+        self, s: float | np.ndarray, lateral: float | np.ndarray, height: float | np.ndarray
+    ) -> np.ndarray:
+        """Points (..., 3) at a distance to the right of the line and a height above it. m.
+
+        Parameters
+        ----------
+        s : (...) array
+            Length along the line. Units: m.
+        lateral : (...) array
+            To the right of the line. Units: m.
+        height : (...) array
+            Above it. Units: m.
+        """
+        position, _, right = self.frame(np.asarray(s, dtype=float))
+        lateral = np.asarray(lateral, dtype=float)[..., None]
+        return position + lateral * right + np.asarray(height, dtype=float)[..., None] * UP
+
+    @cached_property
+    def _samples(self):
+        """Lengths (k,) of samples every metre, and a tree of their plan positions."""
+        s = np.arange(self.curve.x[0], self.curve.x[-1], 1.0)
+        return s, cKDTree(self.curve(s)[:, :2])
+
+    def height(self, points: np.ndarray) -> np.ndarray:
+        """Height (n,) of the line at its nearest place to points (n, 2+). Units: m.
+
+        Parameters
+        ----------
+        points : (n, 2+) array
+            Units: m.
+        """
+        lengths, tree = self._samples
+        s = lengths[tree.query(points[:, :2])[1]]
+        position, forward, _ = self.frame(s)
+        along = np.einsum("ij,ij->i", points[:, :2] - position[:, :2], forward[:, :2])
+        return self.curve(s + along)[:, 2]
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Horizontal distance (...) of points (..., 3) from the whole line, good to 0.1 m. m.
+
+        Parameters
+        ----------
+        points : (..., 3) array
+            Units: m.
+        """
+        return self._samples[1].query(np.asarray(points)[..., :2])[0]
+
+    def distance_to_other_parts(
+        self, points: np.ndarray, s: np.ndarray, earlier: bool = False, apart: float = 30.0
+    ) -> np.ndarray:
+        """Horizontal distance (n,) of points (n, 3) at s (n,) from parts of the line that far on.
+
+        Infinite beyond about 10 m, and for a line that nowhere comes near itself. With `earlier`,
+        from parts before s alone.
+
+        Parameters
+        ----------
+        points : (n, 3) array
+            Units: m.
+        s : (n,) array
+            Of the parts that they belong to. Units: m.
+        earlier : bool
+            Whether parts before s alone count.
+        apart : float
+            Along the line, from which on a place is of another part. Units: m.
+        """
+        lengths, tree = self._samples
+        near, number = tree.query(
+            points[:, :2], 64, distance_upper_bound=10.0
+        )  # three parts within
+        ahead = np.append(lengths, np.inf)[number] - s[:, None]
+        other = ahead < -apart if earlier else np.abs(ahead) > apart
+        return np.where(other & np.isfinite(near), near, np.inf).min(axis=1)
+
+
+def winding_line(
+    length: float, turns: float, rng: Generator, kind: str = "street", speed: float = 8.0
+) -> CentreLine:
+    """A winding line of a length (m), starting at the local origin.
+
+    Its heading swings to each side up to `turns` (deg), in bends wide enough for the speed (m/s).
+    A street goes up and down by up to 6 %; a river is level.
+
+    Parameters
+    ----------
+    length : float
+        Units: m.
+    turns : float
+        How far the heading swings to each side. Units: deg.
+    rng : Generator
+    kind : str
+        Of scene.
+    speed : float
+        Units: m/s.
+    """
+    phase = rng.uniform(0.0, 2 * np.pi, 4)
+    slope = rng.uniform(-0.03, 0.03)
+    swing = np.radians(turns)
+    tightest = max(VEHICLES[kind].tightest_bend, speed**2 / SETTINGS.comfort)
+    bend = max(24.0, 1.3 * swing * tightest)  # m along the line for a radian of the wave
+    s = np.arange(-SETTINGS.margin, length + SETTINGS.margin + 1.0)
+    wave = 0.85 * np.sin(s / bend + phase[0]) + 0.15 * np.sin(2.2 * s / bend + phase[1])
+    heading = phase[3] + swing * wave
+    hill = max(40.0, 5.0 * speed)
+    height = np.zeros_like(s) if kind == "river" else 1.2 * np.sin(s / hill + phase[2]) + slope * s
+    plan = cumulative_trapezoid(np.column_stack([np.sin(heading), np.cos(heading)]), s, axis=0)
+    curve = CubicSpline(s, np.column_stack([np.vstack([np.zeros(2), plan]), height]))
+    return CentreLine(CubicSpline(s, curve(s) - curve(0.0)))
+
+
+def line_along(position: np.ndarray, smoothing: float = 3.0) -> tuple[CentreLine, float]:
+    """CentreLine and length (m) of the way along positions (n, 3), from the first to the last.
+
+    Standing still adds no length: places less than a metre from the one before are dropped. The
+    ends go on straight, with the slope they have there.
+
+    Parameters
+    ----------
+    position : (n, 3) array
+        Units: m.
+    smoothing : float
+        Of the line. Units: m.
+
+    Raises
+    ------
+    ValueError
+        A path that is too short for a scene.
+    """
+    kept = [0]
+    for i, place in enumerate(position[:, :2]):
+        last = position[kept[-1], :2]
+        if abs(place[0] - last[0]) + abs(place[1] - last[1]) >= 1.0:
+            kept.append(i)
+    path = position[kept]
+    s = _lengths(path)
+    if s[-1] < 2 * smoothing:
+        raise ValueError(
+            f"The path is {s[-1]:.1f} m long: a scene needs a drive of {2 * smoothing:.0f} m at "
+            "least."
+        )
+    lengths = np.linspace(0.0, s[-1], round(s[-1]) + 1)
+    path = np.column_stack([np.interp(lengths, s, column) for column in path.T])
+    path = _extend(gaussian_filter1d(_extend(path), smoothing, axis=0, mode="nearest"))
+    ends = 2 * round(
+        SETTINGS.margin
+    )  # of two extensions; the outer keeps the filter's own ends away
+    s = _lengths(path)
+    return CentreLine(CubicSpline(s - s[ends], path)), s[-1 - ends] - s[ends]
+
+
+def _lengths(path):
+    """Length (n,) along a polyline in plan."""
+    return np.append(0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T)))
+
+
+def _extend(path):
+    """A path of steps of a metre, longer by the margin at both ends."""
+    steps = np.arange(1.0, SETTINGS.margin + 1.0)[:, None]
+    before = path[0] - steps[::-1] * (path[5] - path[0]) / 5
+    after = path[-1] + steps * (path[-1] - path[-6]) / 5
+    return np.vstack([before, path, after])

@@ -1,0 +1,265 @@
+"""Where targets stand along a way, what hides them, and where other things keep clear of them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from mlscorr.simulate.scenario import TargetScenario
+from mlscorr.simulate.scene.centre_line import CentreLine
+from mlscorr.simulate.scene.shapes import UP, Mesh, box, join, post
+from mlscorr.simulate.scene.things import target
+from mlscorr.simulate.settings import SETTINGS
+
+
+@dataclass(frozen=True)
+class TargetSpot:
+    """A place for one target: the plane (unit vectors u, v) and the ground below its centre.
+
+    s and lateral (m) place it along the way; ground (m) is the height of what a post stands on.
+    """
+
+    support: str
+    s: float
+    lateral: float
+    centre: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    ground: float
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normal out of the visible side."""
+        return np.cross(self.u, self.v)
+
+
+@dataclass(frozen=True)
+class Targets:
+    """What the surveyor would find without noise: n targets in local coordinates.
+
+    kind (tuple of n), centre (n, 3) in m, normal (n, 3) out of the visible side, the road or wall
+    or post that carries each (tuple of n), and whether a narrow post stands in front (n,).
+    """
+
+    kind: tuple[str, ...]
+    centre: np.ndarray
+    normal: np.ndarray
+    support: tuple[str, ...]
+    hidden: np.ndarray
+
+    def __len__(self):
+        return len(self.kind)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Targets with their meshes (one each), the mesh of their posts, and their spots."""
+
+    targets: Targets
+    meshes: tuple[Mesh, ...]
+    posts: Mesh
+    spots: tuple[TargetSpot, ...]
+
+    def in_the_way(self, s: float, lateral: float, extent: float, wedge: float = 1.2) -> bool:
+        """Whether a thing at s, of a half extent along the way (m), would stand before a target.
+
+        It would where it lies in the wedge of 50 deg to each side (its tangent) from which a target
+        on its side is seen, or beside it.
+
+        Parameters
+        ----------
+        s : float
+            Along the line. Units: m.
+        lateral : float
+            To its right. Units: m.
+        extent : float
+            Half, along the way. Units: m.
+        wedge : float
+            Tangent of the half angle from which a target is seen.
+        """
+        for spot in self.spots:
+            if spot.support == "road" or np.sign(spot.lateral) == np.sign(lateral):
+                depth = max(0.0, abs(spot.lateral) - abs(lateral))
+                if abs(spot.s - s) < wedge * depth + extent + 1.2:
+                    return True
+        return False
+
+
+def place_targets(
+    scenario: TargetScenario, length: float, site: Any, yaw: float, rng: Generator
+) -> Placed:
+    """Placed targets, evenly along a way of a length (m) and on alternating sides.
+
+    Parameters
+    ----------
+    scenario : TargetScenario
+    site : object
+        Its ``spot(s, side, support, half, rng)`` gives a TargetSpot, or None where there is no room
+        for a target that reaches `half` (m) from its centre.
+    yaw : float
+        Turn of the scan plane against the cross-section, which posts' targets face. Units: rad.
+
+    Raises ValueError for targets that are too large or too many, or that find no place.
+    """
+    count = scenario.control + scenario.check
+    s = _along(scenario, count, length, rng)
+    start_side = rng.choice([-1, 1])
+    order = np.concatenate(
+        [rng.permutation(len(scenario.supports)) for _ in range(count)]  # all in turn, at random
+    )
+    steps = np.array([0, 0.03, -0.03, 0.08, -0.08, 0.15, -0.15, 0.25, -0.25, 0.4, -0.4])
+    spots: list[TargetSpot] = []
+    kinds = []
+    for i in range(count):
+        kind = scenario.kinds[i % len(scenario.kinds)]
+        half = _half(kind, scenario.size)
+        side, support = start_side * (-1) ** i, scenario.supports[order[i]]
+        near = np.clip(s[i] + length / count * steps, 0.0, length)
+        spots.append(_find_spot(site, near, side, support, half, spots, rng))
+        kinds.append(kind)
+    spots = [_faced(spot, yaw, rng) if spot.support == "post" else spot for spot in spots]
+    hidden = _choose_hidden(spots, scenario.hidden, rng)
+    posts = [_own_post(spot, scenario.size) for spot in spots if spot.support == "post"]
+    posts += [_slat(spots[i], kinds[i], scenario.size, rng) for i in np.flatnonzero(hidden)]
+    return _placed(tuple(kinds), tuple(spots), scenario.size, hidden, posts)
+
+
+def _placed(kinds, spots, size, hidden, posts):
+    """Placed targets of some kinds on their spots, with the meshes of posts."""
+    nothing = Mesh(np.empty((0, 3, 3)), np.empty(0))
+    targets = Targets(
+        kinds,
+        np.array([spot.centre for spot in spots]),
+        np.array([spot.normal for spot in spots]),
+        tuple(spot.support for spot in spots),
+        hidden,
+    )
+    meshes = tuple(
+        target(kind, spot.centre, spot.u, spot.v, size)
+        for kind, spot in zip(kinds, spots, strict=True)
+    )
+    return Placed(targets, meshes, join([nothing, *posts]), spots)
+
+
+def _half(kind, size):
+    """Half the edge of a target with its board. Units: m."""
+    return size / 2 * (SETTINGS.board_edge if kind == "circle" else 1.0)
+
+
+def _along(scenario, count, length, rng):
+    """Even places (count,) along the way, each moved a little at random. Units: m."""
+    if scenario.size > SETTINGS.largest_target:
+        raise ValueError(
+            f"Targets of {scenario.size} m are too large: boards of {SETTINGS.board_edge} times "
+            "that must fit a lane and a wall's ground floor. "
+            f"Give a size up to {SETTINGS.largest_target} m."
+        )
+    lead = min(SETTINGS.run_in, length / 4)
+    nearest, jitter = 2 - 2 * SETTINGS.jitter, SETTINGS.jitter
+    spacing = (length - 2 * lead) / count
+    half = max(_half(kind, scenario.size) for kind in scenario.kinds)
+    across = 2 * np.sqrt(2) * half + SETTINGS.target_clearance
+    if nearest * spacing < across:
+        room = int((length - 2 * lead) * nearest / across)
+        raise ValueError(
+            f"{count} targets of {scenario.size} m do not fit along {length:.0f} m without "
+            f"touching: there is room for {room}. Give fewer, or a longer drive."
+        )
+    return lead + spacing * (np.arange(count) + 0.5 + rng.uniform(-jitter, jitter, count))
+
+
+def _find_spot(site, near, side, support, half, others, rng):
+    """The first TargetSpot at lengths near (k,) in m with room, apart from others; or a post."""
+    apart = 2 * np.sqrt(2) * half + SETTINGS.target_clearance
+    for kind in dict.fromkeys([support, "post"]):
+        for s in near:
+            for on_side in (side, -side):
+                spot = site.spot(float(s), on_side, kind, half, rng)
+                if spot is not None and all(
+                    np.linalg.norm(spot.centre - other.centre) > apart for other in others
+                ):
+                    return spot
+    raise ValueError(
+        f"Target {len(others) + 1} finds no free place beside the drive at {near[0]:.0f} m: too "
+        "little room between drive and walls, no ground, or no free sight."
+    )
+
+
+def _faced(spot, yaw, rng):
+    """A post's TargetSpot turned about the vertical towards the oblique beams of a scan plane."""
+    turn = rng.uniform(0.0, 1.0) * np.clip(yaw, -np.radians(35.0), np.radians(35.0))
+    cos, sin = np.cos(turn), np.sin(turn)
+    u = np.array([cos * spot.u[0] - sin * spot.u[1], sin * spot.u[0] + cos * spot.u[1], 0.0])
+    return replace(spot, u=u)
+
+
+def _choose_hidden(spots, share, rng):
+    """Which targets are partly hidden: a share of all, none of those that lie flat. (n,) bool."""
+    upright = [i for i, spot in enumerate(spots) if abs(spot.normal[2]) < 0.2]
+    hidden = np.zeros(len(spots), dtype=bool)
+    hidden[rng.permutation(upright)[: round(share * len(spots))].astype(int)] = True
+    return hidden
+
+
+def _own_post(spot, size, width=0.06):
+    """The post of a width (m) behind a target, from the ground to its upper edge."""
+    foot = spot.centre - width * spot.normal
+    foot[2] = spot.ground - 0.3
+    return post(foot, spot.centre[2] + size / 2 - foot[2], width, 0.3)
+
+
+def _slat(spot, kind, size, rng, distance=0.15, depth=0.02):
+    """An upright slat close in front of a target (m), flat: it hides 20 to 40 % of it."""
+    width = size * rng.uniform(*{"circle": (0.17, 0.25), "square": (0.23, 0.33)}[kind])
+    lateral = size * rng.uniform(-0.06, 0.06)
+    corner = spot.centre + distance * spot.normal + (lateral - width / 2) * spot.u
+    corner[2] = spot.ground - 0.3
+    height = spot.centre[2] + _half(kind, size) + 0.1 - corner[2]
+    return box(corner, width * spot.u, height * UP, depth * spot.normal, 0.3)
+
+
+def eyes(line: CentreLine, s: float) -> np.ndarray:
+    """Places (3, 3) on a CentreLine from which a target at s (m) must be seen.
+
+    Parameters
+    ----------
+    line : CentreLine
+    s : float
+        Of the target. Units: m.
+    """
+    return line.place(s + SETTINGS.sight_distance * np.arange(-1, 2), 0.0, SETTINGS.eye_height)
+
+
+def scatter(
+    density: float, start: float, end: float, is_free: Callable, rng: Generator, places: int = 12
+) -> list[tuple[float, int]]:
+    """Places (s, side) of things, so many per 100 m of way between two lengths (m), evenly.
+
+    Each stretch of the way takes one thing, at a random place of it where is_free(s, side);
+    after so many random places it goes without.
+
+    Parameters
+    ----------
+    density : float
+        Things per 100 m.
+    start, end : float
+        Units: m.
+    is_free : function
+        Of s and side.
+    rng : Generator
+    places : int
+        Random places for a thing before its stretch goes without.
+    """
+    count = round(density * (end - start) / 100.0)
+    stretch = (end - start) / max(count, 1)
+    things = []
+    for i in range(count):
+        lengths = start + stretch * (i + rng.uniform(0.0, 1.0, places))
+        sides = rng.choice([-1, 1], places)
+        for s, side in zip(lengths, sides, strict=True):
+            if is_free(s, side):
+                things.append((s, side))
+                break
+    return things

@@ -1,0 +1,106 @@
+"""The cross-section of a street."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.simulate.scenario import DriveScenario
+from mlscorr.simulate.vehicle import CAR
+
+
+@dataclass(frozen=True)
+class StreetSection:
+    """The cross-section of a street along its length.
+
+    Parameters
+    ----------
+    road : float
+        Half width of the carriageway. Units: m.
+    turns : tuple of float
+        Lengths about which it widens to `widened`, for a U-turn. Units: m.
+    widened : float
+        A van's full lock, and room. Units: m.
+    pavement, garden : float
+        Width from the kerb to the house fronts, and of the ground behind them. Units: m.
+    kerb : float
+        Height. Units: m.
+    cross_fall : float
+        Of the carriageway, usual for drainage. Units: ratio.
+    clearance : float
+        By which other parts of the way may come nearer than a thing's own. Units: m.
+    """
+
+    road: float = 3.0
+    turns: tuple[float, ...] = ()
+    widened: float = CAR.turning_radius + 2.0
+    pavement: float = 1.8
+    garden: float = 9.0
+    kerb: float = 0.12
+    cross_fall: float = 0.025
+    clearance: float = 0.7
+
+    def half_width(self, s: float | np.ndarray) -> np.ndarray:
+        """Half width (...) at lengths s (...). Units: m.
+
+        Parameters
+        ----------
+        s : (...) array
+            Length along the line. Units: m.
+        """
+        width = np.full(np.shape(s), self.road)
+        for middle in self.turns:
+            depth = np.clip((20.0 - np.abs(s - middle)) / 8.0, 0.0, 1.0)
+            widened = self.road + max(0.0, self.widened - self.road) * depth**2 * (3 - 2 * depth)
+            width = np.maximum(width, widened)
+        return width
+
+    def height(self, s: float | np.ndarray, lateral: float | np.ndarray) -> np.ndarray:
+        """Height (...) of the carriageway above its edge. Units: m.
+
+        Parameters
+        ----------
+        s : (...) array
+            Length along the line. Units: m.
+        lateral : (...) array
+            To the right of the line. Units: m.
+        """
+        return self.cross_fall * self.road * (1.0 - np.abs(lateral) / self.half_width(s))
+
+    def under_wheels(
+        self, s: float | np.ndarray, lateral: float | np.ndarray, wheels: float = 0.5
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Height of a vehicle's middle over the edge (m) and its fall to the right (rad), (...).
+
+        Its wheels (m) smooth the crown.
+
+        Parameters
+        ----------
+        s : (...) array
+            Length along the line. Units: m.
+        lateral : (...) array
+            To the right of the line. Units: m.
+        wheels : float
+            Over which the crown is smoothed. Units: m.
+        """
+        fall = self.cross_fall * self.road / self.half_width(s)
+        smooth = np.hypot(lateral, wheels)
+        return self.cross_fall * self.road - fall * smooth, fall * np.asarray(lateral) / smooth
+
+
+def section(scenario: DriveScenario, length: float, lane_edge: float = 2.4) -> StreetSection:
+    """StreetSection of a street wide enough for the lanes of a DriveScenario's passes.
+
+    A lane's middle keeps 2.4 m from the kerb, as cars are parked half on it.
+
+    Parameters
+    ----------
+    scenario : DriveScenario
+    length : float
+        Of the drive along the line. Units: m.
+    lane_edge : float
+        From the middle of a lane to the kerb. Units: m.
+    """
+    lateral = max(abs(lane.lateral) for lane in scenario.passes)
+    ends = {"forward": length + 6.0, "back": -6.0}
+    turns = {ends[lane.direction] for lane in scenario.passes} if scenario.u_turn else ()
+    return StreetSection(max(StreetSection.road, lateral + lane_edge), tuple(sorted(turns)))

@@ -1,0 +1,156 @@
+"""Pieces of surface as triangles: quads, boxes, posts; and rays that meet them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles (n, 3, 3) in m about a local origin, with the reflectance (n,) of each."""
+
+    triangles: np.ndarray
+    reflectance: np.ndarray
+
+    def __len__(self):
+        return len(self.triangles)
+
+    @cached_property
+    def caster(self) -> Any:
+        """Open3D's ray caster of the triangles."""
+        return ray_caster(self.triangles)
+
+    @cached_property
+    def normal(self) -> np.ndarray:
+        """Unit normal (n, 3) of each triangle; zero for one without area, which nothing hits."""
+        a, b, c = np.moveaxis(self.triangles, 1, 0)
+        normal = np.cross(b - a, c - a)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        return normal / np.where(length > 0, length, 1.0)
+
+    @cached_property
+    def offset(self) -> np.ndarray:
+        """Distance (n,) of each triangle's plane from the origin, along its normal. Units: m."""
+        return np.einsum("ij,ij->i", self.normal, self.triangles[:, 0])
+
+
+def join(meshes: Sequence[Mesh]) -> Mesh:
+    """One mesh of several.
+
+    Parameters
+    ----------
+    meshes : sequence of Mesh
+    """
+    return Mesh(
+        np.concatenate([m.triangles for m in meshes]),
+        np.concatenate([m.reflectance for m in meshes]),
+    )
+
+
+def four_corners(
+    a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, reflectance: float
+) -> Mesh:
+    """Mesh of quads with corners a, b, c, d (..., 3) in turn, as two triangles each.
+
+    Parameters
+    ----------
+    a, b, c, d : (..., 3) array
+        Units: m.
+    reflectance : float
+    """
+    a, b, c, d = np.broadcast_arrays(a, b, c, d)
+    triangles = np.stack([np.stack([a, b, c], axis=-2), np.stack([a, c, d], axis=-2)], axis=-3)
+    triangles = triangles.reshape(-1, 3, 3).astype(float)
+    return Mesh(triangles, np.full(len(triangles), float(reflectance)))
+
+
+def quads(corner: np.ndarray, u: np.ndarray, v: np.ndarray, reflectance: float) -> Mesh:
+    """Mesh of parallelograms from a corner along two edges, each (..., 3) in m.
+
+    Parameters
+    ----------
+    corner : (..., 3) array
+        Units: m.
+    u, v : (..., 3) array
+        Edge. Units: m.
+    reflectance : float
+
+    Examples
+    --------
+    >>> len(quads(np.zeros((5, 3)), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.5))
+    10
+    """
+    corner, u, v = np.asarray(corner), np.asarray(u), np.asarray(v)
+    return four_corners(corner, corner + u, corner + u + v, corner + v, reflectance)
+
+
+def box(
+    corner: np.ndarray, u: np.ndarray, v: np.ndarray, w: np.ndarray, reflectance: float
+) -> Mesh:
+    """Mesh of the six faces of a box from a corner along three edges (3,) in m.
+
+    Parameters
+    ----------
+    corner : (3,) array
+        Units: m.
+    u, v, w : (3,) array
+        Edge. Units: m.
+    reflectance : float
+    """
+    sides = [(u, v), (v, w), (w, u)]
+    near = [quads(corner, p, q, reflectance) for p, q in sides]
+    far = [quads(corner + o, p, q, reflectance) for (p, q), o in zip(sides, (w, u, v), strict=True)]
+    return join(near + far)
+
+
+def post(foot: np.ndarray, height: float, width: float, reflectance: float) -> Mesh:
+    """Mesh of an upright square post, its foot (3,) in the middle of its base. Units: m.
+
+    Parameters
+    ----------
+    foot : (3,) array
+        Units: m.
+    height : float
+        Units: m.
+    width : float
+        Of its square. Units: m.
+    reflectance : float
+    """
+    u, v = np.array([width, 0.0, 0.0]), np.array([0.0, width, 0.0])
+    return box(foot - (u + v) / 2, u, v, height * UP, reflectance)
+
+
+def ray_caster(triangles: np.ndarray) -> Any:
+    """Open3D's ray caster of triangles (n, 3, 3) about a local origin, in their order.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) array
+        Units: m.
+    """
+    import open3d as o3d
+
+    corners: Any = triangles.reshape(-1, 3).astype(np.float32)
+    caster = o3d.t.geometry.RaycastingScene()
+    numbers: Any = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+    caster.add_triangles(corners, numbers)
+    return caster
+
+
+def sees(caster: Any, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Whether no triangle stands between points (n, 3) and (n, 3), to 5 cm: (n,) bool.
+
+    Parameters
+    ----------
+    caster : RaycastingScene
+    start, end : (n, 3) array
+        Units: m.
+    """
+    rays = np.hstack([start, end - start]).astype(np.float32)
+    free = caster.cast_rays(rays)["t_hit"].numpy()
+    return free > 1.0 - 0.05 / np.linalg.norm(end - start, axis=1)

@@ -1,0 +1,278 @@
+"""What stands along a way, as triangles: targets, houses, trees, lamps, cars."""
+
+import numpy as np
+from numpy.random import Generator
+
+from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, join, post, quads
+from mlscorr.simulate.settings import SETTINGS
+
+
+def target(
+    kind: str, centre: np.ndarray, u: np.ndarray, v: np.ndarray, size: float, segments: int = 64
+) -> Mesh:
+    """Mesh of a target about its centre (3,), in the plane of the unit vectors u, v (3,).
+
+    A circle is a bright disc of diameter `size` within a darker square board of the same plane;
+    a square is a bright plate of edge `size`. Units: m. With 64 segments the edge of a disc departs
+    0.4 mm from a circle of 0.6 m.
+
+    Parameters
+    ----------
+    kind : str
+        circle or square.
+    centre : (3,) array
+        Units: m.
+    u, v : (3,) array
+        Unit vector in its plane.
+    size : float
+        Units: m.
+    segments : int
+        Of a disc.
+    """
+    if kind == "square":
+        return quads(centre - size / 2 * (u + v), size * u, size * v, SETTINGS.white)
+    angle = np.linspace(0.0, 2 * np.pi, segments + 1)
+    ray = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
+    to_edge = 1 / np.maximum(abs(np.cos(angle)), abs(np.sin(angle)))[:, None]
+    rim = centre + size / 2 * ray
+    edge = centre + SETTINGS.board_edge * size / 2 * to_edge * ray
+    fan = np.stack([np.broadcast_to(centre, rim[1:].shape), rim[:-1], rim[1:]], axis=1)
+    disc = Mesh(fan, np.full(segments, SETTINGS.white))
+    return join([disc, four_corners(rim[:-1], edge[:-1], edge[1:], rim[1:], SETTINGS.black)])
+
+
+def facade(
+    corner: np.ndarray,
+    along: np.ndarray,
+    height: float,
+    inward: np.ndarray,
+    reflectance: float,
+    ground: float = 3.2,
+    storey: float = 3.0,
+    bay: float = 2.6,
+) -> Mesh:
+    """Mesh of a house front with a plain ground floor and rows of recessed windows above.
+
+    Parameters
+    ----------
+    corner : (3,) array
+        Lower corner. Units: m.
+    along : (3,) array
+        Horizontal edge. Units: m.
+    height : float
+        Units: m.
+    inward : (3,) array
+        Unit normal into the house.
+    ground : float
+        Height of the ground floor. Units: m.
+    storey, bay : float
+        Height and width of what holds a window. Units: m.
+    """
+    rows = max(0, int((height - ground) // storey))
+    if rows == 0:
+        return quads(corner, along, height * UP, reflectance)
+    columns = max(1, int(np.linalg.norm(along) // bay))
+    top = ground + rows * storey
+    plain = quads(
+        np.array([corner, corner + top * UP]),
+        along,
+        np.array([ground * UP, (height - top) * UP]),
+        reflectance,
+    )
+    column, row = np.meshgrid(np.arange(columns), np.arange(rows))
+    u, v = along / columns, storey * UP
+    cell = corner + ground * UP + column.reshape(-1, 1) * u + row.reshape(-1, 1) * v
+    return join([plain, _windows(cell, u, v, 0.18 * inward, reflectance)])
+
+
+def _windows(cell, u, v, depth, reflectance, glass=0.1):
+    """Mesh of cells (n, 3) of a front, spanned by u and v, each with a recessed window.
+
+    glass: reflectance of a pane off its mirror direction. Units: m.
+    """
+    window, wu, wv = cell + 0.25 * u + 0.25 * v, 0.5 * u, 0.5 * v
+    frame_and_reveal = [
+        quads(cell, u, 0.25 * v, reflectance),
+        quads(cell + 0.75 * v, u, 0.25 * v, reflectance),
+        quads(cell + 0.25 * v, 0.25 * u, wv, reflectance),
+        quads(cell + 0.25 * v + 0.75 * u, 0.25 * u, wv, reflectance),
+        quads(window, wu, depth, reflectance),
+        quads(window + wv, wu, depth, reflectance),
+        quads(window, wv, depth, reflectance),
+        quads(window + wu, wv, depth, reflectance),
+    ]
+    return join([*frame_and_reveal, quads(window + depth, wu, wv, glass)])
+
+
+def house(
+    near: np.ndarray,
+    far: np.ndarray,
+    inward: np.ndarray,
+    height: float,
+    reflectance: float,
+    depth: float = 8.0,
+    ridge: float = 2.5,
+    lowest: float = 5.0,
+) -> Mesh:
+    """Mesh of a house, or of a plain wall where it is low.
+
+    near, far (3,): the lower corners of its front on the ground; inward (3,): unit normal into
+    it; height (m) of the eaves above the lower of the corners. End walls stand across the street,
+    so that they show in gaps.
+
+    Parameters
+    ----------
+    near : (3,) array
+        Lower corner of its front. Units: m.
+    far : (3,) array
+        The other one. Units: m.
+    inward : (3,) array
+        Unit normal into it.
+    height : float
+        Of the eaves above the lower corner. Units: m.
+    reflectance : float
+    depth : float
+        Units: m.
+    ridge : float
+        Of the roof above the eaves. Units: m.
+    lowest : float
+        Height from which it is a house and no wall. Units: m.
+    """
+    base = np.array([near[0], near[1], min(near[2], far[2]) - 0.5])
+    along = (far - near) * [1.0, 1.0, 0.0]
+    height = height + 0.5
+    is_house = height - 0.5 >= lowest
+    back = (depth if is_house else 0.3) * inward
+    ends = quads(np.array([base, base + along]), back, height * UP, reflectance)
+    if not is_house:
+        top = quads(base + height * UP, along, back, reflectance)
+        return join([quads(base, along, height * UP, reflectance), ends, top])
+    ground = 3.2 + 0.5 + abs(far[2] - near[2])  # windows start above both corners
+    eaves = np.array([base + height * UP, base + height * UP + back])
+    slopes = np.array([back / 2 + ridge * UP, -back / 2 + ridge * UP])
+    roof = quads(eaves, along, slopes, 0.3)
+    gable = eaves[0] + np.array([0.0 * back, back, back / 2 + ridge * UP])
+    gables = Mesh(np.array([gable, gable + along]), np.full(2, reflectance))
+    return join([facade(base, along, height, inward, reflectance, ground), ends, roof, gables])
+
+
+def leaves(
+    centre: np.ndarray,
+    radii: np.ndarray,
+    forward: np.ndarray,
+    count: int,
+    rng: Generator,
+    edge: float = 0.2,
+) -> Mesh:
+    """Mesh of leaves scattered in a crown, so that a beam returns from any depth of it.
+
+    Parameters
+    ----------
+    centre : (3,) array
+        Units: m.
+    radii : (3,) array
+        Half axes of the crown along `forward`, across it and upright. Units: m.
+    forward : (3,) array
+        Horizontal unit vector.
+    count : int
+    edge : float
+        Of a leaf: a bunch of real ones, so that hundreds fill a crown. Units: m.
+    """
+    place = rng.standard_normal((count, 3))
+    place *= rng.uniform(0.1, 1.0, (count, 1)) ** (1 / 3) / np.linalg.norm(
+        place, axis=1, keepdims=True
+    )
+    axes = np.array([forward, np.cross(forward, UP), UP])
+    middle = centre + (place * radii) @ axes
+    corners = rng.standard_normal((count, 3, 3))
+    corners -= corners.mean(axis=1, keepdims=True)
+    corners *= edge / np.linalg.norm(corners, axis=2, keepdims=True).mean(axis=1, keepdims=True)
+    reflectance = rng.uniform(0.35, 0.6, count)  # of green leaves at 905 nm
+    return Mesh(middle[:, None] + 0.58 * corners, reflectance)
+
+
+def tree(
+    foot: np.ndarray,
+    forward: np.ndarray,
+    crown: np.ndarray,
+    rng: Generator,
+    most_leaves: int = 1500,
+    bark: float = 0.25,
+) -> Mesh:
+    """Mesh of a tree from its foot (3,): a trunk, and leaves above the height of a vehicle.
+
+    crown (3,): half axes of the crown along the unit vector `forward`, across it, upright. m.
+
+    Parameters
+    ----------
+    foot : (3,) array
+        Units: m.
+    forward : (3,) array
+        Unit vector.
+    crown : (3,) array
+        Half axes along forward, across it, upright. Units: m.
+    rng : Generator
+    most_leaves : int
+    bark : float
+        Reflectance.
+    """
+    trunk = rng.uniform(2.9, 3.4)
+    middle = foot + (trunk + crown[2]) * UP
+    count = int(min(most_leaves, rng.uniform(150.0, 320.0) * np.prod(crown)))
+    return join(
+        [
+            post(foot - 0.3 * UP, trunk + 0.3 + crown[2], rng.uniform(0.18, 0.3), bark),
+            leaves(middle, crown, forward, count, rng),
+        ]
+    )
+
+
+def lamp(foot: np.ndarray, towards: np.ndarray) -> Mesh:
+    """Mesh of a street lamp of 6 m on its foot (3,), its arm along the unit vector `towards`.
+
+    Parameters
+    ----------
+    foot : (3,) array
+        Units: m.
+    towards : (3,) array
+        Unit vector of its arm.
+    """
+    side = np.cross(UP, towards)
+    arm = box(foot + 5.9 * UP - 0.1 * side, 1.2 * towards, 0.2 * side, 0.12 * UP, 0.3)
+    return join([post(foot - 0.3 * UP, 6.3, 0.14, 0.3), arm])
+
+
+def car(
+    place: np.ndarray,
+    forward: np.ndarray,
+    right: np.ndarray,
+    reflectance: float,
+    width: float = 1.7,
+) -> Mesh:
+    """Mesh of a parked car about the place (3,) on the ground under its middle.
+
+    Parameters
+    ----------
+    place : (3,) array
+        On the ground under its middle. Units: m.
+    forward, right : (3,) array
+        Unit vector.
+    reflectance : float
+    width : float
+        Units: m.
+    """
+    ahead = np.array([-2.1, 2.1, 2.1, 1.15, 0.45, -1.1, -1.8, -2.1])[:, None]  # m from its middle
+    above = np.array([0.25, 0.25, 0.65, 0.85, 1.4, 1.42, 0.95, 0.85])[:, None]  # m, of the ground
+    outline = place + ahead * forward + above * UP
+    middle = place + 0.7 * UP
+    near, far = outline - width / 2 * right, outline + width / 2 * right
+    skin = four_corners(near, np.roll(near, -1, 0), np.roll(far, -1, 0), far, reflectance)
+    sides = [
+        np.stack([np.broadcast_to(m, s.shape), s, np.roll(s, -1, 0)], axis=1)
+        for m, s in (
+            (middle - width / 2 * right, near),
+            (middle + width / 2 * right, far),
+        )
+    ]
+    sides = np.concatenate(sides)
+    return join([skin, Mesh(sides, np.full(len(sides), reflectance))])

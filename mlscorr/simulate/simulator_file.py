@@ -1,0 +1,163 @@
+"""simulator.toml: what a simulator believes of a survey, and the effects that it has."""
+
+import warnings
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import tomlkit
+from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
+
+from mlscorr.effects import Effect, in_order
+from mlscorr.io.survey_sections import MountingSection, Positive, PosSection, ScannerSection
+from mlscorr.io.toml_file import TomlSection, read_toml
+from mlscorr.simulate.scenario import EffectScenario
+from mlscorr.survey import Mounting, Pos, Scanner, Survey
+
+DECIMALS = 12  # of numbers in deg that a person may have written
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """What is believed of a survey, so that it can be simulated.
+
+    Parameters
+    ----------
+    mounting : Mounting or None
+        As recorded; None where nobody knows it.
+    scanner : Scanner
+    pos : Pos
+    effects : tuple of Effect
+        That turn what is true into what is recorded, in the order in which they act.
+    """
+
+    mounting: Mounting | None
+    scanner: Scanner
+    pos: Pos
+    effects: tuple[Effect, ...] = ()
+
+
+class WindowSection(TomlSection):
+    """A time in which the POS is worse, see Pos."""
+
+    start: Annotated[float, Field(allow_inf_nan=False)]  # gps_time, s
+    length: Positive  # s
+    factor: Positive  # of the largest error on the stated sigma
+    shape: Literal["rise", "hump"] = "rise"
+
+
+class BelievedPosSection(PosSection):
+    """The POS that the survey states, and windows in which it errs more."""
+
+    windows: list[WindowSection] = Field(default_factory=list)
+
+    def pos(self) -> Pos:
+        """The Pos with its windows."""
+        windows = tuple((w.start, w.length, w.factor, w.shape) for w in self.windows)
+        return replace(super().pos(), windows=windows)
+
+
+class SimulatorFile(TomlSection):
+    """What stands in simulator.toml, in its own units (deg)."""
+
+    mounting: MountingSection | None = None
+    scanner: ScannerSection = ScannerSection()
+    pos: BelievedPosSection = BelievedPosSection()
+    effects: list[EffectScenario] = Field(default_factory=list)
+
+    @property
+    def imperfections(self) -> tuple[Effect, ...]:
+        """The effects, in the order in which they act."""
+        return in_order(effect.effect for effect in self.effects)
+
+    @model_validator(mode="after")
+    def _has_each_noise_once(self):
+        self.imperfections  # noqa: B018 - refuses random effects that are there twice
+        return self
+
+
+def beliefs_of(survey: Survey) -> Simulator:
+    """The Simulator that survey.toml describes: no effects.
+
+    How well a calibration knows the mounting is no part of it.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    mounting = survey.mounting and replace(survey.mounting, covariance=None)
+    return Simulator(mounting, survey.scanner, survey.pos)
+
+
+def read_simulator(path: Path | str) -> Simulator:
+    """Simulator of a simulator.toml.
+
+    Sections [mounting], [scanner] and [pos] have the keys and units of survey.toml, [[effects]]
+    those of scenario.toml; what is left out has the defaults of survey.toml.
+
+    Raises ValueError for bad TOML, unknown keys and effects (with the nearest known one) and
+    values that no survey can have; FileNotFoundError where there is no such file.
+
+    Parameters
+    ----------
+    path : path
+    """
+    file = read_toml(path, SimulatorFile, "a simulator")
+    mounting = None if file.mounting is None else file.mounting.mounting()
+    return Simulator(mounting, file.scanner.scanner(), file.pos.pos(), file.imperfections)
+
+
+def write_simulator(simulator: Simulator, path: Path | str) -> None:
+    """Write simulator.toml; a file there is replaced.
+
+    Numbers of up to 12 decimals in deg are read as the same to the last bit, others to 1e-15 rad.
+
+    Parameters
+    ----------
+    simulator : Simulator
+    path : path
+    """
+    scanner, pos, mounting = simulator.scanner, simulator.pos, simulator.mounting
+    sections: dict[str, Any] = {
+        "scanner": {
+            "range_noise": float(scanner.range_noise),
+            "angle_noise": _degrees(scanner.angle_noise),
+            "lines_per_second": float(scanner.lines_per_second),
+        },
+        "pos": {
+            "position_sigma": float(pos.position_sigma),
+            "attitude_sigma": [_degrees(sigma) for sigma in pos.attitude_sigma],
+            "correlation_time": float(pos.correlation_time),
+        },
+    }
+    if mounting is not None:
+        lever_arm = np.asarray(mounting.lever_arm, dtype=float).tolist()
+        boresight = {"lever_arm": lever_arm, "boresight": _angles(mounting.boresight)}
+        sections = {"mounting": boresight, **sections}
+    if pos.windows:
+        sections["pos"]["windows"] = [
+            dict(zip(WindowSection.model_fields, window, strict=True)) for window in pos.windows
+        ]
+    if simulator.effects:
+        sections["effects"] = [effect.document() for effect in simulator.effects]
+    Path(path).write_text(tomlkit.dumps(sections), encoding="utf-8")
+
+
+def _degrees(radians):
+    """The number in deg that is these radians when it is read: rounded where that is the same."""
+    degrees = np.degrees(radians)
+    rounded = np.round(degrees, DECIMALS)
+    return float(rounded if np.radians(rounded) == radians else degrees)
+
+
+def _angles(boresight):
+    """Angles [a, b, c] in deg of R_L^P = Rz(c) Ry(b) Rx(a), rounded as above."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Gimbal lock")
+        angles = boresight.as_euler("xyz", degrees=True)
+    rounded = np.round(angles, DECIMALS) + 0.0
+    repeated = Rotation.from_euler("xyz", rounded, degrees=True)
+    same = np.array_equal(repeated.as_quat(), boresight.as_quat())
+    return (rounded if same else angles).tolist()
