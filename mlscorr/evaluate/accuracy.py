@@ -9,13 +9,15 @@ import math
 
 import numpy as np
 
+from mlscorr.evaluate.settings import SETTINGS
+
 STANDARD = "ASPRS Positional Accuracy Standards for Digital Geospatial Data, Edition 2 (2023)"
-FEWEST = 30  # check points
-TWICE = 2.0  # how much more accurate the points must be than the product
 AXES = ("horizontal", "vertical")
 
 
-def positional_accuracy(residuals, survey_sigma, points, based_on="check"):
+def positional_accuracy(
+    residuals: np.ndarray, survey_sigma: np.ndarray, points: int, based_on: str | None = "check"
+) -> dict[str, object]:
     """Accuracy of a product from what remains at surveyed points, as report.json has it.
 
     RMSE_H and RMSE_V of the product join those of its fit to the points and those of the points:
@@ -34,8 +36,8 @@ def positional_accuracy(residuals, survey_sigma, points, based_on="check"):
         each left out in turn, which the standard doesn't accept as a test.
 
     >>> residuals, sigma = np.full((30, 3), 0.03), np.full((30, 3), 0.004)
-    >>> found = positional_accuracy(residuals, sigma, 30)
-    >>> found["rmse_horizontal"], found["class_horizontal_cm"], found["conformant"]
+    >>> accuracy = positional_accuracy(residuals, sigma, 30)
+    >>> accuracy["rmse_horizontal"], accuracy["class_horizontal_cm"], accuracy["conformant"]
     (0.0428..., 5, True)
     """
     if len(residuals) == 0:
@@ -44,7 +46,7 @@ def positional_accuracy(residuals, survey_sigma, points, based_on="check"):
         np.asarray(residuals, float).reshape(-1, 3), np.asarray(survey_sigma, float).reshape(-1, 3)
     ))  # fmt: skip
     both = {key: _joined(fit[key], survey[key]) for key in fit}
-    found = {
+    accuracy = {
         "standard": STANDARD,
         "based_on": based_on,
         "points": points,
@@ -55,9 +57,9 @@ def positional_accuracy(residuals, survey_sigma, points, based_on="check"):
         "rmse_3d": _joined(*both.values()),
         "class_horizontal_cm": _class(both["rmse_horizontal"]),
         "class_vertical_cm": _class(both["rmse_vertical"]),
-        "conformant": based_on == "check" and points >= FEWEST,
+        "conformant": based_on == "check" and points >= SETTINGS.check_points,
     }
-    return {**found, "statement": _statement(found)}
+    return {**accuracy, "statement": _statement(accuracy)}
 
 
 def _rms(values, axes):
@@ -67,8 +69,8 @@ def _rms(values, axes):
     return float(np.sqrt((values[:, :axes] ** 2).sum(axis=1).mean()))
 
 
-def _joined(one, other):
-    return None if one is None or other is None else math.hypot(one, other)
+def _joined(fit, survey):
+    return None if fit is None or survey is None else math.hypot(fit, survey)
 
 
 def _class(rmse):
@@ -76,48 +78,49 @@ def _class(rmse):
     return None if rmse is None else max(1, math.ceil(round(100 * rmse, 6)))
 
 
-def _statement(found):
+def _statement(accuracy):
     """The accuracy in sentences, what is missing to a test by the standard before the classes."""
-    if found["based_on"] is None:
+    if accuracy["based_on"] is None:
         return [
             "Not determined: there are no check points, and too few control points to leave one "
             "out in turn."
         ]
-    return [_test(found), *(_classes(found, axis) for axis in AXES), *_doubts(found)]
+    return [_test(accuracy), *(_classes(accuracy, axis) for axis in AXES), *_doubts(accuracy)]
 
 
-def _test(found):
-    points = found["points"]
+def _test(accuracy):
+    points = accuracy["points"]
     plural = "point was" if points == 1 else "points were"
-    if found["based_on"] != "check":
+    if accuracy["based_on"] != "check":
         return (
             f"There are no check points. {points} control {plural} left out in turn and predicted "
             "from the others: an estimate of the accuracy, and not a conformant test, as these "
             "points took part in the correction."
         )
-    if points < FEWEST:
+    if points < SETTINGS.check_points:
         return (
-            f"The standard calls for at least {FEWEST} check points and {points} {plural} used: "
-            "fewer than 30 check points are not a conformant test."
+            f"The standard calls for at least {SETTINGS.check_points} check points and {points} "
+            f"{plural} used: fewer than {SETTINGS.check_points} check points are not a conformant "
+            "test."
         )
     return f"This data set was tested with {points} independent check points."
 
 
-def _classes(found, axis):
-    rmse, name = found[f"rmse_{axis}"], f"RMSE_{axis[0].upper()}"
-    tested = "It meets" if found["conformant"] else "It would meet"
+def _classes(accuracy, axis):
+    rmse, name = accuracy[f"rmse_{axis}"], f"RMSE_{axis[0].upper()}"
+    tested = "It meets" if accuracy["conformant"] else "It would meet"
     return (
-        f"{tested} the {found[f'class_{axis}_cm']}-cm {axis} accuracy class: {name} is "
-        f"{100 * rmse:.1f} cm ({100 * found['fit'][f'rmse_{axis}']:.1f} cm fit to the points, "
-        f"{100 * found['survey'][f'rmse_{axis}']:.1f} cm survey of the points)."
+        f"{tested} the {accuracy[f'class_{axis}_cm']}-cm {axis} accuracy class: {name} is "
+        f"{100 * rmse:.1f} cm ({100 * accuracy['fit'][f'rmse_{axis}']:.1f} cm fit to the points, "
+        f"{100 * accuracy['survey'][f'rmse_{axis}']:.1f} cm survey of the points)."
     )
 
 
-def _doubts(found):
+def _doubts(accuracy):
     """Where the surveyed points aren't accurate enough to test such a product."""
     for axis in AXES:
-        survey, product = (found[part][f"rmse_{axis}"] for part in ("survey", "fit"))
-        if TWICE * survey > product:
+        survey, product = (accuracy[part][f"rmse_{axis}"] for part in ("survey", "fit"))
+        if SETTINGS.accuracy_ratio * survey > product:
             yield (
                 f"The {axis} survey error of the points, {100 * survey:.1f} cm, is more than half "
                 "of what they found: points for a test should be twice as accurate as the product."

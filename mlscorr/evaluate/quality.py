@@ -2,6 +2,7 @@
 
 import operator
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -11,32 +12,64 @@ OPERATORS = {
     ">": operator.gt,
     "<": operator.lt,
 }
-AXES = {"e": (0, "easting"), "n": (1, "northing"), "h": (2, "height")}
+AXES = {"e": "easting", "n": "northing", "h": "height"}
 COUNTS = {
-    "check.n": "number of observed check points",
-    "control.n": "number of observed control points",
+    "check.n": "number of observations of check points",
+    "control.n": "number of observations of control points",
+    "check.n_surveyed": "number of surveyed check points",
+    "check.n_seen": "number of check points that were seen",
+    "check.n_scored": "number of check points that were scored",
+    "check.n_unseen": "number of check points that should have been seen and were not",
+    "control.n_surveyed": "number of surveyed control points",
+    "control.n_seen": "number of control points that were seen",
+    "control.n_scored": "number of control points that were used",
+    "control.n_unseen": "number of control points that should have been seen and were not",
     "model.sigma0": "sigma0",
     "model.outliers": "number of rejected control points",
     "coverage.longest_gap_s": "longest time without control (s)",
     "coverage.points_outside_trajectory": "points outside the trajectory",
     "coverage.points_outside_control": "points outside the control span",
+    "coverage.points_corrected": "corrected points",
+    "coverage.points_untouched": "points that were left as they were",
+    "coverage.points_extrapolated": "points whose correction is extrapolated",
+    "coverage.share_extrapolated": "share of the points whose correction is extrapolated (0 to 1)",
+    "coverage.seconds_extrapolated": "time whose correction is extrapolated (s)",
+    "coverage.metres_extrapolated": "way whose correction is extrapolated (m)",
+}
+WEAK = {
+    "weak.n": "number of extrapolated stretches",
+    "weak.sigma": "largest sigma of an extrapolated stretch (m)",
+    "weak.length_m": "longest extrapolated stretch (m)",
 }
 GROUPS = {"check": "check points", "control": "control points", "leave_one_out": "left-out control"}
 
 
 @dataclass(frozen=True)
 class Gate:
-    """A condition under which a result is not good enough: quantity, operator, limit."""
+    """A condition under which a result is not good enough.
+
+    Parameters
+    ----------
+    quantity : str
+        One of ``quantities()``.
+    operator : str
+        One of ``OPERATORS``.
+    limit : float
+        Lengths in m.
+    """
 
     quantity: str
     operator: str
     limit: float
 
 
-def read_gate(text):
+def read_gate(text: str) -> Gate:
     """The gate that a sentence such as ``check.rmse_h > 0.03`` states (lengths in m).
 
-    Raises ValueError for another form or an unknown quantity, naming the nearest known one.
+    Raises
+    ------
+    ValueError
+        For another form or an unknown quantity, naming the nearest known one.
 
     >>> read_gate("check.rmse_3d > 0.05")
     Gate(quantity='check.rmse_3d', operator='>', limit=0.05)
@@ -60,12 +93,12 @@ def read_gate(text):
     return gate
 
 
-def quantities():
+def quantities() -> dict[str, str]:
     """Names of all quantities that a gate can ask for, with what they are."""
-    named = dict(COUNTS)
+    named = COUNTS | WEAK
     for group, title in GROUPS.items():
         for statistic in ("rmse", "mean", "std", "min", "max"):
-            for letter, (_, axis) in AXES.items():
+            for letter, axis in AXES.items():
                 named[f"{group}.{statistic}_{letter}"] = f"{statistic} of {title} in {axis} (m)"
         for length, words in (("horizontal", "horizontal distance"), ("3d", "3D distance")):
             for statistic in ("rmse", "max"):
@@ -73,20 +106,26 @@ def quantities():
     return named
 
 
-def failures(gates, report):
-    """A sentence for each gate that a report (the content of report.json) fails.
+def failures(gates: Iterable[Gate], report: dict) -> list[str]:
+    """A sentence for each gate that a report fails.
 
     A quantity that was not determined fails every gate: what isn't known isn't good enough.
+
+    Parameters
+    ----------
+    gates : iterable of Gate
+    report : dict
+        The content of report.json.
     """
     sentences = []
     for gate in gates:
         what = quantities()[gate.quantity]
-        found = _value(gate.quantity, report)
-        if found is None:
+        value = _value(gate.quantity, report)
+        if value is None:
             sentences.append(f"{gate.quantity}: {what} was not determined.")
-        elif OPERATORS[gate.operator](found, gate.limit):
+        elif OPERATORS[gate.operator](value, gate.limit):
             sentences.append(
-                f"{gate.quantity}: {what} is {found:.4g} {gate.operator} {gate.limit:g}."
+                f"{gate.quantity}: {what} is {value:.4g} {gate.operator} {gate.limit:g}."
             )
     return sentences
 
@@ -96,6 +135,9 @@ def _value(quantity, report):
     group, name = quantity.split(".")
     if quantity == "model.outliers":
         return len(report["model"]["outliers"])
+    if quantity in WEAK:
+        rows = report["weak"]
+        return len(rows) if name == "n" else max((row[name] for row in rows), default=0.0)
     if quantity in COUNTS:
         return report[group][name]
     if group == "leave_one_out":
@@ -105,5 +147,5 @@ def _value(quantity, report):
     statistic, _, axis = name.partition("_")
     if axis not in AXES:
         return values.get(name)
-    found = values.get(statistic)
-    return None if found is None else found[AXES[axis][0]]
+    vector = values.get(statistic)
+    return None if vector is None else vector[list(AXES).index(axis)]

@@ -1,0 +1,110 @@
+"""The model section of report.json."""
+
+import numpy as np
+
+from mlscorr.estimate import COMPONENTS, Estimate
+
+
+def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[str, object]:
+    """What was estimated, by which parameters, and how sure it is.
+
+    ``alternatives`` are the covariance families that the correction averages over; ``orders`` sets
+    other orders of the trend beside the one in use; ``tests`` has one row per used target, with w,
+    redundancy and detectable error for each pass; ``determined`` says which components of the pose
+    the control points tell, by the ratio of posterior to prior variance.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    warnings : tuple of str
+        On what went into it, beside its own.
+    """
+    section = {
+        "method": "lsc",
+        "order": estimate.order,
+        "covariance": _covariance(estimate.parameters),
+        "estimated_by": f"restricted maximum likelihood of {_observations(estimate)}",
+        "log_likelihood": estimate.log_likelihood,
+        "sigma0": estimate.sigma0,
+        "outliers": [
+            {"name": o.name, "statistic": o.statistic, "critical": o.critical}
+            for o in estimate.outliers
+        ],
+        "alternatives": [
+            {**_covariance(parameters), "probability": probability}
+            for parameters, probability in estimate.families
+        ],
+        "warnings": [*warnings, *estimate.warnings],
+    }
+    return {
+        **section,
+        "global_test": _global_test(estimate.guards.global_test),
+        "orders": [_order(alternative) for alternative in estimate.alternatives],
+        "tests": [_test(test) for test in estimate.tests],
+        "determined": _by_component(estimate.guards.determined),
+        "variance_ratio": _by_component(estimate.guards.variance_ratio),
+        "longest_gap": list(estimate.guards.gap),
+        "passes_without_control": [list(span) for span in estimate.guards.passes_without_control],
+    }
+
+
+def _observations(estimate):
+    """What the parameters were chosen by."""
+    if estimate.ties is None or not estimate.ties.used.any():
+        return "the control points"
+    return "control points and ties" if len(estimate.equations.names) else "ties"
+
+
+def _covariance(parameters):
+    return {
+        "family": parameters.family,
+        "correlation_time": parameters.drift_time,
+        "scale": parameters.drift_scale,
+        "jitter_correlation_time": parameters.jitter_time,
+        "jitter_scale": parameters.jitter_scale,
+        "bias_correlation_time": parameters.bias_time,
+        "bias_scale": parameters.bias_scale,
+        "attitude_scale": parameters.attitude_scale,
+    }
+
+
+def _global_test(test):
+    if test is None:
+        return None
+    return {
+        "statistic": test.statistic,
+        "redundancy": test.redundancy,
+        "limits": [test.lower, test.upper],
+        "passed": test.passed,
+    }
+
+
+def _order(alternative):
+    return {
+        "order": alternative.order,
+        "family": alternative.parameters.family,
+        "log_likelihood": alternative.log_likelihood,
+        "probability": alternative.probability,
+        "leave_one_out_rmse": _numbers(alternative.leave_one_out),
+    }
+
+
+def _test(test):
+    statistic = float(test.statistic)
+    return {
+        "name": test.name,
+        "statistic": statistic if np.isfinite(statistic) else None,
+        "critical": test.critical,
+        "w": [_numbers(row) for row in test.w],
+        "redundancy": [_numbers(row) for row in test.redundancy],
+        "detectable": [_numbers(row) for row in test.detectable],
+    }
+
+
+def _by_component(values):
+    return dict(zip(COMPONENTS, values.tolist(), strict=True))
+
+
+def _numbers(values):
+    """A list of floats, or None where they are not numbers, which JSON can't hold."""
+    return values.tolist() if np.isfinite(values).all() else None

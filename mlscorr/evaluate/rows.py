@@ -1,0 +1,259 @@
+"""Rows on what remains at surveyed points: made once, then written, printed, shown and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+NAMES = ("rmse", "mean", "std", "min", "max")  # of statistics, as documents have them
+VECTORS = ("surveyed", "observed", "sigma", "before", "after", "left_out")  # of a TargetRow
+SINGLE = ("name", "gps_time", "role", "used", "reason")
+CHECK_REASON = "check point"  # why it took no part in the estimate
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Statistics of residuals in E, N, H, and of their lengths in plan and in space.
+
+    Parameters
+    ----------
+    n : int
+        How many residuals they are of.
+    rmse, mean, std, minimum, maximum : (5,) array
+        E, N, H, horizontal and 3D; NaN where so few residuals don't have it. std is that of the
+        sample about its mean. Units: m.
+    """
+
+    n: int
+    rmse: np.ndarray
+    mean: np.ndarray
+    std: np.ndarray
+    minimum: np.ndarray
+    maximum: np.ndarray
+
+    @classmethod
+    def of(cls, residuals: np.ndarray) -> Statistics:
+        """Statistics of residuals (n, 3) in m.
+
+        >>> statistics = Statistics.of(np.array([[0.3, 0.0, -0.1], [-0.4, 0.0, 0.1]]))
+        >>> statistics.rmse[:3].round(4).tolist(), float(statistics.maximum[3])
+        ([0.3536, 0.0, 0.1], 0.4)
+        """
+        n, lengths = (
+            len(residuals),
+            [np.linalg.norm(residuals[:, :axes], axis=1) for axes in (2, 3)],
+        )
+
+        def measured(function, smallest=1):
+            if n < smallest:
+                return np.full(5, np.nan)
+            return np.hstack([function(values) for values in (residuals, *lengths)])
+
+        return cls(
+            n,
+            measured(lambda values: np.sqrt(np.mean(values**2, axis=0))),
+            measured(lambda values: values.mean(axis=0)),
+            measured(lambda values: values.std(axis=0, ddof=1), smallest=2),
+            measured(lambda values: values.min(axis=0)),
+            measured(lambda values: values.max(axis=0)),
+        )
+
+    @property
+    def table(self) -> np.ndarray:
+        """The statistics (5, 5): a row each for E, N, H, horizontal and 3D."""
+        return np.stack([self.rmse, self.mean, self.std, self.minimum, self.maximum], axis=1)
+
+    def document(self) -> dict:
+        """The statistics as documents have them, None where they are not determined."""
+        e, n, h, horizontal, spatial = (_numbers(values) or [None] * 5 for values in self.table)
+        document = {
+            name: None if e[k] is None else [e[k], n[k], h[k]] for k, name in enumerate(NAMES)
+        }
+        for end, values in (("horizontal", horizontal), ("3d", spatial)):
+            document |= {f"{name}_{end}": v for name, v in zip(NAMES, values, strict=True)}
+        return document
+
+
+@dataclass(frozen=True)
+class Score:
+    """What remains at control or at check points, before and after a correction.
+
+    Parameters
+    ----------
+    before, after : Statistics
+    left_out : Statistics or None
+        Of control points once the others alone have corrected them.
+    """
+
+    before: Statistics
+    after: Statistics
+    left_out: Statistics | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of observations."""
+        return self.after.n
+
+    def document(self) -> dict:
+        """The section ``control`` or ``check`` of report.json."""
+        document = {"n": self.n, "before": self.before.document(), "after": self.after.document()}
+        if self.left_out is not None:
+            document["leave_one_out"] = {"n": self.left_out.n, **self.left_out.document()}
+        return document
+
+
+@dataclass(frozen=True)
+class TargetRow:
+    """One observation of a surveyed point, or a surveyed point without any.
+
+    Parameters
+    ----------
+    name : str
+    pass_number : int or None
+        Passes count from 1 in time.
+    gps_time : float or None
+        Units: s.
+    role : str
+        ``control`` or ``check``.
+    surveyed, observed, sigma, before, after, left_out : (3,) array
+        Places, one sigma of the misclosure, and misclosures (surveyed - observed) as recorded,
+        corrected, and corrected by the other points alone; NaN where not known. Units: m.
+    used : bool
+        Whether it took part in the estimate.
+    reason : str or None
+        Why it did not.
+    scanned : bool
+        Whether points of the cloud lie about it, so that it should have been observed.
+    """
+
+    name: str
+    pass_number: int | None
+    gps_time: float | None
+    role: str
+    surveyed: np.ndarray
+    observed: np.ndarray
+    sigma: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    left_out: np.ndarray
+    used: bool
+    reason: str | None
+    scanned: bool = True
+
+    @classmethod
+    def unobserved(
+        cls,
+        name: str,
+        pass_number: int | None,
+        role: str,
+        surveyed: np.ndarray,
+        reason: str,
+        scanned: bool = True,
+    ) -> TargetRow:
+        """The row of a surveyed point that was not observed."""
+        nan = np.full(3, np.nan)
+        vectors = {"observed": nan, "sigma": nan, "before": nan, "after": nan, "left_out": nan}
+        row: dict[str, Any] = {"surveyed": surveyed, **vectors, "used": False, "reason": reason}
+        return cls(name, pass_number, None, role, **row, scanned=scanned)
+
+    @classmethod
+    def read(cls, row: dict) -> TargetRow:
+        """The row that stands in ``targets[]`` of report.json."""
+        fields: dict[str, Any] = {name: row[name] for name in SINGLE}
+        for name in VECTORS:
+            fields[name] = np.array(row.get(name) or [np.nan] * 3, dtype=float)
+        return cls(pass_number=row["pass"], **fields, scanned=row.get("scanned", True))
+
+    @property
+    def is_observed(self) -> bool:
+        """Whether the scanner saw it."""
+        return bool(np.isfinite(self.observed).all())
+
+    @property
+    def group(self) -> str:
+        """Where it belongs: ``control``, ``check`` or ``unused``.
+
+        No check point takes part in the estimate, so it counts as unused only when another
+        reason than its role is given.
+        """
+        if self.used or (self.role == "check" and self.reason in (None, "", CHECK_REASON)):
+            return self.role
+        return "unused"
+
+    def document(self) -> dict:
+        """The row of ``targets[]`` in report.json."""
+        vectors = {name: _numbers(getattr(self, name)) for name in VECTORS}
+        return {
+            "name": self.name,
+            "pass": self.pass_number,
+            "gps_time": self.gps_time,
+            "role": self.role,
+            **vectors,
+            "used": self.used,
+            "reason": self.reason,
+            "scanned": self.scanned,
+        }
+
+
+@dataclass(frozen=True)
+class PointCounts:
+    """How many surveyed points of a role took part, each counted once whatever its passes.
+
+    Parameters
+    ----------
+    surveyed, observed, scored : int
+        In the control file; observed under their names; used as control points, or tested by as
+        check points.
+    missing : tuple of (str, str)
+        Name and reason of each that has points of the cloud about it and no observation.
+    refused : tuple of (str, str)
+        Name and reason of each that was observed and not used.
+    """
+
+    surveyed: int
+    observed: int
+    scored: int
+    missing: tuple[tuple[str, str], ...] = ()
+    refused: tuple[tuple[str, str], ...] = ()
+
+    @classmethod
+    def of(cls, rows: Iterable[TargetRow], role: str) -> PointCounts:
+        """Counts of the points of a role.
+
+        Parameters
+        ----------
+        rows : iterable of TargetRow
+        role : str
+            ``control`` or ``check``.
+        """
+        rows = [row for row in rows if row.role == role]
+        observed = {row.name for row in rows if row.is_observed}
+        scored = {row.name for row in rows if row.is_observed and row.group == role}
+
+        def reasons(names):
+            first = {row.name: row.reason or "" for row in reversed(rows) if row.name in names}
+            return tuple(sorted(first.items()))
+
+        missing = {row.name for row in rows if row.scanned} - observed
+        everything = {row.name for row in rows}
+        counts = len(everything), len(observed), len(scored)
+        return cls(*counts, reasons(missing), reasons(observed - scored))
+
+    def document(self) -> dict[str, object]:
+        """What the sections ``control`` and ``check`` of report.json have of it."""
+        return {
+            "n_surveyed": self.surveyed,
+            "n_seen": self.observed,
+            "n_scored": self.scored,
+            "n_unseen": len(self.missing),
+            "unseen": [{"name": name, "reason": reason} for name, reason in self.missing],
+        }
+
+
+def _numbers(values):
+    """A list of floats, None for each that is not known; None where none is."""
+    numbers = [value if np.isfinite(value) else None for value in values.tolist()]
+    return None if all(value is None for value in numbers) else numbers
