@@ -1,20 +1,61 @@
 """The content of gap.json: everything that a diagnosis says, as plain numbers and words."""
 
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 
 import numpy as np
 
-from mlscorr.gap.where import NAMES
+from mlscorr.effects import Effect, effect_class
+from mlscorr.effects.vehicle import PositionNoise
+from mlscorr.gap.close.closure import Closure
+from mlscorr.gap.infer.causes import Inference
+from mlscorr.gap.infer.separability import Separability
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.infer.where import NAMES
+from mlscorr.gap.observe.absence import Absence
+from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.plan.additions import NextData
 from mlscorr.survey import Survey
 
-EPOCHS, ON_MAP = 1500, 1500  # of trajectory and rows on the map: more can't be seen on a page
-QUANTILE = 1.96
-LEAST = 1e-4  # probability from which on a pair is listed
+MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
+LISTED = 1e-4  # probability from which on a pair is listed in the evidence
+NEXT_RUN = (
+    "Run mlscorr diagnose once more with --simulator simulator.toml of this folder: it has the "
+    "cause in it, and the next run finds what is left, or nothing."
+)
 
 
-def gap_document(survey, rows, inference, closure, next_data, advice, effects, left_out, warnings):
-    """Content of gap.json, from what its arguments are named after; see DiagnosedSurvey."""
+def gap_document(
+    survey: Survey,
+    rows: Rows,
+    inference: Inference,
+    closure: Closure,
+    next_data: Sequence[NextData],
+    effects: Iterable[Effect],
+    left_out: Mapping[str, str],
+    warnings: Iterable[str],
+    absence: Absence | None = None,
+) -> dict:
+    """Content of gap.json.
+
+    Parameters
+    ----------
+    survey : Survey
+    rows : Rows
+    inference : Inference
+    closure : Closure
+    next_data : sequence of NextData
+    effects : iterable of Effect
+        That the simulator had already.
+    left_out : mapping of str to str
+        Why effects were not considered.
+    warnings : iterable of str
+    absence : Absence, optional
+        Of surveyed targets that have no row.
+    """
     verdict, where = inference.verdict, inference.where
+    absence = Absence() if absence is None else absence
     return {
         "name": survey.name,
         "verdict": {
@@ -22,8 +63,9 @@ def gap_document(survey, rows, inference, closure, next_data, advice, effects, l
             "probability": float(verdict.probability),
             "set": list(verdict.set),
             "p_value": float(verdict.p_value),
-            "same": [one for one in inference.same if one != verdict.label],
+            "same": [name for name in inference.same if name != verdict.label],
             "lead": verdict.lead,
+            "hidden": verdict.is_hidden,
             "sentence": _sentence(inference),
         },
         "gap": {
@@ -34,55 +76,86 @@ def gap_document(survey, rows, inference, closure, next_data, advice, effects, l
             "kind": closure.kind,
         },
         "headline": where.headline,
-        "advice": advice,
+        "advice": _advice(inference, closure, next_data),
         "where": [_split(split) for split in where.splits],
         "causes": [_cause(rows, cause) for cause in inference.causes],
         "separability": separability_document(inference.separability),
         "closure": _closure(closure),
-        "next_data": [asdict(one) for one in next_data],
+        "next_data": [asdict(data) for data in next_data],
         "evidence": _evidence(inference),
         "innovations": _innovations(rows, where),
         "windows": _windows(inference.cause, rows),
         "map": map_document(survey) | {"rows": _on_map(rows, where)},
         "channels": {str(k): int((rows.channel == k).sum()) for k in np.unique(rows.channel)},
-        "simulator": {"effects": [effect_document(one) for one in effects]},
+        "simulator": {"effects": [effect.document() for effect in effects]},
         "left_out": dict(left_out),
-        "warnings": list(warnings),
+        "absent": [run.document() for run in absence.runs],
+        "warnings": [*absence.warnings, *warnings],
         "notes": list(survey.notes),
     }
 
 
 def _sentence(inference):
     verdict, cause = inference.verdict, inference.cause
-    sure = f"probability {verdict.probability:.2f}"
+    chance = f"probability {verdict.probability:.2f}"
     if verdict.label == "none":
-        return f"Nothing is wrong that this survey could show ({sure})."
+        return f"Nothing is wrong that this survey could show ({chance})."
+    if verdict.is_hidden:
+        return (
+            f"What was compared shows nothing wrong, but it can't be said that nothing is: there "
+            f"is a {verdict.lead} (probability of something unknown {verdict.probability:.2f})."
+        )
     if verdict.label == "unknown":
-        return f"No known effect explains it ({sure}): it looks like a {verdict.lead}."
-    said = [
-        f"{one.name} {one.estimate:.4g} {one.unit}"
-        + (f" +- {QUANTILE * one.sigma:.2g}" if np.isfinite(one.sigma) else "")
-        for one in cause.parameters
+        return f"No known effect explains it ({chance}): it looks like a {verdict.lead}."
+    sizes = [
+        f"{parameter.name} {parameter.estimate:.4g} {parameter.unit}"
+        + (f" +- {SETTINGS.quantile * parameter.sigma:.2g}" if np.isfinite(parameter.sigma) else "")
+        for parameter in cause.parameters
     ]
     names = verdict.label.replace("+", " and ")
     do = "explain" if "+" in verdict.label else "explains"
-    return f"{names} {do} it ({sure}): {', '.join(said)} (95 %)."
+    return f"{names} {do} it ({chance}): {', '.join(sizes)} (95 %)."
+
+
+def _advice(inference, closure, next_data):
+    """What to do about a verdict: a list of sentences."""
+    verdict, sentences = inference.verdict, []
+    if verdict.label == "none":
+        sentences.append(
+            "Nothing needs to be done: what is left agrees with what the simulator says."
+        )
+    elif verdict.is_hidden:
+        sentences.append(
+            "Find out why the targets of that stretch could not be matched before the survey is "
+            "trusted there: the warnings give each one's reason."
+        )
+    elif verdict.label == "unknown":
+        sentences.append(f"Look for what makes a {verdict.lead}: no effect of the library does.")
+        if closure.effect != "none":  # it impersonates the cause
+            sentences.append(
+                f"The nearest known effect, {closure.effect}, closes "
+                f"{100 * max(0.0, min(1.0, closure.shrink)):.0f} % of the gap and leaves "
+                "the rest: don't use it."
+            )
+    else:
+        sentences += [effect_class(part).remedy for part in verdict.label.split("+")]
+        sentences.append(NEXT_RUN)
+    labels = (*verdict.set, *inference.same)
+    open_question = [name for name in labels if name not in ("none", verdict.label)]
+    if open_question and next_data:
+        sentences.append(
+            f"To settle what is open ({', '.join(dict.fromkeys(open_question))}), measure "
+            f"{next_data[0].survey}: {next_data[0].why}"
+        )
+    return list(dict.fromkeys(sentences))
 
 
 def _split(split):
     name, unit = NAMES.get(split.by, (split.by, ""))
-    found = {"by": split.by, "name": name, "unit": unit}
-    if split.edges is not None:
-        found["edges"] = split.edges.tolist()
-    else:
-        found["bins"] = list(split.bins)
-    return found | {
-        "count": split.count.tolist(),
-        "before": split.before.tolist(),
-        "after": split.after.tolist(),
-        "share": split.share.tolist(),
-        "null_band": split.band.tolist(),
-    }
+    place = {"bins": list(split.bins)} if split.edges is None else {"edges": split.edges.tolist()}
+    columns = {key: getattr(split, key).tolist() for key in ("count", "before", "after", "share")}
+    named = {"by": split.by, "name": name, "unit": unit}
+    return named | place | columns | {"null_band": split.band.tolist()}
 
 
 def _cause(rows, cause):
@@ -92,37 +165,32 @@ def _cause(rows, cause):
         "effect": cause.effect,
         "probability": float(cause.probability),
         "rms_mm": float(1e3 * np.sqrt(np.mean(moved**2))),
-        "parameters": [asdict(one) for one in cause.parameters],
+        "parameters": [asdict(parameter) for parameter in cause.parameters],
     } | ({"target": target[0]} if target else {})
 
 
-def separability_document(compared):
-    """Classes, correlations and minimal detectable biases of a Separability."""
-    detectable = {}
-    for name, effect, unit, size in zip(
-        compared.names, compared.effects, compared.units, compared.detectable, strict=True
-    ):
-        one = {"name": name, "unit": unit, "detectable": float(size)}
-        detectable.setdefault(effect, []).append(one)
+def separability_document(compared: Separability) -> dict:
+    """Classes, correlations and minimal detectable biases.
+
+    Parameters
+    ----------
+    compared : Separability
+    """
+    detectable, names = defaultdict(list), compared.names
+    columns = zip(names, compared.effects, compared.units, compared.detectable, strict=True)
+    for name, effect, unit, size in columns:
+        detectable[effect].append({"name": name, "unit": unit, "detectable": float(size)})
     return {
         "classes": [list(members) for members in compared.classes],
-        "correlation": {
-            "names": list(compared.names),
-            "matrix": compared.correlation.tolist(),
-        },
-        "detectable": detectable,
+        "correlation": {"names": list(names), "matrix": compared.correlation.tolist()},
+        "detectable": dict(detectable),
     }
 
 
 def _closure(closure):
     labels = closure.labels or (closure.effect,) * len(closure.folds)
-    return {
-        "effect": closure.effect,
-        "kind": closure.kind,
-        "before": closure.before,
-        "after": closure.after,
-        "unit": closure.unit,
-        "shrink": closure.shrink,
+    names = ("effect", "kind", "before", "after", "unit", "shrink")
+    return {name: getattr(closure, name) for name in names} | {
         "interval": list(closure.interval),
         "null_band": list(closure.null_band),
         "held_out": closure.held_out,
@@ -135,7 +203,7 @@ def _closure(closure):
 
 def _evidence(inference):
     """The ladder; of labels that were weighed last, the ratio follows from the probability."""
-    score = {name: float(values[0]) for name, values in inference.found.score.items()}
+    score = {name: float(values[0]) for name, values in inference.evidence.score.items()}
     chance, none = inference.probability, score["none"]
     known = max(score, key=lambda name: chance.get(name, 0.0))
 
@@ -149,7 +217,7 @@ def _evidence(inference):
     return [
         {"label": name, "log_evidence_ratio": ratio(name), "probability": chance[name]}
         for name in chance
-        if name in score or chance[name] > LEAST
+        if name in score or chance[name] > LISTED
     ]
 
 
@@ -165,22 +233,27 @@ def _innovations(rows, where):
 
 def _windows(cause, rows):
     """When the events of a cause act."""
-    found = []
+    windows = []
     for part, _ in cause.parts:
-        if "time" in part.fixed:
+        if part.kind.moment():
             start = rows.reference.start + part.fixed["time"]
             half = part.fixed.get("width", 0.0) / 2
             end = rows.gps_time.max() if "width" not in part.fixed else start + half
-            found.append({"effect": part.name, "start": start - half, "end": float(end)})
-    for start, length, *_ in cause.setting.bursts:
-        found.append({"effect": "position_noise", "start": start, "end": start + length})
-    return found
+            windows.append({"effect": part.name, "start": start - half, "end": float(end)})
+    for start, length, *_ in cause.model.windows:
+        windows.append({"effect": PositionNoise.name, "start": start, "end": start + length})
+    return windows
 
 
-def map_document(survey: Survey):
-    """Way and targets of a survey on the map."""
+def map_document(survey: Survey) -> dict:
+    """Way and targets of a survey on the map.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
     way = survey.trajectory.position
-    thin = way[:: max(1, len(way) // EPOCHS), :2]
+    thin = way[:: max(1, len(way) // MAP_POINTS), :2]
     targets = [
         {"name": name, "role": role, "position": place[:2].tolist()}
         for role, points in (("control", survey.control), ("check", survey.check))
@@ -190,7 +263,8 @@ def map_document(survey: Survey):
 
 
 def _on_map(rows, where):
-    taken = np.unique(np.linspace(0, len(where.row) - 1, min(ON_MAP, len(where.row))).astype(int))
+    number = len(where.row)
+    thin = np.unique(np.linspace(0, number - 1, min(MAP_POINTS, number)).astype(int))
     return [
         {
             "position": rows.position[row, :2].round(2).tolist(),
@@ -198,10 +272,5 @@ def _on_map(rows, where):
             "before": round(float(u[0]), 2),
             "after": round(float(u[1]), 2),
         }
-        for row, u in zip(where.row[taken], where.innovation[taken], strict=True)
+        for row, u in zip(where.row[thin], where.innovation[thin], strict=True)
     ]
-
-
-def effect_document(effect):
-    """An Effect as scenario.toml names it."""
-    return {"name": effect.name, **asdict(effect)}

@@ -1,0 +1,1 @@
+"""The harness that grades the diagnosis on surveys with sealed labels."""

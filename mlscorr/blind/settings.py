@@ -1,0 +1,41 @@
+"""What the blind check is made of: shares, sizes and limits, with the reason of each number."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Sizes are in minimal detectable biases (MDB) of each survey's own geometry."""
+
+    shares: tuple[tuple[str, float], ...] = (
+        ("clean", 0.20),
+        ("noise", 0.08),
+        ("single", 0.37),
+        ("pair", 0.08),
+        ("withheld", 0.17),  # a single effect that the library lacks
+        ("outside", 0.10),  # a mechanism that no library knows
+    )
+    # of the cases: none without effects is rare in practice, so a wrong alarm there costs most
+    single_sizes: tuple[tuple[float, float], ...] = (
+        *((0.75, 0.08), (1.5, 0.08), (2.0, 0.27), (3.0, 0.27), (4.0, 0.1), (5.0, 0.1), (8.0, 0.1)),
+    )
+    # MDB of single effects, and their shares: goals are set at 2 and at 3
+    clear_sizes: tuple[float, float] = (3.0, 6.0)
+    # MDB, of pairs, withheld ones and mechanisms: what a diagnosis should not miss
+    noise_sizes: tuple[float, float] = (2.0, 8.0)
+    # MDB of noise, whose information grows with the square of its size
+    event_widths: tuple[float, float] = (2.0, 30.0)
+    # s, between which the width of an event is drawn, evenly by its log: a lost fix to a tunnel
+    least_size: float = 0.5
+    # MDB: an effect that stays below at its largest credible value doesn't show
+    tries: int = 12
+    # surveys, and effects in each, where one shows none of what it should have
+    likeness: float = 0.8
+    # squared correlation with an effect above which a mechanism is that effect
+    unlikeness: float = 0.5
+    # squared correlation below which another effect is wrongly named
+    bins: int = 5
+    # of the stated probability: 300 cases fill no more
+
+
+SETTINGS = Settings()

@@ -1,0 +1,292 @@
+"""The full simulator run again on a survey's own pulses: what the residuals would be in it.
+
+Targets are fitted anew by the extraction, and planes anew to their points, as build_rows does
+with the survey itself. The world is the reference surface, the targets where they were surveyed,
+and planes as the survey shows them; a plane that was seen twice is one.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mlscorr.effects import Effect
+from mlscorr.gap.close.beams import Beams
+from mlscorr.gap.close.refit import refit_targets
+from mlscorr.gap.observe.channels import log_roughness, rounding_sigma
+from mlscorr.gap.observe.plane_fit import freedom, moments
+from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.observe.selection import gate
+from mlscorr.gap.observe.settings import SETTINGS
+from mlscorr.gap.signatures.changes import check_mounting
+from mlscorr.gap.signatures.expectation import expected
+from mlscorr.simulate.scan import Draws, Met, Planes, Replay, TargetWorld, true_targets
+from mlscorr.survey import Survey
+
+ON_PATCHES = ("shared", "roughness", "return_rate")
+
+
+def rerun(
+    rows: Rows, survey: Survey, beams: Beams, effects: Iterable[Effect], rng: np.random.Generator
+) -> np.ndarray:
+    """Residuals (m,) of the rows in a survey that the simulator makes with some effects.
+
+    Parameters
+    ----------
+    rows : Rows
+        Those that the Beams were collected for, or some of them.
+    survey : Survey
+        As recorded; its Scanner says what noise the simulator makes.
+    beams : Beams
+    effects : iterable of Effect
+        Turn truth into record. Random ones on the pose are not realised: their variance is the
+        background's.
+    rng : numpy.random.Generator
+        One seed draws the same noise whatever the effects are: the difference of two runs is what
+        the effects do.
+
+    Returns
+    -------
+    (m,) array
+        As in Rows, in the same units; NaN where nothing can be compared: beams that meet another
+        surface, a target that isn't found or known much worse than as observed.
+
+    Raises
+    ------
+    ValueError
+        For effects on the beams of a survey without a mounting, and for rows that are not the
+        Beams'.
+    """
+    effects, views = tuple(effects), _views_of(rows, beams)
+    check_mounting(survey, effects)
+    residual = np.full(len(rows), np.nan)
+    if len(rows) == 0:
+        return residual
+    run, dither, speckle, fit_rng = _drawn(rows, survey, beams, effects, rng)
+
+    # Targets where they were surveyed, and planes as they were seen.
+    boards = _boards(rows, beams, effects)
+    met = _meet(rows, beams, run.beams, boards, speckle)
+    xyz, kept = run.measure(met)
+    xyz += dither
+    patches = _Patches.of(beams, xyz, kept, np.isfinite(met.range))
+    for channel, values in zip(ON_PATCHES, (_shared, _roughness, _return_rate), strict=True):
+        on = np.flatnonzero(rows.channel == channel)
+        residual[on] = values(patches, views[on], rows.believed[on])
+    refit_targets(
+        residual, rows, survey, beams, views, (xyz, kept, met, run.beams, boards), fit_rng
+    )
+
+    # The reference surface.
+    on = np.flatnonzero((rows.channel == "surface") & (views[:, 0] >= 0))
+    if len(on) and beams.reference is not None:
+        spread = SETTINGS.trims[-1] * np.sqrt(patches.variance)
+        residual[on] = _surface(rows, survey, beams, on, views[on, 0], run, dither, spread)
+    return residual
+
+
+@dataclass(frozen=True)
+class BeamSimulator:
+    """The simulator on a survey's own beams, with the same noise each time.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    beams : Beams
+        Of these.
+    effects : tuple of Effect
+        That it believes in already.
+    seed : int
+    """
+
+    rows: Rows
+    survey: Survey
+    beams: Beams
+    effects: tuple[Effect, ...]
+    seed: int
+
+    def added(self, effects: Iterable[Effect]) -> np.ndarray:
+        """What further effects add to each row (m,); to the first order where no run tells it."""
+        added = self._run((*self.effects, *effects)) - self._plain
+        linear = expected(self.rows, self.survey, effects).shift
+        return np.where(np.isfinite(added) & self.rows.metric, added, linear)
+
+    @cached_property
+    def _plain(self):
+        return self._run(self.effects)
+
+    def _run(self, effects):
+        rng = np.random.default_rng(self.seed)
+        return rerun(self.rows, self.survey, self.beams, effects, rng)
+
+
+def _drawn(rows, survey, beams, effects, rng):
+    """All that is random, whatever the effects are: the Replay, rounding of the points (n, 3) in
+    m, speckle of the pulses about targets, and a generator for the fits.
+    """
+    draws, dither, speckle, fit_rng = rng.spawn(4)
+    n, on_target = len(beams.view), beams.target[beams.view] >= 0
+    draws, rounding = Draws.of(n, draws), rounding_sigma() * dither.standard_normal((n, 3))
+    run = Replay(survey, beams.pulses, effects, rows.reference, draws, beams.origin)
+    return run, rounding, speckle.standard_normal(n)[on_target], fit_rng
+
+
+def _views_of(rows, beams):
+    """Numbers (m, 2) of the first and second view of each row's item; -1 for none."""
+    views = np.full((len(rows), 2), -1)
+    for column in (0, 1):
+        numbers = np.flatnonzero(beams.second == bool(column))
+        numbers = numbers[np.argsort(beams.item[numbers])]
+        if len(numbers) == 0:
+            continue
+        place = np.minimum(np.searchsorted(beams.item[numbers], rows.item), len(numbers) - 1)
+        here = beams.item[numbers[place]] == rows.item
+        views[here, column] = numbers[place[here]]
+    known = views[:, 0] >= 0
+    other = known & (beams.gps_time[views[:, 0]] != rows.gps_time)
+    if other.any():
+        raise ValueError(
+            f"{other.sum()} of {len(rows)} rows have another time than in the Beams: collect the "
+            "beams anew for these rows."
+        )
+    return views
+
+
+def _boards(rows, beams, effects):
+    """Boards of the views at targets, where these truly are."""
+    targets = true_targets(rows.targets, effects, rows.reference)
+    item = beams.item[beams.target >= 0]
+    known, row = np.unique(rows.item, return_index=True)
+    place = np.minimum(np.searchsorted(known, item), max(len(known) - 1, 0))
+    surveyed = np.where(known[place] == item, rows.survey_item[row[place]], -1)
+    centre = targets.position[surveyed] - beams.origin if len(targets) else np.empty((0, 3))
+    return replace(beams.boards, centre=centre)
+
+
+def _meet(rows, beams, shot, boards, speckle):
+    """Met of all pulses: with the planes of patches, and with targets."""
+    point, normal = beams.point.copy(), beams.normal.copy()
+    shared = np.flatnonzero(rows.channel == "shared")
+    order = shared[np.argsort(rows.item[shared])]
+    if len(order):  # one plane for both views
+        place = np.minimum(np.searchsorted(rows.item[order], beams.item), len(order) - 1)
+        both = rows.item[order[place]] == beams.item
+        point[both] = rows.position[order[place[both]]] - beams.origin
+        normal[both] = rows.direction[order[place[both]]]
+    offset = np.einsum("li,li->l", normal, point)
+    on_target = beams.target[beams.view] >= 0
+    flat, (start, direction) = ~on_target, shot
+    view = beams.view[flat]
+    parts = [
+        Planes(normal[view], offset[view], beams.pulses.intensity[flat]).meet(
+            start[flat], direction[flat]
+        )
+    ]
+    number = beams.target[beams.view[on_target]]
+    behind = beams.beyond[on_target], beams.behind[on_target]
+    world = TargetWorld(boards, number, *behind, speckle)
+    parts.append(world.meet(start[on_target], direction[on_target]))
+    # patches stand before targets
+    return Met.concatenate(parts)
+
+
+@dataclass(frozen=True)
+class _Patches:
+    """Planes through the simulated points of each view at a patch; NaN or 0 for other views.
+
+    centre, normal (l, 3); variance (l,) in m^2; number (l,) of points and of pulses that met it.
+    """
+
+    centre: np.ndarray
+    normal: np.ndarray
+    variance: np.ndarray
+    points: np.ndarray
+    fired: np.ndarray
+
+    @classmethod
+    def of(cls, beams, xyz, kept, met):
+        flat = beams.target[beams.view] < 0
+        view, count = beams.view[flat], int((beams.target < 0).sum())
+        views = len(beams)
+        centre, normal = np.full((views, 3), np.nan), np.full((views, 3), np.nan)
+        variance = np.full(views, np.nan)
+        points, fired = np.zeros(views), np.zeros(views)
+        if count:
+            first = np.searchsorted(view, np.arange(count))
+            local = xyz[flat] - beams.origin - beams.point[view]
+            weight = (kept & met)[flat].astype(float)
+            local[weight == 0] = 0.0
+            mean, values, axes = moments(local, weight, first, view)
+            points[:count] = np.add.reduceat(weight, first)
+            fired[:count] = np.add.reduceat(met[flat].astype(float), first)
+            full = points[:count] >= SETTINGS.plane_points
+            centre[:count] = np.where(full[:, None], mean + beams.point[:count], np.nan)
+            turned = np.sign(np.einsum("li,li->l", axes[:, :, 0], beams.normal[:count]))
+            normal[:count] = axes[:, :, 0] * turned[:, None]
+            unbiased = values[:, 0] * points[:count] / freedom(points[:count])
+            variance[:count] = np.where(full, unbiased, np.nan)
+        return cls(centre, normal, variance, points, fired)
+
+
+def _shared(patches, views, _believed):
+    first, second = views.T
+    normal = patches.normal[first] + patches.normal[second]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    apart = patches.centre[first] - patches.centre[second]
+    return np.where((views >= 0).all(axis=1), np.einsum("mi,mi->m", normal, apart), np.nan)
+
+
+def _roughness(patches, views, believed):
+    view = views[:, 0]
+    variance = np.maximum(patches.variance[view], 1e-12)
+    ratio, _ = log_roughness(variance, believed, patches.points[view])
+    return np.where(view >= 0, ratio, np.nan)
+
+
+def _return_rate(patches, views, _believed):
+    view = views[:, 0]
+    share = patches.points[view] / np.maximum(patches.fired[view], 1)
+    return np.where((view >= 0) & (patches.fired[view] > 0), share - 1.0, np.nan)
+
+
+def _surface(rows, survey, beams, on, view, run, dither, spread):
+    """Mean distance (k,) of simulated points from the facets that the recorded beams meet.
+
+    Points farther from the middle one than the spread (l,), and than any surface is rough, are of
+    another surface.
+    """
+    met, triangle = beams.reference.meet(*run.beams, beams.pulses.intensity)
+    xyz, kept = run.measure(met)
+    normal, offset = beams.reference.mesh.normal, beams.reference.mesh.offset
+    direction, largest = np.zeros((len(beams), 3)), np.zeros(len(beams))
+    direction[view], largest[view] = rows.direction[on], gate(survey, rows.gps_time[on])
+    towards = direction[beams.view]
+    cosine = np.einsum("ni,ni->n", normal[beams.facet], towards)
+    true_cosine = np.einsum("ni,ni->n", normal[triangle], towards)
+    away = np.einsum("ni,ni->n", normal[beams.facet], xyz + dither - beams.origin)
+    away = (away - offset[beams.facet]) * np.sign(cosine)
+    used = kept & (beams.facet >= 0) & (triangle >= 0) & (np.abs(away) <= largest[beams.view])
+    used &= np.minimum(np.abs(cosine), np.abs(true_cosine)) >= np.cos(SETTINGS.parallel)
+
+    middle = _median(np.where(used, away, np.nan), beams.view, len(beams))
+    limit = np.fmax(spread, SETTINGS.roughest)
+    with np.errstate(invalid="ignore"):
+        used &= np.abs(away - middle[beams.view]) <= limit[beams.view]
+
+    def count(which):
+        return np.bincount(beams.view, which, len(beams))[view]
+
+    number, lost = count(used), count(np.isfinite(met.range) & ~kept)
+    known = number >= np.maximum(1, SETTINGS.facet_share * (count(beams.view >= 0) - lost))
+    mean = count(np.where(used, away, 0.0)) / np.maximum(number, 1)
+    return np.where(known, mean, np.nan)
+
+
+def _median(values, view, count):
+    """Median (l,) of each view's values (n,) that are not NaN."""
+    order = np.lexsort((values, view))  # NaN last
+    first = np.searchsorted(view, np.arange(count))
+    number = np.bincount(view, np.isfinite(values), count).astype(int)
+    return values[order[np.minimum(first + number // 2, len(view) - 1)]]

@@ -1,0 +1,182 @@
+"""The pulses about observed targets, those too that nothing returned, and what lies behind."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numba import njit
+
+from mlscorr.gap.close.settings import SETTINGS
+from mlscorr.gap.close.sightings import Sighting, board_of
+from mlscorr.gap.close.unreturned import unreturned
+from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.simulate.scan import Platform, RecordedPulses, aim, recorded_platform, recorded_pulses
+from mlscorr.survey import PointCloud, Survey
+from mlscorr.targets.candidates import search_radius
+from mlscorr.targets.fit import FittedTarget
+
+
+class Surroundings:
+    """Points whose beams pass near surveyed targets, of the chunks that it is given.
+
+    A target lies somewhere within its search radius; once it is fitted the points about it stay.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+
+    def __init__(self, survey: Survey):
+        self._targets, self._trajectory = survey.surveyed, survey.trajectory
+        self._origin = survey.trajectory.position.mean(axis=0)
+        self._platform = recorded_platform(survey, self._origin)
+        self._radius = search_radius(survey, self._targets)
+        self._open, self._settled, self._fitted = [], [], []
+
+    def __len__(self):
+        return sum(len(cloud) for cloud, _ in [*self._settled, *self._open])
+
+    def add(self, chunk: PointCloud) -> None:
+        """Take what it needs of a chunk."""
+        inside = chunk[self._trajectory.segment(chunk.gps_time) >= 0]
+        if len(inside) == 0 or len(self._targets) == 0:
+            return
+        if (np.diff(inside.gps_time) < 0).any():
+            inside = inside[np.argsort(inside.gps_time, kind="stable")]
+        extent = SETTINGS.around * self._targets.size + SETTINGS.margin + 2 * self._radius
+        near = self._passing(inside, self._targets.position, extent)
+        self._open.append((inside[near], inside.gps_time[[0, -1]]))
+
+    def settle(self, fitted: Iterable[FittedTarget], since: float) -> None:
+        """Let go of points before a time (s) but those about targets that are fitted.
+
+        Parameters
+        ----------
+        fitted : iterable of FittedTarget
+            Since the last call.
+        since : float
+            Targets to come have no point before it. Units: s.
+        """
+        self._fitted += [(t, _scanned(t), self._largest_extent(t)) for t in fitted]
+        if not self._open:
+            return
+        last, remaining = min(since, self._open[-1][1][1]) - OBSERVE.moment, []
+        for cloud, limits in self._open:
+            part = self._narrowed(cloud, last), limits
+            (remaining if limits[1] >= last else self._settled).append(part)
+        self._open = remaining
+
+    def _narrowed(self, cloud, last):
+        keep = cloud.gps_time >= last
+        for target, times, extent in self._fitted:
+            rows = slice(*np.searchsorted(cloud.gps_time, times))
+            keep[rows] |= self._passing(cloud[rows], target.position[None], np.array([extent]))
+        return cloud[keep]
+
+    def _largest_extent(self, target):
+        """How far from a fitted target beams may be wanted, whichever point it is. Units: m."""
+        away = np.linalg.norm(self._targets.position - target.position, axis=1)
+        return _extent(target, away[away <= self._radius].max(initial=away.min()))
+
+    def _passing(self, cloud, place, extent):
+        """Which beams (n,) of a cloud pass places (k, 3) within extents (k,), or would. m."""
+        level = np.zeros(len(cloud))
+        start = self._platform.place(cloud.gps_time, level, level, level, np.zeros(3))
+        return _passing_any(start, cloud.xyz - self._origin, place - self._origin, extent**2)
+
+    def about(self, platform: Platform, sighting: Sighting, origin: np.ndarray) -> list:
+        """Pulses about a Sighting, whether they returned or not.
+
+        Parameters
+        ----------
+        platform : Platform
+            The recorded one about the origin.
+        sighting : Sighting
+        origin : (3,) array
+            Units: m.
+
+        Returns
+        -------
+        list of (RecordedPulses, (n,) array, (n,) array, (n, 2) array)
+            Of each chunk: pulses, and their distance (m), cosine of incidence and place where they
+            cross the target's plane (m).
+        """
+        target, parts = sighting.fitted, []
+        times = _scanned(target)
+        extent = _extent(target, np.linalg.norm(target.position - sighting.surveyed))
+        for chunk, limits in [*self._settled, *self._open]:
+            cloud = chunk[slice(*np.searchsorted(chunk.gps_time, times))]
+            if len(cloud):
+                first, last = platform.epochs[[0, -1]]
+                span = np.clip(times, max(limits[0], first), min(limits[1], last))
+                parts += _about_target(platform, cloud, target, origin, span, extent)
+        return parts
+
+
+def _scanned(target):
+    """Times between which a fitted target and its surroundings were scanned. Units: s."""
+    time = target.cloud.gps_time
+    return time.min() - OBSERVE.moment, time.max() + OBSERVE.moment
+
+
+def _extent(target, apart):
+    """How far from a target, observed apart from where it was surveyed, beams matter. m."""
+    return SETTINGS.around * target.size + SETTINGS.margin + apart
+
+
+def _about_target(platform, cloud, target, origin, span, extent):
+    """Part of Surroundings.about: of the points of one chunk, within a span of time."""
+    cloud, nearest = _passing(platform, cloud, origin, target.position, extent)
+    if len(cloud) == 0:
+        return []
+    pulses = _first_returns(recorded_pulses(platform, cloud, origin, target.normal))
+    pulses = RecordedPulses.concatenate([pulses, unreturned(pulses, span, extent / nearest)])
+    beams = aim(platform, pulses.gps_time, pulses.angle, pulses.elevation)
+    board = board_of(target, origin)
+    distance, slant, place = board.crossings(np.zeros(len(pulses), int), *beams)
+    with np.errstate(invalid="ignore"):
+        near = np.isfinite(distance) & (np.hypot(*place.T) <= extent)
+    return [(pulses[near], distance[near], slant[near], place[near])] if near.any() else []
+
+
+@njit(cache=True)
+def _passing_any(start, end, place, squared_extent):
+    """Which beams (n,) from start to end (n, 3) pass one of the places (k, 3), or would."""
+    near = np.zeros(len(start), np.bool_)
+    for i in range(len(start)):
+        x, y, z = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1], end[i, 2] - start[i, 2]
+        length = np.sqrt(x**2 + y**2 + z**2)
+        for k in range(len(place)):
+            a, b, c = (
+                place[k, 0] - start[i, 0],
+                place[k, 1] - start[i, 1],
+                place[k, 2] - start[i, 2],
+            )
+            along = (a * x + b * y + c * z) / length
+            if along > 0 and a**2 + b**2 + c**2 - along**2 <= squared_extent[k]:
+                near[i] = True
+                break
+    return near
+
+
+def _passing(platform, cloud, origin, place, extent):
+    """Points of a cloud whose beams pass a place (3,) within an extent, and the least distance of
+    the scanner from the place. Units: m.
+    """
+    level = np.zeros(len(cloud))
+    start = platform.place(cloud.gps_time, level, level, level, origin)
+    sight, towards = cloud.xyz - start, place - start
+    along = np.einsum("ni,ni->n", sight, towards) / np.linalg.norm(sight, axis=1)
+    squared = np.einsum("ni,ni->n", towards, towards)
+    passing = (along > 0) & (squared - along**2 <= extent**2)
+    return cloud[passing], np.sqrt(squared[passing].min(initial=np.inf))
+
+
+def _first_returns(pulses):
+    """Pulses in order of time without later echoes: the same time and direction, farther away."""
+    apart = np.abs(np.diff(pulses.angle)) + np.abs(np.diff(pulses.elevation))
+    same = (np.diff(pulses.gps_time) == 0) & (
+        apart * np.minimum(pulses.range[1:], pulses.range[:-1]) < 5e-3
+    )
+    group = np.append(0, np.cumsum(~same))
+    order = np.lexsort((pulses.range, group))
+    return pulses[order[np.unique(group[order], return_index=True)[1]]]

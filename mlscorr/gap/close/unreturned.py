@@ -1,0 +1,64 @@
+"""Pulses that met nothing: no file has them, those beside them tell of them."""
+
+import numpy as np
+
+from mlscorr.gap.close.settings import SETTINGS
+from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.simulate.scan import RecordedPulses
+
+
+def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float) -> RecordedPulses:
+    """Pulses that were fired between recorded ones, and beside them, and met nothing.
+
+    Parameters
+    ----------
+    pulses : RecordedPulses
+        About one place, in order of time.
+    span : (float, float)
+        Times between which they are wanted. Units: s.
+    opening : float
+        Angle about the recorded ones. Units: rad.
+
+    Times and angles go on in the steps of those recorded. None where these are not regular (rings
+    of beams, jitter, a thinned cloud): then a target before the sky has only the beams that met
+    it.
+    """
+    none, start, pause = pulses[:0], pulses.gps_time[0], np.diff(pulses.gps_time)
+    if len(pause) < SETTINGS.line_pulses or np.ptp(pulses.elevation) > SETTINGS.level:
+        return none
+    step = np.percentile(pause, 25)
+    single = np.abs(pause - step) < 0.1 * step
+    regular = max(OBSERVE.rule * (pause < 1.5 * step).sum(), SETTINGS.delivered * len(pause))
+    if single.sum() < regular:
+        return none
+    number = np.append(0, np.cumsum(np.round(pause / pause[single].mean()).astype(int)))
+    first, step = _line(number, pulses.gps_time - start)
+    if np.abs(pulses.gps_time - start - first - step * number).max() > 0.3 * step:
+        return none
+    turned = np.mod(np.diff(pulses.angle) + np.pi, 2 * np.pi) - np.pi
+    rate = turned[single].mean()
+    left = np.unwrap(np.mod(pulses.angle - rate * number, 2 * np.pi))
+    zero, more = _line(number, left)
+    if np.std(left - zero - more * number) > max(0.5 * abs(rate), 1e-3):
+        return none
+    every = np.arange(*np.ceil((np.array(span) - start - first) / step).astype(int))
+    angle = np.mod(zero + (rate + more) * every + np.pi, 2 * np.pi) - np.pi
+    middle = np.angle(np.exp(1j * pulses.angle).mean())
+    width = np.abs(np.mod(pulses.angle - middle + np.pi, 2 * np.pi) - np.pi).max() + opening
+    beside = np.abs(np.mod(angle - middle + np.pi, 2 * np.pi) - np.pi) <= width
+    lost = np.flatnonzero(beside & ~np.isin(every, number))
+    n = len(lost)
+    return RecordedPulses(
+        gps_time=start + first + step * every[lost],
+        angle=angle[lost],
+        elevation=np.full(n, np.median(pulses.elevation)),
+        range=np.full(n, np.nan),
+        intensity=np.zeros(n),
+        incidence=np.ones(n),
+    )
+
+
+def _line(x, y):
+    """Value at 0 and slope of the straight line through points (n,), by least squares."""
+    slope = np.cov(x, y)[0, 1] / np.var(x, ddof=1)
+    return y.mean() - slope * x.mean(), slope

@@ -1,0 +1,171 @@
+"""How large the gap is, beyond chance, in the unit in which its kind of cause shows.
+
+systematic   mm: of the squared residuals, in the metric of V^-1, the most that any one cause, known
+             or unknown, could explain, less what it explains by chance
+position     mm: mean of sigma_i^2 (u_i^2 - 1) of the innovations u: more than all sigmas predict
+scatter      mm: mean excess variance of the points about their planes
+returns      percent: mean excess share of pulses that return
+
+All are signed squares that are zero on average when nothing is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.effects import effect_class
+from mlscorr.gap.infer.error_models import STATED, ErrorModel
+from mlscorr.gap.infer.evidence import ColumnTable, block_groups
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.observe.rows import Rows
+
+UNITS = {"systematic": "mm", "position": "mm", "scatter": "mm", "returns": "%"}
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """What a simulator with a cause in it expects of the rows.
+
+    Parameters
+    ----------
+    shift : (m,) array
+        Of the residuals, in their unit.
+    growth : (m,) array
+        Of roughness rows: variance about the plane that is added, over the believed one.
+    extra : (m,) array
+        Variance that is added to the rows' own noise. Units: m^2.
+    model : ErrorModel
+        Of the POS's covariance.
+    """
+
+    shift: np.ndarray
+    growth: np.ndarray
+    extra: np.ndarray
+    model: ErrorModel = STATED
+
+    @classmethod
+    def nothing(cls, rows: Rows) -> Predicted:
+        """Of the simulator as it is."""
+        zero = np.zeros(len(rows))
+        return cls(zero, zero, zero)
+
+
+def gap_kind(label: str, noisy: Iterable[str], rows: Rows) -> str:
+    """How the gap of a label is measured: one of UNITS.
+
+    Parameters
+    ----------
+    label : str
+    noisy : iterable of str
+        Names of noise classes.
+    rows : Rows
+    """
+    parts = set(label.split("+"))
+    if not parts <= set(noisy):
+        return "systematic"
+    kinds = [effect_class(part) for part in parts]
+    if all(kind.stage == "return" for kind in kinds):
+        return "returns"
+    rough = (rows.channel == "roughness").any()
+    return "scatter" if rough and not any(kind.is_of_pose() for kind in kinds) else "position"
+
+
+def signed_root(square: np.ndarray, unit: str = "mm") -> np.ndarray:
+    """sign(g) |g|^(1/2) of a square in m^2 (in mm) or of shares (in percent)."""
+    return (1e3 if unit == "mm" else 1e2) * np.sign(square) * np.sqrt(np.abs(square))
+
+
+def systematic_square(
+    observations: Observations, model: ErrorModel, table: ColumnTable, residual: np.ndarray
+) -> np.ndarray:
+    """The most that any block of a table explains of the squares of residuals.
+
+    In the metric of V^-1. Each block counts as it does in the evidence: by its trust, less its
+    number of columns, which is what it explains by chance.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : ErrorModel
+        Of V.
+    table : ColumnTable
+    residual : (n, k) array
+
+    Returns
+    -------
+    square : (k,) array
+    """
+    k, largest = residual.shape[1], np.full(residual.shape[1], -np.inf)
+    both = np.hstack([residual, observations.columns(table.columns)])
+    white = observations.whitener(model).whiten(both)
+    y, a = white[slice(k)], white[slice(k, None)]
+    projected, free = a.product(y), SETTINGS.free_sigma
+    for index, numbers, _ in block_groups(table):
+        value, vector = np.linalg.eigh(a.blocks(index))
+        value = np.maximum(value, 0.0)
+        square = (vector.swapaxes(1, 2) @ projected[index]) ** 2
+        explained = (square / (value + free**-2)[:, :, None]).sum(axis=1)
+        by_chance = (value * free**2 > 1).sum(axis=1)
+        trust = np.array([table.blocks[i].trust for i in numbers])
+        largest = np.maximum(largest, (trust[:, None] * explained - by_chance[:, None]).max(axis=0))
+    return largest
+
+
+def unit_square(observations: Observations, model: ErrorModel) -> float:
+    """Square of the length that a sum of squares of one has, spread over all rows. Units: m^2.
+
+    The sigma is that of the median innovation.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : ErrorModel
+        Of V.
+    """
+    _, sigma = observations.whitener(model).innovations(np.zeros((len(observations), 1)))
+    return float(np.median(sigma) ** 2 / len(observations))
+
+
+def position_terms(
+    observations: Observations, predicted: Predicted, residual: np.ndarray
+) -> np.ndarray:
+    """sigma^2 (u^2 - 1) of residuals less what is predicted.
+
+    Parameters
+    ----------
+    observations : Observations
+    predicted : Predicted
+    residual : (n, k) array
+
+    Returns
+    -------
+    terms : (n, k) array
+        Units: m^2.
+    """
+    extra = predicted.extra[observations.row] * observations.half
+    shift = observations.columns(predicted.shift[:, None])
+    u, sigma = observations.whitener(predicted.model, extra).innovations(residual - shift)
+    return sigma[:, None] ** 2 * (u**2 - 1)
+
+
+def scatter_terms(rows: Rows, predicted: Predicted, residual: np.ndarray) -> np.ndarray:
+    """Excess variance about the planes of roughness rows, zero elsewhere.
+
+    Parameters
+    ----------
+    rows : Rows
+    predicted : Predicted
+    residual : (m, k) array
+
+    Returns
+    -------
+    terms : (m, k) array
+        Units: m^2.
+    """
+    rough = (rows.channel == "roughness")[:, None]
+    believed = np.where(rough, rows.believed[:, None], 0.0)
+    return believed * (np.exp(np.where(rough, residual, 0.0)) - 1 - predicted.growth[:, None])

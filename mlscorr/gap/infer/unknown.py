@@ -1,0 +1,201 @@
+"""What no known effect explains, in general terms: an error in some direction that varies with
+something. The blocks of functions that find it also say in words where to look.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.signatures.displacements import displacements
+from mlscorr.survey import Survey
+
+DIRECTIONS = {
+    "east": "easting error",
+    "north": "northing error",
+    "height": "height error",
+    "right": "error to the right",
+    "forward": "error along the drive",
+    "beam": "range error",
+    "scan": "scan angle error",
+    "across": "error across the scan plane",
+    "roll": "roll error",
+    "pitch": "pitch error",
+    "yaw": "heading error",
+    "clock": "time error",
+}
+PLACES = ("east", "north", "height")
+BODY = ("right", "forward", "height")
+TURNS = ("roll", "pitch", "yaw")
+BEAMS = ("beam", "scan", "across")
+FUNCTIONS = {  # name: words, directions
+    "constant": ("that is constant", (*BODY, *BEAMS, *TURNS, "clock")),
+    "pass": ("that differs between passes", (*PLACES, *BODY[:2], "beam", "scan", *TURNS, "clock")),
+    "elapsed": ("that grows with time", (*PLACES, *BODY[:2], *BEAMS, *TURNS, "clock")),
+    "warming": ("that grows with time and settles", ("beam", "scan", *TURNS)),
+    "elapsed in the pass": ("that grows in each pass", (*TURNS, "clock")),
+    "time": ("that comes and goes with time", PLACES),
+    "slow time": ("that changes slowly with time", (*PLACES, "beam", *TURNS, "clock")),
+    "location": ("that depends on the place along the drive", PLACES),
+    "map": ("that depends on the place on the map", PLACES),
+    "range": ("in proportion to the range", ("height", "beam", "right")),
+    "range squared": ("that grows with the range squared", ("height", "beam")),
+    "smooth range": ("that depends on the range", ("beam", "height")),
+    "cyclic range": ("that repeats with the range", ("beam",)),
+    "incidence": ("that depends on the incidence angle", ("beam", "scan")),
+    "intensity": ("that grows with the intensity", ("beam",)),
+    "smooth intensity": ("that depends on the intensity", ("beam", "scan")),
+    "scan angle": ("in proportion to the scan angle", ("scan", "across", "beam")),
+    "once or twice a turn": ("that repeats once or twice a turn of the scanner", BEAMS),
+    "often a turn": ("that repeats several times a turn of the scanner", BEAMS),
+    "speed": ("that grows with speed", (*BODY, "beam", *TURNS)),
+    "speed squared": ("that grows with speed squared", (*BODY, "pitch")),
+    "smooth speed": ("that depends on speed", (*BODY, "pitch")),
+    "turn rate": ("that grows with the turn rate", (*BODY, *TURNS)),
+    "turning": ("that grows with the turn rate to either side", ("height", "pitch")),
+    "lateral acceleration": ("that grows with speed times turn rate", ("right", "height", "roll")),
+    "acceleration": ("that grows with acceleration", ("forward", "height", "pitch")),
+    "roll rate": ("that grows with the roll rate", ("roll",)),
+    "pitch rate": ("that grows with the pitch rate", ("pitch",)),
+    "heading": ("that depends on the heading", (*BODY, "beam", *TURNS)),
+}
+DRIFT_FUNCTIONS = ("time", "slow time", "location", "pass", "elapsed")
+
+
+@dataclass(frozen=True)
+class UnknownBlock:
+    """One direction times one function: columns (m, p) of the rows, and the lead in words.
+
+    is_drift tells that the POS's own drift looks like it.
+    """
+
+    lead: str
+    columns: np.ndarray
+    is_drift: bool
+
+
+def unknown_blocks(rows: Rows, survey: Survey) -> tuple[UnknownBlock, ...]:
+    """Blocks of functions for what no effect explains.
+
+    Directions and functions whose covariate the survey doesn't vary, or doesn't know, are left
+    out. Errors of places appear once for all rows, and once for the surveyed targets alone where
+    there are other rows too: those are errors of the control.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    """
+    views = displacements(rows, survey)
+    functions = _functions(views)
+    metric = np.flatnonzero(rows.metric)
+    order = np.argsort(views.item, kind="stable")
+    first = np.searchsorted(views.item[order], rows.item[metric])
+    last = np.searchsorted(views.item[order], rows.item[metric], side="right")
+    of_target = rows.survey_item >= 0
+    mixed = of_target[metric].any() and not of_target[metric].all()
+    blocks = []
+
+    def add(name, direction, values, only=None):
+        along = np.zeros((len(rows), values.shape[1]))
+        for step in range(2):
+            has = metric[first + step < last]
+            view = order[(first + step)[first + step < last]]
+            unit = views.sign[view, None] * views.directions[direction][view]
+            projected = np.einsum("mi,mi->m", rows.direction[has], unit)
+            along[has] += projected[:, None] * values[view]
+        if only is not None:
+            along[~only] = 0.0
+        if np.abs(along).max(initial=0.0) > 1e-6:  # else nothing of it is to be seen
+            what = DIRECTIONS[direction] + ("" if only is None else " of the surveyed targets")
+            drift = only is None and direction in PLACES + BODY and name in DRIFT_FUNCTIONS
+            blocks.append(UnknownBlock(f"{what} {FUNCTIONS[name][0]}", along, drift))
+
+    for name, values in functions.items():
+        for direction in FUNCTIONS[name][1]:
+            if direction in views.directions:
+                add(name, direction, values)
+    for direction in PLACES if mixed else ():
+        for name in ("constant", "map"):
+            if name in functions:
+                add(name, direction, functions[name], of_target)
+    return tuple(blocks)
+
+
+def _functions(views):
+    """Values (k, p) of the functions of each name at the looks."""
+    c = views.covariates
+    away, speed, turn = c["range"], c["speed"], c["turn_rate"]
+    time = _without_gaps(c["time"])
+    warmth = 1 - np.exp(-3 * (c["time"] - c["time"].min()) / max(np.ptp(c["time"]), 1e-9))
+    values = {
+        "constant": np.ones((len(time), 1)),
+        "elapsed": _centred(c["time"])[:, None],
+        "warming": warmth[:, None],
+        "elapsed in the pass": c["elapsed"][:, None],
+        "time": _splines(time, np.ptp(time) / SETTINGS.knots),
+        "slow time": _splines(time, 5),
+        "location": _splines(c["location"], np.ptp(c["location"]) / SETTINGS.knots_place),
+        "map": np.column_stack([_centred(v) for v in views.xyz[:, :2].T]),
+        "range": away[:, None] / away.mean(),
+        "range squared": (away[:, None] / away.mean()) ** 2,
+        "smooth range": _splines(np.log(away), 5),
+        "cyclic range": _waves(2 * np.pi * away / max(np.ptp(away), 1e-9), range(1, 7)),
+        "incidence": _splines(c["incidence"], 5),
+        "intensity": _centred(c["intensity"])[:, None],
+        "smooth intensity": _splines(c["intensity"], 5),
+        "speed": speed[:, None] / max(speed.mean(), 1e-9),
+        "speed squared": (speed[:, None] / max(speed.mean(), 1e-9)) ** 2,
+        "smooth speed": _splines(speed, 5),
+        "turn rate": turn[:, None],
+        "turning": np.abs(turn)[:, None],
+        "lateral acceleration": (speed * turn)[:, None],
+        "acceleration": c["acceleration"][:, None],
+        "roll rate": c["roll_rate"][:, None],
+        "pitch rate": c["pitch_rate"][:, None],
+        "heading": _waves(c["heading"], (1, 2)),
+    }
+    if len(np.unique(c["pass"])) > 1:
+        number = c["pass"][:, None] == np.unique(c["pass"])
+        values["pass"] = number[:, 1:] - number[:, 1:].mean(axis=0)
+    if np.isfinite(c["scan_angle"]).all():
+        angle = c["scan_angle"]
+        values |= {
+            "scan angle": angle[:, None],
+            "once or twice a turn": _waves(angle, (1, 2)),
+            "often a turn": _waves(angle, (3, 4, 5, 6)),
+        }
+    return {name: columns for name, columns in values.items() if columns.shape[1]}
+
+
+def _centred(values):
+    """Values from -1 to 1 over their span."""
+    low, high = values.min(), values.max()
+    return (2 * values - low - high) / max(high - low, 1e-9)
+
+
+def _without_gaps(time):
+    """Times (k,) with long steps in which nothing was seen cut to the spacing of knots."""
+    order = np.argsort(time)
+    steps = np.minimum(np.diff(time[order], prepend=time[order][:1]), SETTINGS.knots)
+    short = np.empty_like(time)
+    short[order] = np.cumsum(steps)
+    return short
+
+
+def _waves(angle, orders):
+    return np.column_stack([f(n * angle) for n in orders for f in (np.sin, np.cos)])
+
+
+def _splines(values, number):
+    """Cubic B-splines (k, p) over the span of values, on equal intervals; none without a span."""
+    low, high = values.min(), values.max()
+    if not high - low > 1e-6 * max(1.0, abs(high)):
+        return np.zeros((len(values), 0))
+    inner = int(np.clip(number, 5, SETTINGS.functions)) - 3
+    step = (high - low) / inner
+    knots = low + step * np.arange(-3, inner + 4)
+    inside = np.clip(values, low, high - 1e-9 * (high - low))
+    return BSpline.design_matrix(inside, knots, 3).toarray()

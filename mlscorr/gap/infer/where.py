@@ -1,0 +1,240 @@
+"""Where observed and simulated differ by more than the simulator itself predicts.
+
+With u the innovations of the residuals in the order of time and sigma_i their predicted sigmas,
+
+    G^2 = mean of sigma_i^2 (u_i^2 - 1)
+
+is what the simulator doesn't account for: zero on average when it is right, negative as often as
+positive. Each row has one term, so G^2 adds up over any split of the rows. Lengths are printed
+as sign(G^2) |G^2|^(1/2), in mm.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from mlscorr.gap.infer.error_models import STATED, ErrorModel
+from mlscorr.gap.infer.measure import signed_root
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.observe.rows import Background, Rows
+
+SPLITS = (
+    *("time", "location", "range", "incidence", "scan_angle", "intensity"),
+    *("speed", "turn_rate", "pass", "axis", "channel"),
+)
+NAMES = {  # what a number of a split is called, and its unit
+    "time": ("time", "s"),
+    "location": ("location", "m"),
+    "range": ("range", "m"),
+    "incidence": ("incidence angle", "deg"),
+    "scan_angle": ("scan angle", "deg"),
+    "intensity": ("log intensity", "decades"),
+    "speed": ("speed", "m/s"),
+    "turn_rate": ("turn rate", "deg/s"),
+}
+PLACES = {"pass": "in pass {}", "axis": "along the axis {}", "channel": "{}"}
+CHANNELS = {
+    "target": "on the targets",
+    "surface": "on the reference surface",
+    "shared": "on planes that two passes share",
+}
+DEGREES = ("incidence", "scan_angle", "turn_rate")
+AXES = ("E", "N", "H")
+
+
+@dataclass(frozen=True)
+class Split:
+    """The gap by one covariate.
+
+    Parameters
+    ----------
+    by : str
+        One of SPLITS.
+    edges : (b + 1,) array or None
+        Of continuous ones; angles in degrees.
+    bins : tuple of str
+        Otherwise.
+    count : (b,) int array
+        Rows in each.
+    before, after : (b,) array
+        Signed gap of the rows of each bin. Units: mm.
+    share : (b,) array
+        Of what the cause explains of the squared innovations; without a cause, of the squared gap
+        of all rows. Sums to one.
+    band : (b, 2) array
+        95 % of what each bin's gap is when nothing is wrong. Units: mm.
+    """
+
+    by: str
+    edges: np.ndarray | None
+    bins: tuple[str, ...]
+    count: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    share: np.ndarray
+    band: np.ndarray
+
+
+@dataclass(frozen=True)
+class Where:
+    """The gap and its splits.
+
+    Parameters
+    ----------
+    before, after : float
+        Signed; after is with the cause taken off. Units: mm.
+    null_band : (float, float)
+        95 % of what it is when nothing is wrong. Units: mm.
+    splits : tuple of Split
+    row : (n,) int array
+        Which row each innovation is of.
+    gps_time : (n,) array
+        Units: s.
+    innovation : (n, 2) array
+        u before and after.
+    sigma : (n,) array
+        Of the innovations. Units: m.
+    headline : str
+    """
+
+    before: float
+    after: float
+    null_band: tuple[float, float]
+    splits: tuple[Split, ...]
+    row: np.ndarray
+    gps_time: np.ndarray
+    innovation: np.ndarray
+    sigma: np.ndarray
+    headline: str
+
+
+def locate(
+    rows: Rows,
+    background: Background,
+    shift: np.ndarray,
+    rng: np.random.Generator,
+    replicas: Sequence[ErrorModel],
+    model: ErrorModel = STATED,
+    extra: np.ndarray | None = None,
+) -> Where:
+    """Where the gap lies, before and after a cause is taken off.
+
+    Parameters
+    ----------
+    rows : Rows
+    background : Background
+    shift : (m,) array
+        What the cause makes of the residuals; zero for none.
+    rng : numpy.random.Generator
+    replicas : sequence of ErrorModel
+        Of each replica for the null band: a survey in which nothing acts, whose POS errs, and whose
+        noise has tails, as this one's do once the cause is taken off.
+    model : ErrorModel
+        Of V after: another one than stated when the cause is in the noise of the POS.
+    extra : (m,) array, optional
+        Variance that a noise of the rows' own adds, after.
+    """
+    observed = Observations.of(rows, background)
+    columns = observed.columns(np.column_stack([rows.residual, rows.residual - shift]))
+    best = replace(max(replicas, key=replicas.count), windows=model.windows)
+    tails = observed.whitener(best).innovations(columns[:, 1:])[0][:, 0]
+    drawn = [
+        observed.whitener(each).draw(rng, replicas.count(each), tails)
+        for each in dict.fromkeys(replicas)
+    ]
+    u, sigma = observed.whitener().innovations(np.hstack([columns, *drawn]))
+    terms = sigma[:, None] ** 2 * (u**2 - 1)
+    explained = u[:, 0] ** 2 - u[:, 1] ** 2 if shift.any() else terms[:, 0].copy()
+    if model != STATED or extra is not None:
+        more = 0.0 if extra is None else extra[observed.row] * observed.half
+        after, wider = observed.whitener(model, more).innovations(columns[:, 1:])
+        u[:, 1] = after[:, 0]
+        terms[:, 1] = wider**2 * (after[:, 0] ** 2 - 1)
+    keep = observed.second
+    terms, explained, row = terms[keep], explained[keep], observed.row[keep]
+    mean = terms.mean(axis=0)
+    low, high = (float(v) for v in np.percentile(signed_root(mean[2:]), SETTINGS.band))
+    band = low, high
+    splits = tuple(_split(rows, row, by, terms, explained) for by in SPLITS)
+    splits = tuple(split for split in splits if split is not None)
+    before, after = (float(v) for v in signed_root(mean[:2]))
+    return Where(
+        before, after, band, splits, row, observed.errors.gps_time[keep], u[keep, :2], sigma[keep],
+        _headline(before, band, splits, len(row), shift.any()),
+    )  # fmt: skip
+
+
+def _split(rows, row, by, terms, explained):
+    """The gap by one covariate, or None where it is not known or the same for all rows."""
+    edges, bins, number = _bins(rows, row, by)
+    if number is None:
+        return None
+    count = np.bincount(number, minlength=len(bins))
+    sums = np.array([np.bincount(number, column, len(bins)) for column in terms.T]).T
+    mean = signed_root(sums / np.maximum(count, 1)[:, None])
+    return Split(
+        by, edges, bins, count, mean[:, 0], mean[:, 1],
+        np.bincount(number, explained, len(bins)) / (explained.sum() or 1.0),
+        np.percentile(mean[:, 2:], SETTINGS.band, axis=1).T,
+    )  # fmt: skip
+
+
+def _bins(rows, row, by):
+    """Edges or None, names, and the bin of each row."""
+    if by == "channel":
+        names, number = np.unique(rows.channel[row], return_inverse=True)
+        return None, tuple(str(name) for name in names), number
+    values = rows.covariates[by][row]
+    if not np.isfinite(values).all():
+        return None, (), None
+    if by in ("pass", "axis"):
+        known, number = np.unique(values.astype(int), return_inverse=True)
+        names = [AXES[k] if by == "axis" and k >= 0 else str(k) for k in known]
+        return None, tuple(names), number
+    values = np.degrees(values) if by in DEGREES else values
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, SETTINGS.bins + 1)))
+    if len(edges) < 2:
+        return None, (), None
+    number = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    return (
+        edges,
+        tuple(f"{a:.4g} to {b:.4g}" for a, b in pairwise(edges)),
+        number,
+    )
+
+
+def _headline(before, band, splits, number, explained):
+    """One sentence: how large, and where most of it is."""
+    low, high = band
+    measurable = before > high
+    size = (
+        f"All rows together differ by {before:.1f} mm more than predicted ({low:.1f} to "
+        f"{high:.1f} mm when nothing is wrong)"
+    )
+    if not measurable and not explained:
+        return f"Nothing stands out. {size}: that is not measurable."
+    best, largest = None, 0.0
+    for split in splits:
+        fraction = split.count / number
+        for i in range(len(split.bins)):
+            plain = split.share[i] > SETTINGS.plain * fraction[i]
+            if plain and split.share[i] - fraction[i] > largest:
+                best, largest = (split, i), split.share[i] - fraction[i]
+    of = "what the cause explains" if explained else "the gap"
+    if best is None:
+        return f"{of.capitalize()} lies everywhere alike. {size}."
+    split, i = best
+    return (
+        f"{100 * min(split.share[i], 1.0):.0f} % of {of} lies {_place(split, i)}, where "
+        f"{100 * split.count[i] / number:.0f} % of the rows are. {size}."
+    )
+
+
+def _place(split, i):
+    if split.edges is None:
+        return PLACES[split.by].format(CHANNELS.get(split.bins[i], split.bins[i]))
+    name, unit = NAMES[split.by]
+    return f"at a {name} of {split.bins[i]} {unit}"

@@ -1,0 +1,5 @@
+"""What is compared: rows of observed minus simulated, and what each was measured under."""
+
+from mlscorr.gap.observe.pairing import Pairing, build_rows
+from mlscorr.gap.observe.patch_search import PatchCollector
+from mlscorr.gap.observe.rows import Rows, background

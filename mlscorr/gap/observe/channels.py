@@ -1,0 +1,104 @@
+"""What each patch tells of itself: its roughness, and how many of its pulses returned.
+
+Log intensity is left out: a reference surface has no reflectance, and survey.toml says nothing of
+how strength falls with range, so that there is nothing to compare it with.
+"""
+
+import numpy as np
+
+from mlscorr.gap.observe.covariates import scanner_origin
+from mlscorr.gap.observe.patches import Patches
+from mlscorr.gap.observe.plane_fit import freedom
+from mlscorr.gap.observe.settings import SETTINGS
+from mlscorr.survey import Survey
+
+
+def rounding_sigma() -> float:
+    """What rounding in a file adds to a coordinate, one sigma of its even errors. Units: m."""
+    return SETTINGS.file_step / np.sqrt(12)
+
+
+def _believed_variance(survey, patches):
+    """Variance (p,) about the plane that range and angle noise should make. Units: m^2."""
+    p, samples = patches.time.shape
+    time, xyz = patches.time.ravel(), patches.xyz.reshape(-1, 3)
+    normal = np.repeat(patches.normal, samples, axis=0)
+    sight = xyz - scanner_origin(survey, time)
+    away = np.linalg.norm(sight, axis=1)
+    slant = np.einsum("ni,ni->n", sight, normal) / away
+    across = _sweep(survey, sight, time)
+    tilt = np.einsum("ni,ni->n", across, normal)
+    variance = (survey.scanner.range_noise * slant) ** 2 + rounding_sigma() ** 2
+    variance += (survey.scanner.angle_noise * tilt) ** 2
+    return variance.reshape(p, samples).mean(axis=1)
+
+
+def _sweep(survey, sight, time):
+    """How a point moves (n, 3) as its scan angle grows, m per rad; as if the scanner turned about
+    the driving direction where the mounting is not known.
+    """
+    if survey.mounting is None:
+        forward = survey.trajectory.at(time).attitude.apply([0.0, 1.0, 0.0])
+        return np.cross(forward, sight)
+    axis = survey.trajectory.at(time).attitude.apply(
+        survey.mounting.boresight.apply([0.0, 0.0, 1.0])
+    )
+    return np.cross(axis, sight)
+
+
+def log_roughness(
+    variance: np.ndarray, believed: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Log of a variance about a plane over the believed one, without its bias, and its variance.
+
+    Mean and variance of the logarithm of chi^2 / freedom, to the second order.
+
+    Parameters
+    ----------
+    variance, believed : (p,) array
+        Units: m^2.
+    points : (p,) array
+        On each plane.
+    """
+    return np.log(variance / believed) + 1 / freedom(points), 2 / freedom(points)
+
+
+def roughness(
+    survey: Survey, patches: Patches
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """How rough patches are beside what the scanner is believed to make.
+
+    Parameters
+    ----------
+    survey : Survey
+    patches : Patches
+
+    Returns
+    -------
+    tuple of four (p,) arrays
+        Log variance ratio, its variance, the believed variance (m^2), and which patches count:
+        none that is curved does, whatever the noise.
+    """
+    believed = _believed_variance(survey, patches)
+    ratio, variance = log_roughness(patches.variance, believed, patches.points)
+    return ratio, variance, believed, patches.ripple <= SETTINGS.largest_ripple
+
+
+def return_rate(patches: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Share of pulses that returned from patches beside the believed 1.
+
+    Parameters
+    ----------
+    patches : Patches
+
+    Returns
+    -------
+    tuple of three (p,) arrays
+        Share minus 1, its variance, and which patches count: none where the median share is so
+        low that the cloud must have been thinned.
+    """
+    fired = np.maximum(patches.fired, 1)
+    share, counted = patches.returned / fired, patches.fired >= SETTINGS.fired
+    counted &= np.median(share[counted]) >= SETTINGS.thinned if counted.any() else False
+    loss = np.maximum(1.0 - share, SETTINGS.least_loss)
+    return share - 1.0, loss * (1.0 - loss) / fired, counted

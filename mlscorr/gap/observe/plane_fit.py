@@ -1,0 +1,239 @@
+"""Planes through the points of small cells of space and time."""
+
+import numpy as np
+
+from mlscorr.gap.observe.covariates import scanner_origin
+from mlscorr.gap.observe.patches import Patches
+from mlscorr.gap.observe.settings import SETTINGS
+from mlscorr.survey import PointCloud, Survey
+from mlscorr.targets import SETTINGS as TARGETS
+
+
+def fit_patches(
+    survey: Survey, chunk: PointCloud, inside: np.ndarray, share: float
+) -> Patches | None:
+    """Patches of a chunk and pass, without their pass number; None where there is none.
+
+    Parameters
+    ----------
+    survey : Survey
+    chunk : PointCloud
+        n points.
+    inside : (n,) bool array
+        Those of the pass.
+    share : float
+        Of the blocks of the ground, that are looked at.
+    """
+    block = _chance(
+        *np.floor(chunk.xyz[:, :2] / (SETTINGS.block_cells * SETTINGS.cell)).T.astype(np.int64)
+    )
+    rows = np.flatnonzero(inside & (block < share))
+    key = place_key(chunk.xyz[rows], chunk.gps_time[rows])
+    order = np.argsort(key, kind="stable")
+    rows, key = rows[order], key[order]
+    first = np.flatnonzero(np.append(True, key[1:] != key[:-1])) if len(rows) else np.empty(0, int)
+    count = np.diff(np.append(first, len(rows)))
+    keep = count >= SETTINGS.plane_points
+    if not keep.any():
+        return None
+    rows = rows[np.repeat(keep, count)]
+    count = count[keep]
+    return _fit(survey, chunk, rows, count, block)
+
+
+def place_key(xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
+    """A number for the cell and moment of points: those of one patch have the same.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    gps_time : (n,) array
+        Units: s.
+
+    Returns
+    -------
+    (n,) uint64 array
+    """
+    cell = np.floor(xyz / SETTINGS.cell).astype(np.int64)
+    return _mix(*cell.T, np.floor(gps_time / SETTINGS.moment).astype(np.int64))
+
+
+def _mix(*numbers):
+    """One 64-bit number (n,) of several integers (n,), different for all that occur together."""
+    mixed = np.zeros(len(numbers[0]), np.uint64)
+    for number in numbers:
+        mixed ^= number.astype(np.uint64)
+        mixed *= np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio (Fibonacci hashing)
+        mixed ^= mixed >> np.uint64(32)
+    return mixed
+
+
+def _chance(*numbers):
+    """A number from 0 to 1 (n,) that depends on integers (n,) alone."""
+    return (_mix(*numbers) >> np.uint64(11)) / float(1 << 53)
+
+
+def _fit(survey, chunk, rows, count, block):
+    """Planes through groups of points: rows (n,) of the chunk, count (g,) of each group."""
+    first, group = np.cumsum(count) - count, np.repeat(np.arange(len(count)), count)
+    local = chunk.xyz[rows] - chunk.xyz[rows[first]][group]
+    weight, (mean, values, axes) = _trimmed(local, first, group)
+    held = np.add.reduceat(weight, first)
+    variance = values[:, 0] * held / freedom(held)
+    least = np.maximum(SETTINGS.plane_points, SETTINGS.rule * count)
+    good = (held >= least) & (variance <= SETTINGS.roughest**2)
+    good &= values[:, 1] >= SETTINGS.narrowest**2
+    if not good.any():
+        return None
+    fired, returned = _misses(chunk.gps_time, rows, first, group)
+    away = np.einsum("ni,ni->n", local - mean[group], axes[group, :, 0])
+    sample = rows[_taken(weight > 0, first)[good]]
+    begin = chunk.gps_time[rows[0]]
+    time = np.add.reduceat(weight * (chunk.gps_time[rows] - begin), first) / held
+    normal = axes[good, :, 0]
+    slant = np.einsum("pi,pi->p", normal, _sight(survey, chunk, sample))
+    normal *= np.sign(slant)[:, None]
+    return Patches(
+        pass_number=np.zeros(good.sum(), int),
+        gps_time=begin + time[good],
+        centre=chunk.xyz[rows[first]][good] + mean[good],
+        normal=normal,
+        variance=variance[good],
+        spread=np.sqrt(values[good, 1]),
+        ripple=(variance / _between(away, weight, first, group))[good],
+        points=held[good].astype(int),
+        fired=fired[good],
+        returned=returned[good],
+        block=block[rows[first]][good],
+        xyz=chunk.xyz[sample],
+        time=chunk.gps_time[sample],
+        intensity=chunk.intensity[sample].astype(float),
+        cloud=_on_planes(chunk, rows[np.repeat(good, count)], count[good], sample, normal),
+    )[np.abs(slant) >= TARGETS.grazing]
+
+
+def _trimmed(local, first, group):
+    """Which points (n,) lie on their group's plane, as weights, and the moments of these."""
+    weight = np.ones(len(local))
+    for trim in SETTINGS.trims:
+        mean, values, axes = moments(local, weight, first, group)
+        away = np.abs(np.einsum("ni,ni->n", local - mean[group], axes[group, :, 0]))
+        held = np.add.reduceat(weight, first)
+        sigma = np.sqrt(values[:, 0] * held / freedom(held))
+        weight = (away <= trim * np.maximum(sigma, SETTINGS.file_step / 10)[group]).astype(float)
+    return weight, moments(local, weight, first, group)
+
+
+def _on_planes(chunk, rows, count, sample, normal):
+    """PointCloud of the points on each plane (g,), of groups of rows (n,) with counts (g,)."""
+    first, group = np.cumsum(count) - count, np.repeat(np.arange(len(count)), count)
+    in_time = np.argsort(chunk.gps_time[sample], axis=1, kind="stable")[:, SETTINGS.samples // 2]
+    origin = chunk.xyz[sample[np.arange(len(count)), in_time]]
+    height = np.einsum("ni,ni->n", chunk.xyz[rows] - origin[group], normal[group])
+    heights = np.einsum("gsi,gi->gs", chunk.xyz[sample] - origin[:, None], normal)
+    middle, sigma = (
+        np.median(heights, axis=1),
+        np.maximum(heights.std(axis=1), SETTINGS.file_step / 2),
+    )
+    for _ in range(4):
+        on = np.abs(height - middle[group]) <= SETTINGS.trims[-1] * sigma[group]
+        held = np.add.reduceat(on.astype(float), first)
+        middle = np.add.reduceat(np.where(on, height, 0.0), first) / held
+        squares = np.where(on, height - middle[group], 0.0) ** 2
+        sigma = np.maximum(np.sqrt(np.add.reduceat(squares, first) / held), SETTINGS.file_step / 2)
+    on = np.flatnonzero(np.abs(height - middle[group]) <= SETTINGS.trims[-1] * sigma[group])
+    on = on[np.lexsort((chunk.gps_time[rows[on]], group[on]))]
+    clouds = np.empty(len(count), dtype=object)
+    for i, part in enumerate(np.split(rows[on], np.searchsorted(group[on], range(1, len(count))))):
+        taken = (
+            (np.arange(SETTINGS.patch_pulses) + 0.5) * len(part) / SETTINGS.patch_pulses
+        ).astype(int)
+        clouds[i] = chunk[part[taken] if len(part) > SETTINGS.patch_pulses else part]
+    return clouds
+
+
+def freedom(points: np.ndarray) -> np.ndarray:
+    """Degrees of freedom about a plane through numbers (n,) of points: a plane has three."""
+    return np.maximum(points - 3, 1)
+
+
+def moments(
+    local: np.ndarray, weight: np.ndarray, first: np.ndarray, group: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Moments of groups of points.
+
+    Parameters
+    ----------
+    local : (n, 3) array
+        Points, group after group, about a place near them. Units: m.
+    weight : (n,) array
+    first : (g,) int array
+        Where each group begins.
+    group : (n,) int array
+
+    Returns
+    -------
+    tuple of (g, 3), (g, 3) and (g, 3, 3) arrays
+        Mean (m), variances from the least (m^2), and their axes, in columns.
+    """
+    total = np.maximum(np.add.reduceat(weight, first), 1.0)
+    mean = np.add.reduceat(weight[:, None] * local, first) / total[:, None]
+    centred = local - mean[group]
+    covariance = np.empty((len(first), 3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            entry = np.add.reduceat(weight * centred[:, i] * centred[:, j], first) / total
+            covariance[:, i, j] = covariance[:, j, i] = entry
+    return mean, *np.linalg.eigh(covariance)
+
+
+def _between(away, weight, first, group):
+    """Half the mean square (g,) of differences of distances (n,) that follow each other. m^2."""
+    both = weight * np.append(weight[1:] * (group[1:] == group[:-1]), 0.0)
+    squares = both * np.diff(away, append=0.0) ** 2
+    total = np.maximum(np.add.reduceat(both, first), 1.0)
+    return np.maximum(np.add.reduceat(squares, first) / total / 2, (SETTINGS.file_step / 10) ** 2)
+
+
+def _taken(on_plane, first):
+    """Places (g, 12) of points on each group's plane, evenly spread; repeated where few are."""
+    held = np.add.reduceat(on_plane.astype(int), first)
+    inliers = np.flatnonzero(on_plane)
+    begin = np.cumsum(held) - held
+    step = np.maximum(held, 1)[:, None] * (np.arange(SETTINGS.samples) + 0.5) / SETTINGS.samples
+    return inliers[np.minimum(begin[:, None] + step.astype(int), len(inliers) - 1)]
+
+
+def _sight(survey, chunk, sample):
+    """Unit vector (p, 3) from each patch to the scanner."""
+    middle = sample[:, SETTINGS.samples // 2]
+    away = scanner_origin(survey, chunk.gps_time[middle]) - chunk.xyz[middle]
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+def _misses(gps_time, rows, first, group):
+    """Pulses fired and returned within the scan lines of a group, their ends not counted.
+
+    The step of pulses is the least one of the group. Nothing is counted where pauses are not whole
+    multiples of it (jitter, another order), or too many are long (a cloud that was thinned there).
+    """
+    pause = np.diff(gps_time[rows], append=gps_time[rows[-1]])
+    follows = np.append((np.diff(rows) == 1) & (np.diff(group) == 0), False) & (pause > 0)
+    step = np.minimum.reduceat(np.where(follows, pause, np.finfo(float).max), first)
+    pulses = np.where(follows, pause / step[group], np.finfo(float).max)
+    near, longer = (
+        pulses <= SETTINGS.longest_miss,
+        (pulses > SETTINGS.longest_miss) & (pulses <= SETTINGS.line_pause),
+    )
+    pulses = np.where(near, pulses, 0.0)
+
+    def count(which):
+        return np.add.reduceat(which.astype(int), first)
+
+    pauses, lines = count(near), count(near & ~np.append(False, near[:-1]))
+    whole, interrupted = count(near & (np.abs(pulses % 1 - 0.5) > 0.4)), count(longer)
+    regular = (whole >= SETTINGS.rule * pauses) & (interrupted <= (1 - SETTINGS.rule) / 2 * pauses)
+    # a line's first and last returns are there by choice: what lies between them counts
+    fired = np.add.reduceat(np.round(pulses).astype(int), first) - lines
+    return np.where(regular, fired, 0), np.where(regular, pauses - lines, 0)

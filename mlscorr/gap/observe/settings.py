@@ -1,0 +1,59 @@
+"""Numbers of what is compared, with their reasons."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How patches are made, when two of them are one plane, and what is too far off.
+
+    Sizes are those of street scenes; ``python benchmarks/gap_study.py`` shows what they give.
+    """
+
+    # patches
+    cell: float = 1.0  # m: some hundred points of a scanner in a street, flat for most of them
+    moment: float = 1.0  # s: the POS error is one value over it (a POS has a bandwidth of 1 Hz)
+    block_cells: int = 4  # cells that are kept or left together, so that neighbours stay
+    plane_points: int = 24  # of a plane: a variance of 21 degrees of freedom is known to a third
+    samples: int = 12  # pulses that stand for a patch: their mean has a third of their scatter
+    trims: tuple[float, ...] = (2.0, 2.5, 3.0, 3.5)  # sigmas; the last takes 0.05 % of the noise
+    rule: float = 0.9  # share from which on a part stands for the whole: of points, of pauses
+    roughest: float = 0.05  # m about a plane: asphalt and masonry have centimetres, shrubs more
+    narrowest: float = 0.12  # m, one sigma across a patch: a normal to 1 deg from noise of 2 mm
+    file_step: float = 1e-3  # m: the usual scale factor of LAS coordinates
+    patches: int = 1000  # on surfaces, of up to three rows; 200 were enough in gap_study
+    patch_pulses: int = 400  # of a patch, fired again: a mean to a twentieth of the noise
+    longest_miss: float = 4.5  # pulses: of longer pauses a loss of 30 % makes 1 % (0.3^4)
+    line_pause: float = 20.5  # pulses: a longer pause is another scan line
+    # what is compared
+    gate_sigmas: float = 4.0  # of the stated 3D sigma: 1 in 1 000 normal errors lies beyond
+    least_gate: float = 0.5  # m: boresight and lever arm are not in the POS's sigma; cars stand off
+    window: float = 5.0  # s at most, over which a POS error is one shift
+    odd_distance: float = 0.03  # m: more than attitude errors make within a window
+    odd_sigmas: float = 6.0  # of a window's own scatter
+    bins: int = 8  # of each covariate, over which a choice is spread
+    pair_pause: float = 10.0  # s between two visits of one pass: the POS error is another one
+    pair_distance: float = 0.7  # cells between the middles of two patches of one plane
+    parallel: float = float(np.radians(8.0))  # rad: patches of few points know their normal so well
+    surface_sigma: float = 0.002  # m: walls and roads are no planes, nor facets of static scans
+    facet_share: float = 0.75  # of a patch's beams that must meet one plane of the reference
+    overlap: float = 0.01  # of the patches on the reference; fewer are chance: it lies elsewhere
+    # channels
+    least_loss: float = 0.002  # share that any scanner loses: no loss in 100 pulses proves nothing
+    largest_ripple: float = 1.5  # of Patches: 19 of 20 flat ones have less, by chance
+    fired: int = 20  # pulses between points of a patch, to speak of a share of them
+    thinned: float = 0.6  # median share of returns: below it the cloud was thinned
+    # covariates
+    beside: float = 50.0  # m from the first pass, up to which a place has a location along it
+    step: float = 0.25  # s to each side, over which speed and turn rate are taken
+    on_target: float = 0.45  # of a target's size from its centre: on a disc, and on a plate
+
+    @property
+    def pool(self) -> int:
+        """Patches in memory: six for each that is chosen, so that a choice can be spread."""
+        return 6 * self.patches
+
+
+SETTINGS = Settings()

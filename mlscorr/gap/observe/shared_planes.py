@@ -1,0 +1,98 @@
+"""Planes that were seen twice, by two passes or by one that came back: whether both agree."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlscorr.gap.observe.assemble import assemble, patch_pulses
+from mlscorr.gap.observe.patches import Patches
+from mlscorr.gap.observe.rows import Rows, SamplePulses
+from mlscorr.gap.observe.selection import consistent, gate, spread
+from mlscorr.gap.observe.settings import SETTINGS
+from mlscorr.survey import Survey
+
+
+def shared_rows(
+    survey: Survey, patches: Patches, rng: np.random.Generator, limit: int | None = None
+) -> Rows | None:
+    """Rows of the planes that were seen twice, or None where there are none.
+
+    The residual is how far the earlier look lies from the later one, along their mean normal.
+
+    Parameters
+    ----------
+    survey : Survey
+    patches : Patches
+    rng : numpy.random.Generator
+        Chooses where there are more pairs than the limit.
+    limit : int, optional
+        Half of SETTINGS.patches by default.
+    """
+    limit = SETTINGS.patches // 2 if limit is None else limit
+    first, second = (patches[rows] for rows in _pairs(patches))
+    normal, apart, residual = _compare(first, second)
+    kept = np.flatnonzero(np.abs(residual) <= gate(survey, first.gps_time))
+    kept = kept[consistent(first.gps_time[kept], normal[kept], residual[kept])]
+    if len(kept) == 0:
+        return None
+    columns = [first.gps_time[kept], second.gps_time[kept], *np.abs(normal[kept].T)]
+    kept = kept[spread(columns, limit, rng)]
+    first, second = first[kept], second[kept]
+    normal, apart, residual = normal[kept], apart[kept], residual[kept]
+    item = np.arange(len(kept))
+    pulses = [patch_pulses(survey, first, item), patch_pulses(survey, second, item, -1.0)]
+    return assemble(
+        survey,
+        "shared",
+        item,
+        first.gps_time,
+        (first.centre + second.centre) / 2,
+        normal,
+        residual,
+        _noise(first, second, apart),
+        np.minimum(first.points, second.points),
+        SamplePulses.concatenate(pulses),
+        first.pass_number,
+        gps_time_2=second.gps_time,
+    )
+
+
+def _compare(first, second):
+    """Mean normal (n, 3), distance of the middles (n,) and that along the normal (n,). Units: m."""
+    normal = first.normal + second.normal
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    between = first.centre - second.centre
+    return normal, np.linalg.norm(between, axis=1), np.einsum("ni,ni->n", normal, between)
+
+
+def _pairs(patches):
+    """Rows (n,), (n,) of two looks at one plane, the earlier one first; each is in one pair at
+    most with any other pass.
+    """
+    pairs = cKDTree(patches.centre).query_pairs(
+        SETTINGS.pair_distance * SETTINGS.cell, output_type="ndarray"
+    )
+    time = patches.gps_time[pairs]
+    pairs = np.where((time[:, 0] <= time[:, 1])[:, None], pairs, pairs[:, ::-1])
+    early, late = pairs.T
+    cosine = np.einsum("ni,ni->n", patches.normal[early], patches.normal[late])
+    other = patches.pass_number[early] != patches.pass_number[late]
+    other |= np.abs(patches.gps_time[early] - patches.gps_time[late]) > SETTINGS.pair_pause
+    pair = (cosine >= np.cos(SETTINGS.parallel / 2)) & other
+    early, late = early[pair], late[pair]
+    order = np.argsort(np.linalg.norm(patches.centre[early] - patches.centre[late], axis=1))
+    early, late = early[order], late[order]
+    for forward in (True, False):  # the nearest partner in each pass, of both
+        a, b = (early, late) if forward else (late, early)
+        key = a * (patches.pass_number.max(initial=0) + 1) + patches.pass_number[b]
+        nearest = np.sort(np.unique(key, return_index=True)[1])
+        early, late = early[nearest], late[nearest]
+    return early, late
+
+
+def _noise(first, second, apart):
+    """Variance (n,) of the difference: of both means, of the normal over the way between them,
+    and of the surface, which is no plane.
+    """
+    mean = [patches.variance / patches.points for patches in (first, second)]
+    tilt = [m / patches.spread**2 for m, patches in zip(mean, (first, second), strict=True)]
+    return mean[0] + mean[1] + apart**2 * (tilt[0] + tilt[1]) / 4 + SETTINGS.surface_sigma**2

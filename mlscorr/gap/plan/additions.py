@@ -1,0 +1,248 @@
+"""What to measure next: which cheap addition to this survey tells the open causes apart.
+
+Each addition is made of the survey's own geometry, turned, timed or placed anew, and judged by its
+signatures alone: no data are needed.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.effects import Effect
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.separability import Separability, compare_signatures
+from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
+from mlscorr.gap.observe.assemble import assemble, sample_pulses
+from mlscorr.gap.observe.rows import Rows, background
+from mlscorr.gap.plan.settings import SETTINGS
+from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.survey import ControlPoints, Survey, Trajectory
+
+
+@dataclass(frozen=True)
+class Addition:
+    """One addition: what to do, and rows and survey with it, whose residuals say nothing."""
+
+    name: str
+    rows: Rows
+    survey: Survey
+
+
+@dataclass(frozen=True)
+class NextData:
+    """What to measure next, and why.
+
+    Parameters
+    ----------
+    survey, why : str
+    before, after : float, optional
+        Squared correlation of the causes that it tells apart.
+    """
+
+    survey: str
+    why: str
+    before: float | None = None
+    after: float | None = None
+
+
+def additions(rows: Rows, survey: Survey) -> tuple[Addition, ...]:
+    """The cheap additions that a survey allows.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    """
+    targets = np.flatnonzero(rows.channel == "target")
+    made = [
+        _another_pass("the same road in the opposite direction", rows, survey, backwards=True),
+        _another_pass("the same road at twice the speed", rows, survey, faster=SETTINGS.factor),
+    ]
+    if len(targets):
+        items = np.unique(rows.item[targets])
+        near = items[
+            np.linspace(0, len(items) - 1, min(SETTINGS.stop_targets, len(items))).astype(int)
+        ]
+        made += [
+            _more_targets("as many targets again, between the others", rows, survey, items),
+            _more_targets(
+                "as many targets again, at twice the distance", rows, survey, items, SETTINGS.factor
+            ),
+            _stop(
+                f"a stop of {SETTINGS.pause:.0f} s beside {len(near)} targets", rows, survey, near
+            ),
+        ]
+    return tuple(made)
+
+
+def next_data(
+    rows: Rows,
+    survey: Survey,
+    kinds: Iterable[type[Effect]],
+    effects: Iterable[str],
+    compared: Separability,
+) -> tuple[NextData, ...]:
+    """Which additions tell effects apart that this survey can't, best first.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    kinds : iterable of Effect classes
+        Those to consider.
+    effects : tuple of str
+        Open causes: the verdict's set, or a class. Events are no matter of geometry: left out.
+    compared : Separability
+        Of the survey as it is.
+    """
+    names = tuple(name for name in effects if name in compared.effects)
+    if len(names) < 2:
+        return ()
+    kinds = [kind for kind in kinds if kind.name in names]
+    before, data = _largest(compared, names), []
+    for addition in additions(rows, survey):
+        signs, _ = signatures(addition.rows, addition.survey, kinds)
+        observed = Observations.of(addition.rows, background(addition.rows, addition.survey))
+        after = _largest(compare_signatures(observed, signs), names)
+        if before - after >= SETTINGS.smallest_fall:
+            why = (
+                f"{' and '.join(names)}: squared correlation falls from {before:.2f} to "
+                f"{after:.2f}" + ("." if after <= INFERENCE.same else ", which is still one class.")
+            )
+            data.append(NextData(addition.name, why, before, after))
+    return tuple(sorted(data, key=lambda planned: planned.after or 0.0))
+
+
+def _largest(compared, names):
+    """Largest squared correlation between parameters of different effects among names."""
+    effects = np.array(compared.effects)
+    named = np.isin(effects, names)
+    apart = named[:, None] & named & (effects[:, None] != effects)
+    return float((compared.correlation[apart] ** 2).max(initial=0.0))
+
+
+def _another_pass(name, rows, survey, backwards=False, faster=1.0):
+    """All targets and surfaces once more, from the same places at other times."""
+    once = rows.select(rows.metric & ~rows.two_times)
+    trajectory = survey.trajectory
+    first, last = trajectory.gps_time[[0, -1]]
+
+    def anew(time):
+        elapsed = (last - time) if backwards else (time - first)
+        return last + SETTINGS.pause + elapsed / faster
+
+    turn = Rotation.from_euler("z", np.pi if backwards else 0.0)
+    order = slice(None, None, -1 if backwards else 1)
+    longer = _joined(
+        trajectory,
+        anew(trajectory.gps_time)[order],
+        trajectory.position[order],
+        (trajectory.attitude * turn)[order],
+        order,
+    )
+    wider = replace(survey, trajectory=longer)
+    more = _placed(once, wider, anew, lambda pulses: pulses.xyz, once.survey_item)
+    return Addition(name, _both(rows, more), wider)
+
+
+def _joined(trajectory, time, position, attitude, order):
+    """A trajectory and epochs that follow it, with its own sigmas in an order."""
+    sigmas = [
+        None if values is None else np.vstack([values, values[order]])
+        for values in (trajectory.position_sigma, trajectory.attitude_sigma)
+    ]
+    return Trajectory(
+        np.append(trajectory.gps_time, time),
+        np.vstack([trajectory.position, position]),
+        Rotation.concatenate([trajectory.attitude, attitude]),
+        *sigmas,
+    )
+
+
+def _more_targets(name, rows, survey, items, farther=1.0):
+    """Targets like the items, half an interval later, seen under the same angles."""
+    once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
+    trajectory = survey.trajectory
+    visits = np.sort(np.unique(once.gps_time))
+    later = 0.5 * np.median(np.diff(visits)) if len(visits) > 1 else 1.0
+
+    def anew(time):
+        moved = time + later
+        same = trajectory.segment(moved) == trajectory.segment(time)
+        back = np.maximum(time - later, trajectory.gps_time[0])
+        return np.where(same & (trajectory.segment(moved) >= 0), moved, back)
+
+    return _new_targets(name, rows, survey, once, anew, farther)
+
+
+def _stop(name, rows, survey, items):
+    """The items' targets set up around one place, where the vehicle stands."""
+    trajectory = survey.trajectory
+    once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
+    middle = trajectory.at(np.median(trajectory.gps_time[trajectory.segment(
+        trajectory.gps_time) == 0]))  # fmt: skip
+    step = np.median(np.diff(trajectory.gps_time))
+    start = trajectory.gps_time[-1] + SETTINGS.pause
+    time = start + np.arange(0.0, SETTINGS.pause, step)
+    n = len(time)
+    nearest = np.full(n, np.argmin(np.abs(trajectory.gps_time - middle.gps_time[0])))
+    longer = _joined(
+        trajectory, time, trajectory.position[nearest], trajectory.attitude[nearest], nearest
+    )
+    low, high = once.gps_time.min(), once.gps_time.max()
+
+    def anew(recorded):
+        share = (recorded - low) / max(high - low, 1.0)  # pulses come before and after their target
+        return start + np.clip(share, 0.0, 1.0) * (time[-1] - start)
+
+    return _new_targets(name, rows, replace(survey, trajectory=longer), once, anew, 1.0)
+
+
+def _new_targets(name, rows, survey, once, anew, farther):
+    """Rows of new targets, which stand to the vehicle as those of `once` did."""
+    trajectory, arm = survey.trajectory, np.zeros(3)
+    if survey.mounting is not None:
+        arm = survey.mounting.lever_arm
+
+    def place(pulses):
+        then, now = trajectory.at(pulses.gps_time), trajectory.at(anew(pulses.gps_time))
+        body = then.attitude.inv().apply(pulses.xyz - then.position)
+        return now.position + now.attitude.apply(arm + farther * (body - arm))
+
+    items, number = np.unique(once.item, return_inverse=True)
+    old = once.survey_item[np.unique(number, return_index=True)[1]]
+    known, targets = survey.surveyed, rows.targets
+    added = ControlPoints(
+        tuple(f"new {i + 1}" for i in range(len(items))),
+        targets.position[old], targets.sigma[old], tuple(targets.kind[i] for i in old),
+        targets.size[old], targets.normal[old],
+    )  # fmt: skip
+    wider = replace(survey, check=survey.check + added)
+    more = _placed(once, wider, anew, place, len(known) + number)
+    return Addition(name, _both(replace(rows, targets=wider.surveyed), more), wider)
+
+
+def _placed(once, survey, anew, place, survey_item):
+    """Rows like those of `once` at other times, with pulses at other places."""
+    old = once.pulses
+    pulses = sample_pulses(
+        survey, old.item, old.weight, place(old), anew(old.gps_time), old.intensity, old.normal
+    )
+    item, number = np.unique(once.item, return_inverse=True)
+    order = np.argsort(pulses.item, kind="stable")
+    first = order[np.searchsorted(pulses.item[order], item)]
+    time = anew(once.gps_time)
+    factor = once.survey_factor
+    return assemble(
+        survey, once.channel, once.item, time, pulses.xyz[first][number], once.direction,
+        np.zeros(len(once)), once.noise, once.points, pulses,
+        survey.trajectory.segment(time) + 1, survey_item=survey_item, survey_factor=factor,
+        believed=once.believed,
+    )  # fmt: skip
+
+
+def _both(rows, more):
+    both = Rows.concatenate([replace(rows, targets=more.targets), more])
+    return replace(both, reference=more.reference)

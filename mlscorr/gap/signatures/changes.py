@@ -1,0 +1,290 @@
+"""What an effect does to the rows: its own function applied, with and without, through Eq. 1.
+
+Effects turn what is true into what is recorded; to the first order they do the same to what is
+recorded already.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mlscorr.effects import Effect, Returns
+from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.signatures.settings import SETTINGS
+from mlscorr.survey import Survey, Trajectory
+
+FIELDS = ("gps_time", "angle", "range")  # of Returns, in which a point can move
+
+
+@dataclass(frozen=True)
+class Change:
+    """What one effect does to the rows.
+
+    Parameters
+    ----------
+    shift : (m,) array
+        Of the residual, in its unit.
+    variance : (m,) array
+        That a random effect adds to the residual; to be added to Rows.noise.
+    growth : (m,) array
+        Of a roughness row, what is added to the variance about the plane, over the believed one:
+        the row's mean grows by log(1 + growth).
+    """
+
+    shift: np.ndarray
+    variance: np.ndarray
+    growth: np.ndarray
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Rows and their survey, ready to try effects on."""
+
+    rows: Rows
+    survey: Survey
+
+    def change(self, effect: Effect, rng: np.random.Generator | None = None) -> Change:
+        """What an effect does to the rows.
+
+        Parameters
+        ----------
+        effect : Effect
+        rng : numpy.random.Generator, optional
+            For random ones.
+
+        Raises
+        ------
+        ValueError
+            For a stage that needs the mounting where that isn't known.
+        """
+        m, stage = len(self.rows), effect.stage
+        check_mounting(self.survey, [effect])
+        shift, variance, growth = np.zeros(m), np.zeros(m), np.zeros(m)
+        rng = np.random.default_rng(0) if rng is None else rng
+        if stage == "return":
+            shift = self._lost(effect, rng)
+        elif effect.is_of_pose():
+            variance = self._pose_variance(effect, rng)
+        elif stage == "pos":
+            shift = self._pose_shift(effect.apply(self._trajectory, self.rows.reference))
+        elif stage == "control":
+            shift = self._control_shift(effect)
+        elif stage == "mounting":
+            mounting = effect.apply(self.survey.mounting, self.rows.reference)
+            shift = self._along(self._moved(mounting=mounting))
+        elif stage != "beam" and effect.random:
+            variance, growth = self._scatter(effect, rng)
+        elif stage != "beam":
+            shift = self._along(self._moved(effect.apply(self.returns, self.rows.reference)))
+        return Change(shift, variance, growth)
+
+    @cached_property
+    def returns(self) -> Returns:
+        """The pulses as effects see them, in order of time."""
+        pulses = self.rows.pulses
+        x, y, z = pulses.scanner_xyz[self._order].T
+        return Returns(
+            gps_time=pulses.gps_time[self._order],
+            angle=np.arctan2(y, x),
+            range=np.sqrt(x**2 + y**2 + z**2),
+            intensity=pulses.intensity[self._order],
+            incidence=pulses.incidence[self._order],
+            kept=np.ones(len(pulses), dtype=bool),
+        )
+
+    @cached_property
+    def _order(self):
+        return np.argsort(self.rows.pulses.gps_time, kind="stable")
+
+    @cached_property
+    def _pulses(self):
+        return self.rows.pulses[self._order]
+
+    @cached_property
+    def _pose(self):
+        return self.survey.trajectory.at(self._pulses.gps_time)
+
+    @cached_property
+    def _body(self):
+        """Pulses (k, 3) in the body frame, as recorded. Units: m."""
+        return self._pose.attitude.inv().apply(self._pulses.xyz - self._pose.position)
+
+    def _moved(self, returns=None, mounting=None):
+        """How far pulses (k, 3) move on the map when these are recorded instead. Units: m."""
+        body, pose = self._body, self._pose
+        recorded = self.survey.mounting
+        if returns is not None and not self._same(returns, "angle", "range"):
+            body = recorded.boresight.apply(self._scanner_xyz(returns)) + recorded.lever_arm
+        if mounting is not None:
+            body = mounting.boresight.apply(self._pulses.scanner_xyz) + mounting.lever_arm
+        if returns is not None and not self._same(returns, "gps_time"):
+            pose = self.survey.trajectory.at(self._held(returns.gps_time))
+        return pose.attitude.apply(body) + (pose.position - self._pulses.xyz)
+
+    def _same(self, returns, *names):
+        return all(getattr(returns, name) is getattr(self.returns, name) for name in names)
+
+    def _scanner_xyz(self, returns):
+        """X_L (k, 3) of changed returns: the elevation out of the scan plane stays. Units: m."""
+        level = self._pulses.scanner_xyz
+        sine = level[:, 2] / self.returns.range
+        flat = returns.range * np.sqrt(1.0 - sine**2)
+        return np.column_stack(
+            [flat * np.cos(returns.angle), flat * np.sin(returns.angle), returns.range * sine]
+        )
+
+    def _held(self, gps_time):
+        """Times (k,) held within the passes of the pulses, at whose ends they may leave it."""
+        trajectory = self.survey.trajectory
+        starts, ends = trajectory.passes.T
+        number = trajectory.segment(self._pulses.gps_time)
+        return np.clip(gps_time, starts[number], ends[number])
+
+    def _along(self, moved):
+        """Shift of the residuals (m,) by moves (k, 3) of the pulses."""
+        number, count, place = self._items
+        total = np.column_stack(
+            [np.bincount(number, self._pulses.weight * v, count) for v in moved.T]
+        )
+        return np.einsum("mi,mi->m", self.rows.direction, total[place])
+
+    @cached_property
+    def _items(self):
+        """Which item each pulse (k,) is of, how many there are, and which each row (m,) is of."""
+        items, number = np.unique(self._pulses.item, return_inverse=True)
+        return number, len(items), np.searchsorted(items, self.rows.item)
+
+    def _mean(self, values):
+        """Sum (m,) over the visits of each row's item of the mean of values (k,) of its pulses."""
+        number, count, place = self._items
+        return np.bincount(number, np.abs(self._pulses.weight) * values, count)[place]
+
+    @cached_property
+    def _speeds(self):
+        """How pulses move per unit of each of FIELDS: name -> (k, 3)."""
+        speeds = {}
+        for name, step in zip(FIELDS, (1e-4, 1e-5, 1e-3), strict=True):
+            if name != "gps_time" and self.survey.mounting is None:
+                continue
+            ends = [
+                self._moved(replace(self.returns, **{name: getattr(self.returns, name) + h}))
+                for h in (-step, step)
+            ]
+            speeds[name] = (ends[1] - ends[0]) / (2 * step)
+        return speeds
+
+    def _scatter(self, effect, rng):
+        """Variance and growth (m,) by noise of each pulse's own."""
+        _, single, pulse = np.unique(self.returns.gps_time, return_index=True, return_inverse=True)
+        pulses = self.returns[single]
+        sums = {}
+        for _ in range(SETTINGS.replicas):
+            changed = effect.apply(pulses, self.rows.reference, rng)
+            for name in FIELDS:
+                if getattr(changed, name) is not getattr(pulses, name):
+                    error = getattr(changed, name) - getattr(pulses, name)
+                    sums[name] = sums.get(name, 0.0) + error**2
+        m, rows = len(self.rows), self.rows
+        variance, along_normal = np.zeros(m), np.zeros(m)
+        for name, total in sums.items():
+            moved = self._speeds[name] * np.sqrt(total / SETTINGS.replicas)[pulse, None]
+            away = np.einsum("ki,ki->k", moved, self._pulses.normal)
+            along_normal += self._mean(away**2)
+            for i in range(3):
+                for j in range(3):
+                    both = rows.direction[:, i] * rows.direction[:, j]
+                    variance += both * self._mean(moved[:, i] * moved[:, j])
+        rough = rows.channel == "roughness"
+        growth = np.where(rough, along_normal / np.where(rough, rows.believed, 1.0), 0.0)
+        return variance / np.maximum(rows.points, 1), growth
+
+    def _lost(self, effect, rng):
+        """Shift (m,) of the share that returns."""
+        replicas = SETTINGS.replicas if effect.random else 1
+        kept = sum(
+            effect.apply(self.returns, self.rows.reference, rng).kept for _ in range(replicas)
+        )
+        share = self._mean(kept / replicas)
+        rate = self.rows.channel == "return_rate"
+        return np.where(rate, self.rows.believed * (share - 1.0), 0.0)
+
+    @cached_property
+    def _trajectory(self):
+        """The recorded trajectory, thinned as far as its gaps stay what they are."""
+        whole = self.survey.trajectory
+        step = max(1, int(SETTINGS.epoch_step / np.median(np.diff(whole.gps_time))))
+        ends = np.searchsorted(whole.gps_time, whole.gaps)
+        rows = np.unique(
+            np.concatenate([np.arange(0, len(whole), step), ends.ravel(), [len(whole) - 1]])
+        )
+        thin = Trajectory(whole.gps_time[rows], whole.position[rows], whole.attitude[rows])
+        return thin if np.array_equal(thin.gaps, whole.gaps) else whole
+
+    def _pose_shift(self, changed):
+        """Shift (m,) of the residuals when this is recorded instead of the thinned trajectory."""
+        recorded = self._trajectory
+        columns = [changed.position - recorded.position]
+        if changed.attitude is not recorded.attitude:
+            columns.append((changed.attitude * recorded.attitude.inv()).as_rotvec())
+        pose = np.hstack(columns)
+        shift = np.zeros(len(self.rows))
+        for before, weight, partials in self._legs:
+            at_rows = pose[before] * (1 - weight) + pose[before + 1] * weight
+            shift += np.einsum("mi,mi->m", partials[:, : at_rows.shape[1]], at_rows)
+        return shift
+
+    @cached_property
+    def _legs(self):
+        """For each row's first and second look: the epoch before (m,), the weight (m, 1) of the
+        one after, and the partials (m, 6).
+        """
+        rows, epochs = self.rows, self._trajectory.gps_time
+        second = np.where(rows.two_times, rows.gps_time_2, rows.gps_time)
+        legs = []
+        for time, partials in ((rows.gps_time, rows.partials), (second, rows.partials_2)):
+            before = np.clip(np.searchsorted(epochs, time, side="right") - 1, 0, len(epochs) - 2)
+            weight = (time - epochs[before]) / (epochs[before + 1] - epochs[before])
+            legs.append((before, weight[:, None], partials))
+        return legs if rows.two_times.any() else legs[:1]
+
+    def _pose_variance(self, effect, rng):
+        """Variance (m,) by noise of the recorded trajectory, which rows of a moment share."""
+        total = 0.0
+        for _ in range(SETTINGS.replicas):
+            changed = effect.apply(self._trajectory, self.rows.reference, rng)
+            total = total + self._pose_shift(changed) ** 2
+        return total / SETTINGS.replicas
+
+    def _control_shift(self, effect):
+        """Shift (m,) of the residuals, observed - surveyed, by moved surveyed targets."""
+        rows, targets = self.rows, self.rows.targets
+        shift = np.zeros(len(rows))
+        if len(targets) == 0:
+            return shift
+        moved = effect.apply(targets, rows.reference).position - targets.position
+        on = rows.survey_item >= 0
+        shift[on] = -np.einsum("mi,mi->m", rows.direction[on], moved[rows.survey_item[on]])
+        return shift
+
+
+def check_mounting(survey: Survey, effects: Iterable[Effect]) -> None:
+    """Refuse effects on beams that nobody knows.
+
+    Parameters
+    ----------
+    survey : Survey
+    effects : iterable of Effect
+
+    Raises
+    ------
+    ValueError
+        For an effect on the beams of a survey without a mounting.
+    """
+    for effect in effects:
+        if survey.mounting is None and effect.needs_mounting():
+            raise ValueError(
+                f"{effect.name} acts on the {effect.stage}, and {survey.path} has no [mounting]: "
+                "without it nobody knows the beams."
+            )

@@ -1,0 +1,52 @@
+"""What a simulator's effects make of the rows, and the rows without it."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mlscorr.effects import Effect
+from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.signatures.changes import Bench, Change
+from mlscorr.survey import Survey
+
+
+def expected(
+    rows: Rows, survey: Survey, effects: Iterable[Effect], rng: np.random.Generator | None = None
+) -> Change:
+    """What effects that a simulator has already make of the rows: one Change of all.
+
+    Take ``shift + log(1 + growth)`` from the residuals, add ``variance`` to their noise.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    effects : iterable of Effect
+    rng : numpy.random.Generator, optional
+        For random ones.
+    """
+    bench, m = Bench(rows, survey), len(rows)
+    shift, variance, growth = np.zeros(m), np.zeros(m), np.zeros(m)
+    for effect in effects:
+        change = bench.change(effect, rng)
+        shift, variance = shift + change.shift, variance + change.variance
+        growth = growth + change.growth
+    return Change(shift, variance, growth)
+
+
+def without_effects(rows: Rows, survey: Survey, effects: Sequence[Effect]) -> Rows:
+    """Rows as observed minus what a simulator with effects expects.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    effects : sequence of Effect
+    """
+    change = expected(rows, survey, effects)
+    common = [effect for effect in effects if effect.random and effect.stage == "pos"]
+    # the noise of each row's own comes from its points, in which theirs is already
+    noise = rows.noise + expected(rows, survey, common).variance
+    residual = rows.residual - change.shift - np.log1p(change.growth)
+    return replace(rows, residual=residual, noise=noise)

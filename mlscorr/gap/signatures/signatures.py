@@ -1,0 +1,233 @@
+"""How each effect shows in the rows: derivatives by its parameters, through its own function."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mlscorr.effects import Effect, known_effects
+from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.signatures.settings import SETTINGS
+from mlscorr.survey import Survey
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How one effect, at one time or of one target where it has such, shows in the rows.
+
+    Parameters
+    ----------
+    kind : class of an Effect
+    fixed : dict
+        Parameters that the columns don't stand for: time, width, target.
+    parameters, units : tuples of p str
+    typical : (p,) array
+        Usual size of each parameter.
+    jacobian : (m, p) array
+        Of the residual by each parameter.
+    variance : (m,) array
+        A random effect's: of the residual's noise by the magnitude squared.
+    growth : (m,) array
+        A random effect's, of roughness rows: at a magnitude x their mean grows by
+        log(1 + growth x^2).
+    """
+
+    kind: type[Effect]
+    fixed: dict
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    typical: np.ndarray
+    jacobian: np.ndarray
+    variance: np.ndarray = field(repr=False)
+    growth: np.ndarray = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.kind.name
+
+    @property
+    def label(self) -> str:
+        """Name, and what is fixed: "position_bump, time 20, width 5"."""
+        fixed = self.fixed.items()
+        parts = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in fixed]
+        return ", ".join([self.name, *parts])
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether it shows in the rows' variance."""
+        return bool(self.variance.any() or self.growth.any())
+
+    @property
+    def is_common(self) -> bool:
+        """Whether its noise is the same for rows of one moment, not each row's own."""
+        return self.is_noise and self.kind.is_of_pose()
+
+    def effect(self, estimate: np.ndarray) -> Effect:
+        """The Effect with some parameters.
+
+        Parameters
+        ----------
+        estimate : (p,) array
+            Of random ones the size alone counts.
+
+        Raises
+        ------
+        ValueError
+            For what no survey can have.
+        """
+        estimate = np.asarray(estimate, dtype=float)
+        if self.kind.is_wave():
+            size, phase = np.hypot(*estimate), np.arctan2(estimate[1], estimate[0])
+            return self.kind(magnitude=float(size), phase=float(phase), **self.fixed)
+        values = np.abs(estimate) if self.kind.random else estimate
+        magnitude = float(values[0]) if len(values) == 1 else values.tolist()
+        return self.kind(magnitude=magnitude, **self.fixed)
+
+
+def signatures(
+    rows: Rows,
+    survey: Survey,
+    effects: Iterable[type[Effect]] | None = None,
+    rng: np.random.Generator | None = None,
+) -> tuple[tuple[Signature, ...], dict[str, str]]:
+    """Signatures of effects in the rows of a survey, and why others have none.
+
+    Deterministic effects are differentiated by steps of a tenth of their usual size to both
+    sides. Events (effects with a time) are tried at times spread over the passes, and with several
+    widths where they have one; target outliers with each target; a phase as its two quadratures.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+        With what is believed of trajectory and mounting.
+    effects : iterable of Effect classes, optional
+        All known ones by default.
+    rng : numpy.random.Generator, optional
+        For random effects, whose variances are sampled; the same seed each time by default.
+
+    Returns
+    -------
+    tuple of Signature, dict of str
+        Sentences by the names of effects without one.
+    """
+    bench, signs, left_out = Bench(rows, survey), [], {}
+    rng = np.random.default_rng(0) if rng is None else rng
+    for kind in known_effects() if effects is None else effects:
+        if kind.needs_mounting() and survey.mounting is None:
+            left_out[kind.name] = (
+                f"{kind.name} acts on the {kind.stage}, and the survey has no [mounting]."
+            )
+            continue
+        bank = [signature(bench, kind, fixed, rng) for fixed in _bank(kind, rows, survey)]
+        bank = [sign for sign in bank if sign.jacobian.any() or sign.is_noise]
+        signs += bank
+        if not bank:
+            left_out[kind.name] = f"No row of this survey depends on {kind.name}."
+    return tuple(signs), left_out
+
+
+def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Generator) -> Signature:
+    """Signature of an effect class.
+
+    Parameters
+    ----------
+    bench : Bench
+    kind : class of an Effect
+    fixed : dict
+        Such as the time of an event.
+    rng : numpy.random.Generator
+        For random effects.
+    """
+    rows, size = bench.rows, kind.quantities()["magnitude"]
+    m, none = len(rows), np.zeros(len(rows))
+    typical = size.typical if size.typical is not None else 1e-3 * size.largest
+    if kind.is_scatter() or kind.stage == "return":
+        step = SETTINGS.loss * min(1.0, size.largest) if kind.stage == "return" else typical
+        change = bench.change(kind(magnitude=step, **fixed), rng)
+        return Signature(
+            kind, fixed, ("magnitude",), (size.unit,), np.array([typical]),
+            (change.shift / step)[:, None], change.variance / step**2, change.growth / step**2,
+        )  # fmt: skip
+    tries = _tries(kind, size, fixed)
+    jacobian, step = np.zeros((m, len(tries))), SETTINGS.step * typical
+    for column, (_, unit, more) in enumerate(tries):
+        ends = [
+            bench.change(kind(magnitude=_scaled(unit, sign * step), **more)).shift
+            for sign in ((-1, 1) if size.least is None else (0, 1))
+        ]
+        jacobian[:, column] = (ends[1] - ends[0]) / (step * (2 if size.least is None else 1))
+    names = tuple(name for name, _, _ in tries)
+    return Signature(
+        kind, fixed, names, (size.unit,) * len(tries), np.full(len(tries), typical),
+        jacobian, none, none,
+    )  # fmt: skip
+
+
+def _tries(kind, size, fixed):
+    """For each column: its name, unit vector or 1 of the magnitude, and further parameters."""
+    if size.count > 1:
+        return [
+            (name, unit, fixed) for name, unit in zip(kind.parts, np.eye(size.count), strict=True)
+        ]
+    if kind.is_wave():  # magnitude sin(x - phase) = a sin(x) - b cos(x)
+        phases = (0.0, np.pi / 2)
+        return [(n, 1.0, {**fixed, "phase": p}) for n, p in zip(kind.parts, phases, strict=True)]
+    return [("magnitude", 1.0, fixed)]
+
+
+def _scaled(unit, step):
+    return float(unit * step) if np.ndim(unit) == 0 else (unit * step).tolist()
+
+
+def _bank(kind, rows, survey):
+    """Sets of fixed parameters at which an effect is tried."""
+    if kind.is_on_target():
+        used = np.unique(rows.survey_item[rows.survey_item >= 0])
+        return [{"target": rows.targets.name[i]} for i in used]
+    known, moment = kind.quantities(), kind.moment()
+    rest = {name: known[name].typical for name in kind.circumstances() if name not in moment}
+    if not moment:
+        return [rest]
+    widths = SETTINGS.widths if "width" in moment else (None,)
+    return [
+        {**rest, "time": time, **({} if width is None else {"width": width})}
+        for width in widths
+        for time in _times(rows, survey, SETTINGS.step_spacing if width is None else width)
+    ]
+
+
+def _times(rows, survey, spacing):
+    """Times of events from reference.start, spread over the time in which things were seen. s."""
+    known = rows.gps_time[rows.metric]
+    if len(known) == 0:
+        return []
+    known = np.append(known, rows.gps_time_2[rows.two_times])
+    low, high = known.min(), known.max()
+    gaps = survey.trajectory.gaps
+    inside = np.clip(gaps, low, high)
+    lost = float((inside[:, 1] - inside[:, 0]).sum())
+    number = int(np.clip((high - low - lost) / spacing, 1, SETTINGS.events))
+    # evenly over the time without gaps
+    elapsed = (np.arange(number) + 0.5) / number * (high - low - lost)
+    times = low + elapsed
+    for start, end in inside:
+        times = np.where(times >= start, times + (end - start), times)
+    times = times[survey.trajectory.segment(times) >= 0]
+    return [float(round(time - rows.reference.start, 3)) for time in times]
+
+
+def select(signs: Iterable[Signature], rows: np.ndarray) -> tuple[Signature, ...]:
+    """Signatures in some rows alone.
+
+    Parameters
+    ----------
+    signs : iterable of Signature
+    rows : (m,) bool array
+    """
+    names = ("jacobian", "variance", "growth")
+    return tuple(
+        replace(sign, **{name: getattr(sign, name)[rows] for name in names}) for sign in signs
+    )

@@ -1,0 +1,107 @@
+"""The survey as a simulator believes in it, and the simulator with a cause added."""
+
+from dataclasses import asdict, fields, replace
+from typing import Any
+
+import numpy as np
+
+from mlscorr.effects import Effect, in_order
+from mlscorr.effects.mounting import Boresight, LeverArm
+from mlscorr.simulate.simulator_file import Simulator, beliefs_of
+from mlscorr.survey import Survey
+
+
+def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Effect, ...]]:
+    """A survey whose scanner and POS are as a simulator believes, and the simulator's effects.
+
+    A mounting in the simulator that differs from the survey's is what the simulator takes for the
+    true one: the difference becomes the effects lever_arm and boresight. Where the trajectory has
+    sigmas of its own, the simulator's factor on those of survey.toml goes to them.
+
+    Parameters
+    ----------
+    survey : Survey
+    simulator : Simulator
+
+    Raises
+    ------
+    ValueError
+        For a difference of mountings that no survey can have, or a simulator with a mounting where
+        the survey has none.
+    """
+    recorded, believed = survey.mounting, simulator.mounting
+    effects = list(simulator.effects)
+    if believed is not None and recorded is None:
+        raise ValueError(
+            f"The simulator knows a [mounting], and {survey.path} has none: give it there, so that "
+            "the beams are known."
+        )
+    if believed is not None:
+        arm = believed.lever_arm - recorded.lever_arm
+        turn = (believed.boresight * recorded.boresight.inv()).as_rotvec()
+        if np.abs(arm).max() > 1e-9:
+            effects.append(LeverArm(magnitude=arm.tolist()))
+        if np.abs(turn).max() > 1e-9:
+            effects.append(Boresight(magnitude=np.degrees(turn).tolist()))
+    trajectory, old, new = survey.trajectory, survey.pos, simulator.pos
+    scales = {
+        "position_sigma": new.position_sigma / old.position_sigma,
+        "attitude_sigma": np.asarray(new.attitude_sigma) / np.asarray(old.attitude_sigma),
+    }
+    scaled = {
+        name: getattr(trajectory, name) * scale
+        for name, scale in scales.items()
+        if getattr(trajectory, name) is not None
+    }
+    trajectory = replace(trajectory, **scaled)
+    believed = replace(survey, trajectory=trajectory, scanner=simulator.scanner, pos=new)
+    return believed, in_order(effects)
+
+
+def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
+    """A simulator with a cause in it, for simulator.toml.
+
+    Parameters
+    ----------
+    simulator : Simulator
+    survey : Survey
+    cause : Cause
+        Its effects, and its Setting of what the POS errs by.
+
+    Raises
+    ------
+    ValueError
+        For a size that no survey can have.
+    """
+    effects = list(simulator.effects)
+    for new in cause.effects:
+        effects = _with(effects, new)
+    believed = simulator.mounting
+    if believed is not None:  # differences of the mounting have become effects
+        _, effects_now = as_believed(survey, replace(simulator, effects=()))
+        for effect in effects_now:
+            effects = _with(effects, effect)
+    scale, pos = cause.model.scale, simulator.pos
+    if not cause.parts or scale != 1.0:
+        attitude = np.asarray(pos.attitude_sigma) * scale
+        pos = replace(pos, position_sigma=pos.position_sigma * scale, attitude_sigma=attitude)
+    pos = replace(pos, windows=(*pos.windows, *cause.model.windows))
+    mounting = beliefs_of(survey).mounting
+    return replace(simulator, mounting=mounting, pos=pos, effects=in_order(effects))
+
+
+def _with(effects, new):
+    """Effects with one more; one of the same kind and place is joined with it."""
+    fixed = _fixed(new)
+    for i, old in enumerate(effects):
+        if old.name == new.name and _fixed(old) == fixed:
+            a, b = np.asarray(old.magnitude, float), np.asarray(new.magnitude, float)
+            total = np.hypot(a, b) if new.random else a + b
+            size = float(total) if total.ndim == 0 else total.tolist()
+            return [*effects[:i], replace(old, magnitude=size), *effects[i + 1 :]]
+    return [*effects, new]
+
+
+def _fixed(effect):
+    known = {f.name for f in fields(effect)} - {"magnitude"}
+    return {name: value for name, value in asdict(effect).items() if name in known}
