@@ -2,51 +2,65 @@
 
 from pathlib import Path
 
-import matplotlib
-
-from mlscorr.report.look import STYLE, svg
-from mlscorr.report.plan import map_figure
+from mlscorr.correction import Correction
+from mlscorr.estimate import TieResiduals
+from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.residuals import residual_figure
+from mlscorr.report.style import png, svg
+from mlscorr.report.target_map import map_figure
+from mlscorr.report.tie_map import tie_figure
 from mlscorr.report.timeline import attitude_figure, correction_figure
 
-DOTS_PER_INCH = 200
-PICTURES = (
-    ("correction.png", correction_figure),
-    ("map.png", map_figure),
-    ("residuals.png", residual_figure),
-)
 
+def drawings(
+    correction: Correction, report: CorrectionReport, ties: TieResiduals | None = None
+) -> dict[str, bytes]:
+    """The page's figures by name, each as the bytes of an SVG.
 
-def drawings(survey, correction, document):
-    """The page's figures by name, each as the bytes of an SVG."""
-    draw = {
-        "correction": correction_figure,
-        "attitude": attitude_figure,
-        "map": map_figure,
-        "residuals": residual_figure,
+    Parameters
+    ----------
+    correction : Correction
+    report : CorrectionReport
+    ties : TieResiduals, optional
+    """
+    of_ties = {} if ties is None else {"ties": svg(tie_figure(correction, ties))}
+    return of_ties | {
+        "correction": svg(correction_figure(correction, report)),
+        "attitude": svg(attitude_figure(correction, report)),
+        "map": svg(map_figure(correction, report)),
+        "residuals": svg(residual_figure(report)),
     }
-    return {name: svg(figure(survey, correction, document)) for name, figure in draw.items()}
 
 
-def write_pictures(folder, survey, correction, document):
-    """Write correction.png, map.png and residuals.png into a folder that exists.
+def write_pictures(
+    folder: str | Path,
+    correction: Correction,
+    report: CorrectionReport,
+    ties: TieResiduals | None = None,
+) -> list[Path]:
+    """Write correction.png, map.png, residuals.png, and ties.png, into a folder that exists.
 
     Parameters
     ----------
     folder : path
-    survey : Survey
     correction : Correction
         Its corrected trajectory may hold the sigmas after the estimate.
-    document : dict
-        The content of report.json.
+    report : CorrectionReport
+    ties : TieResiduals, optional
 
-    Returns the list of their paths.
+    Returns
+    -------
+    list of Path
     """
+    pictures = {
+        "correction.png": correction_figure(correction, report),
+        "map.png": map_figure(correction, report),
+        "residuals.png": residual_figure(report),
+    }
+    if ties is not None:
+        pictures["ties.png"] = tie_figure(correction, ties)
     paths = []
-    for name, draw in PICTURES:
-        path = Path(folder) / name
-        with matplotlib.rc_context(STYLE):
-            figure = draw(survey, correction, document)
-            figure.savefig(path, format="png", dpi=DOTS_PER_INCH, metadata={"Software": "mlscorr"})
-        paths.append(path)
+    for name, figure in pictures.items():
+        paths.append(Path(folder) / name)
+        paths[-1].write_bytes(png(figure))
     return paths

@@ -1,62 +1,96 @@
 """As much of a cloud as pictures of it need, gathered in one pass and in flat memory."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from mlscorr.evaluate.rows import TargetRow
+from mlscorr.io.settings import SETTINGS as IO_SETTINGS
+from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import PointCloud
 
-MOST = 1_000_000  # points of each part; up to twice as many while they are gathered
-CELL = 2.0  # m, of the plan grid that tells which points are near a target
-REACH = 4.0  # times half of what a close-up of a target shows: it is seen from aside, too
-PIECE = 250_000  # points that are worked on at once
+
+class EvenSample:
+    """Every step-th point of what is added; the step doubles where that becomes too many.
+
+    Parameters
+    ----------
+    limit : int
+        So many points are kept, up to twice as many.
+    """
+
+    def __init__(self, limit: int):
+        self.limit, self.step, self.count, self.parts = limit, 1, 0, []
+
+    def add(self, cloud: PointCloud) -> None:
+        """Take the step-th points of a further part."""
+        picked = cloud[-self.count % self.step :: self.step]
+        self.parts.append(PointCloud.concatenate([picked]))  # a copy, or all would stay in memory
+        self.count += len(cloud)
+        while sum(map(len, self.parts)) > 2 * self.limit:
+            self.step *= 2
+            self.parts = [PointCloud.concatenate(self.parts)[::2]]
 
 
 @dataclass(frozen=True)
-class Sample:
-    """Every step-th point of a cloud, and where step > 1 all points near some targets, too."""
+class CloudSample:
+    """Every step-th point of a cloud, and where step > 1 all near targets and walls, too."""
 
     cloud: PointCloud
     step: int
 
-    def pieces(self):
-        """The points in pieces."""
-        for first in range(0, len(self.cloud), PIECE):
-            yield self.cloud[first : first + PIECE]
+    def chunks(self) -> Iterator[PointCloud]:
+        """The points in chunks, as a file's are read."""
+        for first in range(0, len(self.cloud), IO_SETTINGS.chunk_points):
+            yield self.cloud[first : first + IO_SETTINGS.chunk_points]
 
 
-def gather(chunks, targets, most=MOST):
-    """The Sample of a cloud that is streamed as chunks.
+def gather(
+    chunks: Iterable[PointCloud],
+    targets: list[TargetRow],
+    walls: np.ndarray | None = None,
+    limit: int = SETTINGS.sample_points,
+) -> CloudSample:
+    """The sample of a cloud that is streamed as chunks.
 
     Parameters
     ----------
     chunks : iterable of PointCloud
-    targets : list of dict
-        Rows as report.json has them, of the targets near which points are kept.
-    most : int
-        Of the points spread over the cloud, and of those near the targets: at most twice as many.
+    targets : list of TargetRow
+        Those near which points are kept.
+    walls : (k, 3) array, optional
+        Places near which points are kept, too. Units: m.
+    limit : int
+        Of the points spread over the cloud, near targets and near walls: at most twice as many.
     """
-    cells = _cells(targets)
-    kept, steps, seen = ([], []), [1, 1], [0, 0]
+    nothing = np.empty((0, 3))
+    regions = _cells(targets), _about(nothing if walls is None else walls, SETTINGS.plan_cell)
+    spread, near = EvenSample(limit), [EvenSample(limit) for _ in regions]
     for chunk in chunks:
-        for k, part in enumerate((chunk, chunk[_near(chunk, cells)])):
-            picked = part[-seen[k] % steps[k] :: steps[k]]
-            kept[k].append(PointCloud.concatenate([picked]))  # a copy, or all would stay in memory
-            seen[k] += len(part)
-            while sum(map(len, kept[k])) > 2 * most:
-                steps[k] *= 2
-                kept[k][:] = [PointCloud.concatenate(kept[k])[::2]]
-    return Sample(PointCloud.concatenate(kept[0] + (kept[1] if steps[0] > 1 else [])), steps[0])
+        spread.add(chunk)
+        for cells, sample in zip(regions, near, strict=True):
+            sample.add(chunk[_is_near(chunk, cells)])
+    parts = spread.parts + (near[0].parts + near[1].parts if spread.step > 1 else [])
+    return CloudSample(PointCloud.concatenate(parts), spread.step)
 
 
 def _cells(targets):
     """Sorted numbers of the plan cells about the targets."""
+    # four times half of what a close-up shows, as it is seen from aside; no target is over 1 m
+    radius = [2 * np.linalg.norm(row.before) + 4.0 for row in targets]
+    middle = [(row.surveyed + row.observed) / 2 for row in targets]
+    return _about(np.reshape(middle, (-1, 3)), np.array(radius)[:, None])
+
+
+def _about(places, radius):
+    """Sorted numbers of the plan cells within a radius of places (n, 3) along both axes."""
+    low, high = (
+        np.floor((places[:, :2] + s * radius) / SETTINGS.plan_cell).astype(int) for s in (-1, 1)
+    )
     cells = [np.empty(0, np.int64)]
-    for row in targets:
-        half = np.linalg.norm(row["before"]) / 2 + 1.0  # m: no target is so large
-        middle = (np.array(row["surveyed"]) + row["observed"])[:2] / 2
-        low, high = (np.floor((middle + s * REACH * half) / CELL).astype(int) for s in (-1, 1))
-        columns, rows = (np.arange(a, b + 1) for a, b in zip(low, high, strict=True))
+    for first, last in zip(low, high, strict=True):
+        columns, rows = (np.arange(a, b + 1) for a, b in zip(first, last, strict=True))
         cells.append(_number(*np.meshgrid(columns, rows)).ravel())
     return np.unique(np.concatenate(cells))
 
@@ -66,11 +100,10 @@ def _number(column, row):
     return column * (1 << 31) + row
 
 
-def _near(chunk, cells):
+def _is_near(chunk, cells):
     """Which points lie in the cells (sorted)."""
     if len(cells) == 0:
         return np.zeros(len(chunk), bool)
-    columns, rows = (np.floor(chunk.xyz[:, k] / CELL).astype(np.int64) for k in (0, 1))
-    number = _number(columns, rows)
+    number = _number(*np.floor(chunk.xyz[:, :2] / SETTINGS.plan_cell).astype(np.int64).T)
     place = np.minimum(np.searchsorted(cells, number), len(cells) - 1)
     return cells[place] == number

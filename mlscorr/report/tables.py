@@ -1,53 +1,51 @@
-"""What the report says in words and numbers, read from the document of report.json."""
+"""What the report says of a correction in words and in tables."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from mlscorr.evaluate.rows import Statistics
+from mlscorr.report.correction_report import CorrectionReport
+from mlscorr.report.settings import SETTINGS
+
 AXES = ("E", "N", "H")
-GROUPS = ("control", "check", "unused")
 QUANTITIES = ("Easting", "Northing", "Height (vertical)", "Horizontal distance", "3D distance")
-WORSE = 0.002  # m; less is below what surveying a target can tell
 
 
-def group(row):
-    """Where a row of targets[] belongs: ``control``, ``check`` or ``unused``.
+@dataclass(frozen=True)
+class RmseRow:
+    """A row of the table of RMSE.
 
-    No check point takes part in the estimate, so its ``used`` may be false without a fault: it
-    counts as unused only when another reason than its role is given.
-
-    >>> group({"role": "check", "used": False, "reason": None})
-    'check'
+    Parameters
+    ----------
+    label : str
+    strong : bool
+        Whether a verdict may rest on it.
+    n : int
+    rmse : (5,) array
+        E, N, H, horizontal and 3D. Units: m.
     """
-    reason = (row.get("reason") or "").strip().lower()
-    if row["used"] or (row["role"] == "check" and reason in ("", "check", "check point")):
-        return row["role"]
-    return "unused"
+
+    label: str
+    strong: bool
+    n: int
+    rmse: np.ndarray
 
 
-def ordered(rows, *groups):
-    """Rows of targets[] in these groups (all, when none is named), each group in time."""
+def norm(vector: Sequence[float] | np.ndarray, axes: int = 3) -> float:
+    """Length of the first axes of a vector, NaN when one is missing.
 
-    def key(row):
-        time = row.get("gps_time")
-        return GROUPS.index(group(row)), np.inf if time is None else time, row["name"] or ""
-
-    return sorted((row for row in rows if group(row) in (groups or GROUPS)), key=key)
-
-
-def array(rows, key):
-    """A field of three numbers as an (n, 3) array, NaN where it is not determined."""
-    blank = [np.nan] * 3
-    values = [[np.nan if v is None else v for v in (row.get(key) or blank)] for row in rows]
-    return np.array(values, dtype=float).reshape(-1, 3)
+    Parameters
+    ----------
+    vector : (3,) array
+    axes : int
+        2 is horizontal, 3 is 3D.
+    """
+    return float(np.linalg.norm(vector[:axes]))
 
 
-def norm(values, axes=3):
-    """Length of the first axes of a vector: 2 is horizontal, 3 is 3D; None when one is missing."""
-    if values is None or any(value is None for value in values[:axes]):
-        return None
-    return float(np.linalg.norm(values[:axes]))
-
-
-def number(value, decimals=3):
+def number(value: float | None, decimals: int = 3) -> str:
     """A number with fixed decimals, a dash where there is none, and no negative zero.
 
     >>> number(-0.00004), number(None), number(531400.25, 1)
@@ -59,7 +57,16 @@ def number(value, decimals=3):
     return text.lstrip("-") if float(text) == 0 else text
 
 
-def thousands(value):
+def millimetres(value: float | None) -> str:
+    """A length in m as millimetres, with a decimal where it is short.
+
+    >>> millimetres(0.00288), millimetres(0.42302), millimetres(None)
+    ('2.9', '423', '–')
+    """
+    return "–" if value is None else number(1000 * value, int(value < 0.01))
+
+
+def thousands(value: int) -> str:
     """A whole number with narrow spaces between thousands.
 
     >>> thousands(1847911)
@@ -68,130 +75,134 @@ def thousands(value):
     return f"{value:,}".replace(",", " ")
 
 
-def statistic(document, role, when, what="rmse"):
-    """One of rmse, mean, min, max of control or check, before or after; None where not known."""
-    return ((document.get(role) or {}).get(when) or {}).get(what)
+def rmse_rows(report: CorrectionReport) -> list[RmseRow]:
+    """Rows of the table of RMSE, the independent ones first.
 
-
-def rmse_rows(document):
-    """Rows of the RMSE table: label, n, rmse, horizontal and 3D, the independent ones first."""
-    kinds = [
-        ("check", "before", "Check points, before"),
-        ("check", "after", "Check points, after"),
-        ("control", "before", "Control points, before"),
-        ("control", "leave_one_out", "Control points, left out in turn"),
-        ("control", "after", "Control points, after (fit)"),
+    Parameters
+    ----------
+    report : CorrectionReport
+    """
+    check, control = report.check, report.control
+    rows = [
+        ("Check points, before", False, check.before),
+        ("Check points, after", True, check.after),
+        ("Control points, before", False, control.before),
+        ("Control points, left out in turn", True, control.left_out),
+        ("Control points, after (fit)", False, control.after),
     ]
-    rows = []
-    for role, when, label in kinds:
-        rmse = statistic(document, role, when)
-        n = (document.get(role) or {}).get("n", 0)
-        if rmse is None and (role == "check" or when == "leave_one_out"):
-            continue
-        rows.append(
-            {
-                "label": label,
-                "strong": (role, when) in (("check", "after"), ("control", "leave_one_out")),
-                "n": statistic(document, role, when, "n") or n,
-                "rmse": rmse or [None] * 3,
-                "horizontal": norm(rmse, 2),
-                "spatial": norm(rmse, 3),
-            }
-        )
-    return rows
+    required = control.before, control.after
+    return [
+        RmseRow(words, strong, statistics.n, statistics.rmse)
+        for words, strong, statistics in rows
+        if statistics is not None and (statistics.n or any(statistics is part for part in required))
+    ]
 
 
-def statistics_rows(document):
+def statistics_rows(
+    report: CorrectionReport,
+) -> list[tuple[str, int, list[tuple[str, np.ndarray, np.ndarray]]]]:
     """Blocks (title, n, rows) of all statistics, a row (name, before, after) for each quantity.
 
-    before and after are mean, std, RMSE, min, max, None where it is not determined.
+    Parameters
+    ----------
+    report : CorrectionReport
+
+    Returns
+    -------
+    list of tuple
+        before and after are mean, std, RMSE, least and largest (5,), NaN where not determined.
+        Units: m.
     """
-    kinds = [
-        ("check", "after", "Check points"),
-        ("control", "leave_one_out", "Control points, after: left out in turn"),
-        ("control", "after", "Control points, after: fit"),
+    check, control = report.check, report.control
+    blocks = [
+        ("Check points", check.before, check.after),
+        ("Control points, after: left out in turn", control.before, control.left_out),
+        ("Control points, after: fit", control.before, control.after),
     ]
-    blocks = []
-    for role, when, title in kinds:
-        if statistic(document, role, when) is None:
-            continue
-        n = statistic(document, role, when, "n") or document[role]["n"]
-        columns = zip(
-            (*QUANTITIES,),
-            _columns(document[role]["before"]),
-            _columns(document[role][when]),
-            strict=True,
-        )
-        blocks.append((title, n, list(columns)))
-    return blocks
+    return [
+        (title, after.n, list(zip(QUANTITIES, _columns(before), _columns(after), strict=True)))
+        for title, before, after in blocks
+        if after is not None and after.n
+    ]
 
 
-def _columns(found):
-    """Mean, std, RMSE, min, max of E, N, H, horizontal and 3D."""
-    names = ("mean", "std", "rmse", "min", "max")
-    axes = [[(found.get(name) or [None] * 3)[k] for name in names] for k in range(3)]
-    return axes + [[found.get(f"{name}_{end}") for name in names] for end in ("horizontal", "3d")]
+def _columns(statistics: Statistics):
+    return statistics.table[:, [1, 2, 0, 3, 4]]  # the mean first
 
 
-def seen(document, role):
-    """How many points of a role, and how many observations (one for each pass) of them."""
-    n = document[role]["n"]
-    points = len({row["name"] for row in document["targets"] if group(row) == role})
-    return (points if n else 0) or n, n
+def count(report: CorrectionReport, role: str) -> str:
+    """How many points in words: '8 points', or '12 observations of 8 points'.
 
-
-def count(document, role):
-    """How many points in words: '8 points', or '12 observations of 8 points'."""
-    points, n = seen(document, role)
+    Parameters
+    ----------
+    report : CorrectionReport
+    role : str
+        ``control`` or ``check``.
+    """
+    points, n = report.count(role)
     words = "1 point" if points == 1 else f"{points} points"
     return words if points == n else f"{n} observations of {words}"
 
 
-def independent(document):
-    """RMSE (3,) before and after that the verdict rests on, and what it is: check, leave-one-out
-    or fit. (None, None, 'nothing') when there is no residual at all."""
-    kinds = [("check", "after"), ("control", "leave_one_out"), ("control", "after")]
-    for (role, when), kind in zip(kinds, ("check", "leave-one-out", "fit"), strict=True):
-        before, after = statistic(document, role, "before"), statistic(document, role, when)
-        if before is not None and after is not None and None not in [*before, *after]:
-            return before, after, kind
-    return None, None, "nothing"
+def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
+    """The result in sentences, and whether something speaks against it.
 
+    Parameters
+    ----------
+    report : CorrectionReport
 
-def verdict(document):
-    """The result in sentences, and whether it became worse on an axis: (list of str, bool)."""
-    before, after, kind = independent(document)
-    if kind == "nothing":
+    Returns
+    -------
+    sentences : list of str
+    worse : bool
+        It became worse on an axis, or check points are missing where they should have been seen.
+    """
+    before, after, kind = report.judgement
+    if before is None or after is None:
         return ["No target was found that could tell how good the correction is."], True
-    rise = {a: new - old for a, old, new in zip(AXES, before, after, strict=True)}
-    worse = [f"{axis} by {number(by)} m" for axis, by in rise.items() if by > WORSE]
-    sentences = [_plainly(norm(before), norm(after), kind), _result(document, before, after, kind)]
+    rise = dict(zip(AXES, (after.rmse - before.rmse)[:3], strict=True))
+    worse = [f"{a} by {number(by)} m" for a, by in rise.items() if by > SETTINGS.difference]
+    sentences = [
+        _plainly(before.rmse[4], after.rmse[4], kind, report.holds_everywhere),
+        _result(report, before.rmse[:3], after.rmse[:3], kind),
+    ]
     if worse:
         sentences.append(f"After the correction it is worse than before: {', '.join(worse)}.")
-    return sentences, bool(worse)
+    return sentences, bool(worse or report.points("check").missing)
 
 
-def _plainly(before, after, kind):
-    """What the correction did, in plain words; lengths are 3D RMSE in m."""
+def _plainly(before, after, kind, holds_everywhere):
+    """What the correction did, in plain words; lengths are 3D RMSE in m.
+
+    It boasts of no factor where a part of the cloud may be as far off as it was.
+    """
     by = {
         "check": "as independent check points tell",
         "leave-one-out": "as control points tell that were left out in turn",
         "fit": "but only at the points that it was made from: nothing independent can judge it",
     }[kind]
-    pair = f"from {_length(before)} to {_length(after)} off the surveyed places"
-    if kind != "fit" and abs(before - after) <= WORSE:
+    pair = f"from {length_in_words(before)} to {length_in_words(after)} off the surveyed places"
+    if kind != "fit" and abs(before - after) <= SETTINGS.difference:
         return f"The correction changed next to nothing, {by}: {pair}."
     if after > before:
         return f"The correction made the cloud worse, {by}: {pair}. Don't use it."
     closer = before / max(after, 1e-4)
+    if not holds_everywhere:
+        where = "at the points that were seen" if kind == "check" else "where control holds it"
+        return f"The correction brought the cloud {pair} {where}, {by}."
     times = f" ({closer:.0f} times closer)" if closer >= 1.5 and kind != "fit" else ""
     return f"The correction brought the cloud {pair}{times}, {by}."
 
 
-def _length(value):
+def length_in_words(value: float) -> str:
     """A length in words: '7 mm', '4.6 cm', '1.23 m'.
 
-    >>> _length(0.0071), _length(0.046), _length(1.234)
+    Parameters
+    ----------
+    value : float
+        Units: m.
+
+    >>> length_in_words(0.0071), length_in_words(0.046), length_in_words(1.234)
     ('7 mm', '4.6 cm', '1.23 m')
     """
     if value < 0.0095:
@@ -199,16 +210,16 @@ def _length(value):
     return f"{100 * value:.1f} cm" if value < 0.995 else f"{value:.2f} m"
 
 
-def _result(document, before, after, kind):
+def _result(report, before, after, kind):
     """RMSE before and after in one sentence that says what it rests on."""
     low = min(*before, *after)
     decimals = 2 if low >= 0.03 else 3 if low >= 0.003 else 4
-    shown = ["/".join(number(value, decimals) for value in values) for values in (before, after)]
-    figures = f"RMSE {shown[0]} m before, {shown[1]} m after (E/N/H)"
+    pair = ["/".join(number(value, decimals) for value in values) for values in (before, after)]
+    figures = f"RMSE {pair[0]} m before, {pair[1]} m after (E/N/H)"
     if kind == "check":
-        points = count(document, "check")
+        points = count(report, "check")
         return f"Check points: {figures}, {points} that took no part in the estimate."
-    points = count(document, "control")
+    points = count(report, "control")
     if kind == "leave-one-out":
         return (
             "There are no check points. Control points, each left out in turn and predicted from "

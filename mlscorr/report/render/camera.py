@@ -1,10 +1,10 @@
 """Where a picture is taken from, and on which pixel a point lands."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
-
-PLAN = 90.0  # deg, elevation of a camera that looks straight down
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,27 @@ class Camera:
     distance: float = np.inf
 
     @classmethod
-    def towards(cls, focus, azimuth, elevation, scale, size, view_angle=0.0):
+    def towards(
+        cls,
+        focus: np.ndarray,
+        azimuth: float,
+        elevation: float,
+        scale: float,
+        size: tuple[int, int],
+        view_angle: float = 0.0,
+    ) -> Camera:
         """A camera that looks towards an azimuth from an elevation above the horizon.
 
-        azimuth is clockwise from grid north; at an elevation of 90 deg it is what is up in the
-        picture. view_angle is the picture's whole width seen from the eye, 0 for parallel
-        projection. Units: deg.
+        Parameters
+        ----------
+        focus, scale, size
+            As in Camera.
+        azimuth : float
+            Clockwise from grid north; seen from straight above it is what is up. Units: deg.
+        elevation : float
+            90 looks straight down. Units: deg.
+        view_angle : float
+            The picture's whole width seen from the eye, 0 for parallel projection. Units: deg.
         """
         a, e = np.radians([azimuth, elevation])
         right = np.array([np.cos(a), -np.sin(a), 0.0])
@@ -51,9 +66,11 @@ class Camera:
         distance = np.inf
         if view_angle:
             distance = size[0] / scale / 2 / np.tan(np.radians(view_angle) / 2)
-        return cls(np.asarray(focus, float), axes, float(scale), tuple(size), float(distance))
+        return cls(
+            np.asarray(focus, float), axes, float(scale), (size[0], size[1]), float(distance)
+        )
 
-    def project(self, xyz):
+    def project(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pixel coordinates (n, 2), column and row, and depth (n,) behind the focus in m.
 
         Column 0 begins at the left edge, row 0 at the upper one: a point whose coordinates lie

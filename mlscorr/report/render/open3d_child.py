@@ -7,17 +7,16 @@ optionally a file with a reference surface. before.npy and after.npy are written
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-BEHIND = 0.02  # m, the reference surface lies behind the points on it
-GREY = 0.82  # of the reference surface where it faces the eye
-BEYOND = 1.0  # m, of the clipping planes beyond the points
 
-
-def main(folder):
+def main(folder: Path) -> None:
     """Draw both sides with one renderer; a second one in a process would abort it."""
-    import open3d as o3d
+    import open3d
+
+    o3d: Any = open3d
 
     rendering = o3d.visualization.rendering
     job = np.load(folder / "job.npz")
@@ -27,8 +26,9 @@ def main(folder):
     scene.view.set_post_processing(False)  # colours stay exact, and frames repeat
     scene.set_background([1.0, 1.0, 1.0, 1.0])
     depths = [job[f"{side}_xyz"][:, 2] for side in ("before", "after") if len(job[f"{side}_xyz"])]
-    low = min((float(d.min()) for d in depths), default=-1.0) - BEYOND
-    high = max((float(d.max()) for d in depths), default=1.0) + BEYOND
+    # the clipping planes lie a metre beyond the points
+    low = min((float(d.min()) for d in depths), default=0.0) - 1.0
+    high = max((float(d.max()) for d in depths), default=0.0) + 1.0
     _set_camera(rendering, scene.camera, job, low, high)
     material = rendering.MaterialRecord()
     material.shader = "defaultUnlit"
@@ -46,7 +46,7 @@ def main(folder):
 
 def _set_camera(rendering, camera, job, low, high):
     (width, height), scale, distance = job["size"], float(job["scale"]), float(job["distance"])
-    eye = distance if np.isfinite(distance) else high + BEYOND
+    eye = distance if np.isfinite(distance) else high + 1.0
     camera.look_at([0.0, 0.0, 0.0], [0.0, 0.0, eye], [0.0, 1.0, 0.0])
     near, far = max(eye - high, 0.1), eye - low
     if np.isfinite(distance):
@@ -64,10 +64,11 @@ def _reference(o3d, job):
     corners = local[np.asarray(mesh.triangles)].reshape(-1, 3)
     normal = np.cross(corners[1::3] - corners[::3], corners[2::3] - corners[::3])
     facing = np.abs(normal[:, 2]) / np.maximum(np.linalg.norm(normal, axis=1), 1e-12)
-    shade = np.repeat(GREY * (0.6 + 0.4 * facing), 3)
+    shade = np.repeat(0.82 * (0.6 + 0.4 * facing), 3)
     rows = np.arange(len(corners)).reshape(-1, 3)
+    # 2 cm behind the points that lie on it
     surface = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(corners - [0.0, 0.0, BEHIND]), o3d.utility.Vector3iVector(rows)
+        o3d.utility.Vector3dVector(corners - [0.0, 0.0, 0.02]), o3d.utility.Vector3iVector(rows)
     )
     surface.vertex_colors = o3d.utility.Vector3dVector(np.repeat(shade[:, None], 3, axis=1))
     surface.compute_vertex_normals()  # without them the software driver never ends

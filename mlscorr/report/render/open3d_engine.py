@@ -7,11 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.report.render.zbuffer import Canvas
+from mlscorr.report.settings import SETTINGS
+
 CHILD = Path(__file__).with_name("open3d_child.py")
-PATIENCE = 60.0  # s for one pair of pictures; a software driver takes some 5 s
 
 
-def draw_pair(canvases, colours, point_size, reference=None):
+def draw_pair(
+    canvases: tuple[Canvas, Canvas],
+    colours: list[np.ndarray],
+    point_size: float,
+    reference: str | Path | None = None,
+    timeout: float = SETTINGS.open3d_timeout,
+) -> tuple[np.ndarray, ...]:
     """Draw what two canvases show: two RGB arrays (h, w, 3) uint8.
 
     Only points that are nearest to the eye are sent, one for each pixel at most, so that time
@@ -26,8 +34,13 @@ def draw_pair(canvases, colours, point_size, reference=None):
         Diameter in pixels.
     reference : path, optional
         A mesh that is drawn behind the points.
+    timeout : float
+        Units: s.
 
-    Raises RuntimeError, with what happened, when the child fails.
+    Raises
+    ------
+    RuntimeError
+        With what happened, when the child fails.
     """
     camera = canvases[0].camera
     with tempfile.TemporaryDirectory() as name:
@@ -46,16 +59,16 @@ def draw_pair(canvases, colours, point_size, reference=None):
             scale=camera.scale,
             distance=camera.distance,
         )
-        _run(folder)
+        _run(folder, timeout)
         return tuple(np.load(folder / f"{side}.npy")[..., :3] for side in ("before", "after"))
 
 
-def _run(folder):
+def _run(folder, timeout):
     command = [sys.executable, str(CHILD), str(folder)]
     try:
-        child = subprocess.run(command, capture_output=True, timeout=PATIENCE)
+        child = subprocess.run(command, capture_output=True, timeout=timeout, check=False)
     except subprocess.TimeoutExpired:
-        raise RuntimeError(f"Open3D drew no picture within {PATIENCE:.0f} s") from None
+        raise RuntimeError(f"Open3D drew no picture within {timeout:.0f} s") from None
     if child.returncode:
         last = child.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
         raise RuntimeError(f"Open3D failed with exit code {child.returncode} ({last[0]})")

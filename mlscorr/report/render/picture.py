@@ -9,13 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from mlscorr.report.look import STYLE, label
 from mlscorr.report.render.symbols import (
-    FOOT,
-    GAP,
     HALO,
-    HEAD,
-    INCH,
     MARK,
     SYMBOLS,
     compass,
@@ -25,17 +20,23 @@ from mlscorr.report.render.symbols import (
     scale_bar,
 )
 from mlscorr.report.render.views import View
+from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import STYLE, label
 
-BETWEEN = 0.045  # of the page: between panels that stand one above the other
-PALETTE = 256  # colours of a PNG: a third of the bytes, and no difference to the eye
-SHORTEST = 14.0  # pixels, a shorter arrow has no head
+GAP, HEAD, FOOT, STACK_GAP = SETTINGS.page_margins
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One view before and after: RGB (h, w, 3) uint8, by the same camera and colour scale.
+    """One view before and after, by the same camera and colour scale.
 
-    ``limits`` are the ends of the colour scale.
+    Parameters
+    ----------
+    view : View
+    before, after : (h, w, 3) array of uint8
+        RGB.
+    limits : (float, float)
+        Ends of the colour scale.
     """
 
     view: View
@@ -44,11 +45,11 @@ class Picture:
     limits: tuple[float, float]
 
     @property
-    def name(self):
+    def name(self) -> str:
         """A name for a file, without suffix."""
         return "".join(c if c.isalnum() or c in "-_." else "_" for c in self.view.name)
 
-    def panels(self, decorated=True):
+    def panels(self, decorated: bool = True) -> tuple[bytes, ...]:
         """The bytes of two PNGs, before and after, for one to be laid over the other.
 
         Undecorated they are the points alone, pixel by pixel.
@@ -65,35 +66,39 @@ class Picture:
                 pair[k] = _drawn(figure)
         both = _few_colours(np.concatenate(pair))  # the same colours in both
         width, half = both.width, both.height // 2
-        return tuple(png(both.crop((0, k * half, width, (k + 1) * half))) for k in (0, 1))
+        return tuple(_png(both.crop((0, k * half, width, (k + 1) * half))) for k in (0, 1))
 
-    def page(self, size):
+    def page(self, size: tuple[int, int]) -> bytes:
         """The bytes of a PNG: before and after side by side under a title, with a legend.
 
-        size are its width and height in pixels.
+        Parameters
+        ----------
+        size : (int, int)
+            Width and height. Units: pixels.
         """
         figure, corner = _blank(*size), free_corner(self.before, self.after)
-        corners = panel_corners(self.view.camera.size, size)
+        corners = _panel_corners(self.view.camera.size, size)
         for k, words in enumerate(("Before the correction", "After the correction")):
             axes = _panel(figure, self.view, k, (self.before, self.after)[k], corners[k])
             axes.set_title(words, fontsize=letter(axes, 1.0), color="#333333", loc="left")
             scale_bar(axes, self.view.camera)
             compass(axes, self.view.camera, corner)
         _words(figure, self.view, corners[0][0] / size[0])
-        legend(figure, self)
-        return png(_few_colours(_drawn(figure)))
+        legend(figure, self.view, self.limits, (GAP, FOOT))
+        return _png(_few_colours(_drawn(figure)))
 
 
-def panel_size(page, stacked=False):
+def panel_size(page: tuple[int, int], stacked: bool = False) -> tuple[int, int]:
     """Width and height in pixels of each of the two panels on a page of this size."""
     width, height = page
-    gap, high = round(GAP * width), height - round((HEAD + FOOT) * height)
+    gap = round(GAP * width)
+    high = height - round((HEAD + FOOT) * height)
     if stacked:
-        return width - 2 * gap, (high - round(BETWEEN * height)) // 2
+        return width - 2 * gap, (high - round(STACK_GAP * height)) // 2
     return (width - 3 * gap) // 2, high
 
 
-def panel_corners(panel, page):
+def _panel_corners(panel, page):
     """Column and row of the upper left corner of both panels on their page.
 
     They stand one above the other where there is no room side by side.
@@ -101,24 +106,24 @@ def panel_corners(panel, page):
     top = round(HEAD * page[1])
     if 2 * panel[0] > page[0]:
         left = (page[0] - panel[0]) // 2
-        return (left, top), (left, top + panel[1] + round(BETWEEN * page[1]))
+        return (left, top), (left, top + panel[1] + round(STACK_GAP * page[1]))
     gap = (page[0] - 2 * panel[0]) // 3
     return (gap, top), (2 * gap + panel[0], top)
 
 
-def png(image):
-    """The bytes of a PNG of a PIL image."""
+def _png(image):
     stream = io.BytesIO()
     image.save(stream, "png", compress_level=6)
     return stream.getvalue()
 
 
 def _few_colours(pixels):
-    return Image.fromarray(pixels).quantize(PALETTE, dither=Image.Dither.NONE)
+    """An image of 256 colours: a third of the bytes, and no difference to the eye."""
+    return Image.fromarray(pixels).quantize(256, dither=Image.Dither.NONE)
 
 
 def _blank(width, height):
-    figure = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
@@ -132,7 +137,7 @@ def _drawn(figure):
 def _panel(figure, view, k, pixels, corner):
     """The points of one side, pixel by pixel, its marks over them; returns its axes in pixels."""
     height, width = pixels.shape[:2]
-    wide, high = figure.get_size_inches() * INCH
+    wide, high = figure.bbox.width, figure.bbox.height
     bottom = high - corner[1] - height
     figure.figimage(pixels, corner[0], bottom, origin="upper", zorder=-1)
     axes = figure.add_axes((corner[0] / wide, bottom / high, width / wide, height / high))
@@ -159,7 +164,7 @@ def _mark(axes, mark, camera):
 
 
 def _arrow(axes, pixel, width):
-    if np.hypot(*(pixel[1] - pixel[0])) < SHORTEST:  # the head would be longer
+    if np.hypot(*(pixel[1] - pixel[0])) < 14.0:  # pixels: the head would be longer
         axes.plot(*pixel.T, color=MARK, linewidth=width, path_effects=HALO)
         return
     axes.annotate(

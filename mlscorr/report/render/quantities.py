@@ -5,7 +5,19 @@ from dataclasses import dataclass
 import matplotlib
 import numpy as np
 
-from mlscorr.report.look import AFTER, BEFORE, BLUE, GREY, VERMILLION
+from mlscorr.correction import Correction, PointSigma
+from mlscorr.report.style import (
+    AFTER,
+    BEFORE,
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILLION,
+)
+from mlscorr.survey import PointCloud, Scanner, Trajectory
 
 COLOURS = ("intensity", "height", "correction", "sigma")
 MAPS = {  # all darker than the paper at both ends, and readable in grey
@@ -20,117 +32,128 @@ LABELS = {
     "correction": ("How far off each point is: before, by its correction; after, one sigma", "m"),
     "sigma": ("One sigma of each point, as the trajectory states it", "m"),
 }
-PERCENTILES = (1.0, 99.0)  # of the pixels drawn: single bright points don't darken all others
-DARKEST = 0.85  # the upper end of the colour maps is left out: it is too pale on white
-NO_VALUE = GREY
-FIRST, SECOND = BLUE, VERMILLION  # two visits of one place
 GHOST = "#c9c9c9"  # the other state, behind
-PAIRS = {"visit": (FIRST, SECOND), "state": (BEFORE, AFTER)}
+PAIRS = {"visit": (BLUE, VERMILLION, GREEN, ORANGE, SKY, BLACK), "state": (BEFORE, AFTER)}
+STATES = ("as recorded", "corrected", "the other of the two")
 
 
 @dataclass(frozen=True)
-class Chunk:
+class CloudPair:
     """A chunk of the cloud before and after its correction.
 
     By correction, a point is as far off before as it will be moved, and after as the corrected
     trajectory's sigma says; where there is none, its size is shown on both sides.
+
+    Parameters
+    ----------
+    before, after : PointCloud
+    sigmas : pair of PointSigma
+        None where it isn't known.
     """
 
-    before: object
-    after: object
-    sigmas: tuple  # PointSigma before and after; None where it isn't known
+    before: PointCloud
+    after: PointCloud
+    sigmas: tuple[PointSigma | None, PointSigma | None]
 
-    def values(self, colour, split=None):
+    def values(self, colour: str, splits: tuple[float, ...] = ()) -> tuple[np.ndarray, np.ndarray]:
         """Values (n,) of a colour before and after.
 
-        Besides COLOURS, ``visit`` tells times after split, ``state`` before from after.
+        Besides COLOURS, ``visit`` counts splits before a time, ``state`` tells before from after.
         """
         if colour == "state":
             return np.zeros(len(self.before)), np.ones(len(self.after))
         if colour == "visit":
-            late = (self.before.gps_time > split).astype(np.float32)
-            return late, late
+            visit = np.searchsorted(splits, self.before.gps_time).astype(np.float32)
+            return visit, visit
         if colour == "intensity":
             return (self.before.intensity,) * 2
         if colour == "height":
             return self.before.xyz[:, 2], self.after.xyz[:, 2]
         if colour == "sigma":
-            clouds = (self.before, self.after)
-            return tuple(
-                np.full(len(c), np.nan) if s is None else s.at(c)
-                for s, c in zip(self.sigmas, clouds, strict=True)
-            )
+            return self._sigma(0), self._sigma(1)
         x, y, z = (self.after.xyz - self.before.xyz).T
         size = np.sqrt(x * x + y * y + z * z)
-        return size, size if self.sigmas[1] is None else self.sigmas[1].at(self.after)
+        return size, size if self.sigmas[1] is None else self._sigma(1)
+
+    def _sigma(self, side):
+        """One sigma in 3D, NaN where it isn't known."""
+        cloud, sigma = (self.before, self.after)[side], self.sigmas[side]
+        if sigma is None:
+            return np.full(len(cloud), np.nan)
+        return np.linalg.norm(sigma.at(cloud.xyz, cloud.gps_time), axis=1)
 
 
-class PointSigma:
-    """One sigma of points in 3D, from the sigmas of a trajectory at the nearest epoch.
+def point_sigma(trajectory: Trajectory | None) -> PointSigma | None:
+    """Sigma of points by a trajectory's own sigmas alone; None where it states none."""
+    if trajectory is None or trajectory.position_sigma is None or trajectory.attitude_sigma is None:
+        return None
+    return PointSigma.of(Correction(trajectory, trajectory), Scanner(range_noise=0, angle_noise=0))
 
-    The variance of a point at the arm a from the vehicle is tr(P) + |a|^2 tr(C) - a^T C a, with
-    the covariances P of the position and C of the small rotation (from Eq. 7-9).
+
+def swatches(colour: str, visits: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """Pairs (colour, words) of what a picture tells apart; none where it has a scale.
+
+    Parameters
+    ----------
+    colour : str
+    visits : tuple of str
+        What each visit is called.
     """
-
-    def __init__(self, trajectory):
-        body = trajectory.attitude_sigma[:, [1, 0, 2]]  # pitch turns about X, roll about Y
-        turned = trajectory.attitude.as_matrix() * body[:, None, :]
-        self.gps_time = trajectory.gps_time
-        self.position = trajectory.position
-        self.gaps = trajectory.gaps
-        self.variance = (trajectory.position_sigma**2).sum(axis=1)
-        self.rotation = turned @ turned.swapaxes(1, 2)
-
-    @classmethod
-    def of(cls, trajectory):
-        """PointSigma of a trajectory that has sigmas; None for another, or for none."""
-        known = trajectory is not None and trajectory.position_sigma is not None
-        return cls(trajectory) if known and trajectory.attitude_sigma is not None else None
-
-    def at(self, cloud):
-        """Sigma (n,) of the points of a cloud in m; NaN outside the trajectory."""
-        time = self.gps_time
-        middles = (time[1:] + time[:-1]) / 2
-        row = np.searchsorted(middles, cloud.gps_time)
-        arm = cloud.xyz - self.position[row]
-        rotation = self.rotation[row]
-        trace = rotation[:, 0, 0] + rotation[:, 1, 1] + rotation[:, 2, 2]
-        square = sum(arm[:, i] * arm[:, i] for i in range(3))
-        along = sum(arm[:, i] * rotation[:, i, k] * arm[:, k] for i in range(3) for k in range(3))
-        variance = self.variance[row] + square * trace - along
-        outside = (cloud.gps_time < time[0]) | (cloud.gps_time > time[-1])
-        return np.where(outside, np.nan, np.sqrt(variance))
+    if colour == "state":
+        return tuple(zip((*PAIRS[colour], GHOST), STATES, strict=True))
+    palette = PAIRS.get(colour, ())
+    return tuple((palette[k % len(palette)], words) for k, words in enumerate(visits) if palette)
 
 
-def limits(colour, *values):
-    """Ends of the colour scale for pictures (h, w) of values: one scale for all of them."""
+def percentiles(values: np.ndarray) -> np.ndarray:
+    """Ends of a colour scale: single bright points don't darken all others."""
+    return np.percentile(values, [1.0, 99.0])
+
+
+def limits(colour: str, *values: np.ndarray) -> tuple[float, float]:
+    """Ends of the colour scale: one scale for all pictures.
+
+    Parameters
+    ----------
+    colour : str
+    *values : (h, w) arrays
+        NaN where there is nothing.
+    """
     finite = np.concatenate([v[np.isfinite(v)] for v in values])
     if colour in PAIRS or len(finite) == 0:
         return 0.0, 1.0
-    low, high = (float(v) for v in np.percentile(finite, PERCENTILES))
+    low, high = percentiles(finite).tolist()
     if colour != "height":  # noise of a target alone would fill the whole scale
         low = 0.0
     return low, max(high, low + 1e-3)
 
 
-def paint(colour, value, ends):
-    """RGB (h, w, 3) uint8 of values (h, w), grey where the value is NaN."""
+def paint(colour: str, value: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """RGB (h, w, 3) uint8 of values, grey where the value is NaN.
+
+    Parameters
+    ----------
+    colour : str
+    value : (h, w) array
+    ends : (float, float)
+        Of the colour scale.
+    """
     if colour in PAIRS:
-        return rgb(*PAIRS[colour])[np.nan_to_num(value).astype(int)]
+        return rgb(*PAIRS[colour])[np.nan_to_num(value).astype(int) % len(PAIRS[colour])]
     share = np.clip((value - ends[0]) / (ends[1] - ends[0]), 0, 1)
     level = np.nan_to_num(share * 255).astype(np.uint8)
     picture = colour_table(colour)[level]
-    picture[np.isnan(value)] = rgb(NO_VALUE)
+    picture[np.isnan(value)] = rgb(GREY)
     return picture
 
 
-def colour_table(colour):
+def colour_table(colour: str) -> np.ndarray:
     """The colours of a scale from its low to its high end: (256, 3) uint8."""
-    highest = 1.0 if colour == "intensity" else DARKEST
+    highest = 1.0 if colour == "intensity" else 0.85  # beyond it is too pale on white
     table = matplotlib.colormaps[MAPS[colour]](np.linspace(0.0, highest, 256))
     return (table[:, :3] * 255).round().astype(np.uint8)
 
 
-def rgb(*names):
+def rgb(*names: str) -> np.ndarray:
     """Colours by name as RGB (n, 3) uint8."""
     return (np.array([matplotlib.colors.to_rgb(name) for name in names]) * 255).round().astype("u1")

@@ -1,13 +1,15 @@
-"""A first look at the cloud: an even sample of it, and how each target is turned."""
+"""A first pass over the cloud: an even sample of it, and how each target is turned."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from mlscorr.evaluate.rows import TargetRow
+from mlscorr.report.sample import EvenSample
+from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import PointCloud
-
-SAMPLE = 600_000  # points, enough for some ten on each square metre of a wall of 1 km of street
-FEWEST = 8  # points, to tell how a target is turned
 
 
 @dataclass(frozen=True)
@@ -22,40 +24,34 @@ class Scouted:
     normals: np.ndarray
 
 
-def scout(chunks, correction, targets, sizes):
-    """Look through the cloud once, in flat memory: Scouted.
+def scout(
+    chunks: Iterable[PointCloud], correction: Any, targets: list[TargetRow], sizes: np.ndarray
+) -> Scouted:
+    """Go through the cloud once, in flat memory.
 
     Parameters
     ----------
     chunks : iterable of PointCloud
     correction : anything with ``apply(cloud) -> cloud``
-    targets : list of dict
-        Rows as report.json has them.
+    targets : list of TargetRow
     sizes : (n,) array
         Of the targets. Units: m.
+
+    Raises
+    ------
+    ValueError
+        For a cloud without points.
     """
-    centres = np.array([row["observed"] for row in targets], float).reshape(-1, 3)
-    near = [[] for _ in targets]
-    sample, every, first = [], 1, 0
+    near, sample = [[] for _ in targets], EvenSample(SETTINGS.sample_points)
     for cloud in chunks:
-        sample.append(_every(cloud, every, first))
-        first += len(cloud)
-        while sum(map(len, sample)) > 2 * SAMPLE:
-            every *= 2
-            sample = [PointCloud.concatenate(sample)[::2]]
-        for k, centre in enumerate(centres):
-            near[k].append(_around(cloud, centre, 0.4 * sizes[k]))
-    if not sample:
+        sample.add(cloud)
+        for parts, row, size in zip(near, targets, sizes, strict=True):
+            parts.append(_around(cloud, row.observed, 0.4 * size))
+    if not sample.count:
         raise ValueError("The cloud has no points: there is nothing to draw.")
-    before = PointCloud.concatenate(sample)
+    before = PointCloud.concatenate(sample.parts)
     normals = np.array([_normal(np.concatenate(parts)) for parts in near]).reshape(-1, 3)
     return Scouted(before, correction.apply(before), normals)
-
-
-def _every(cloud, step, first):
-    """Each step-th point of the whole cloud, of which first came in earlier chunks."""
-    picked = cloud[(-first) % step :: step]
-    return PointCloud.concatenate([picked])  # a copy, or the whole chunk would stay in memory
 
 
 def _around(cloud, centre, radius):
@@ -67,13 +63,12 @@ def _around(cloud, centre, radius):
 
 
 def _normal(points):
-    """Unit normal of the bright ones of points (n, 4), NaN for fewer than FEWEST."""
-    if len(points) < FEWEST:
+    """Unit normal of the bright ones of points (n, 4), NaN where they are too few."""
+    if len(points):
+        points = points[points[:, 3] >= np.percentile(points[:, 3], 90) / 2, :3]
+    if len(points) < SETTINGS.plane_points:
         return np.full(3, np.nan)
-    local = points[points[:, 3] >= np.percentile(points[:, 3], 90) / 2, :3]
-    if len(local) < FEWEST:
-        return np.full(3, np.nan)
-    centred = local - np.median(local, axis=0)
+    centred = points - np.median(points, axis=0)
     # what stands before or behind is left out by a second fit to the nearest points
     for _ in range(2):
         normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]

@@ -1,19 +1,13 @@
 """Where a cross-section shows the most: the wall that the correction moves the farthest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-CELL = 2.0  # m, of the plan grid in which walls are looked for
-LOW = 0.5  # m above the lowest point of a cell: lower ones are ground
-TALL = 1.5  # m, the least height of a wall over that
-FLAT = 0.05  # m, the largest standard deviation of a wall's points from its plane
-LONG = 0.3  # m, the least standard deviation of a wall's points along it
-FEWEST = 15  # points of a visit on a wall
-MANY = 150  # points of a wall, above which more don't make it clearer
-FLOATING = 0.8  # m between a wall's lower end and the ground: less to see than where they meet
-PAUSE = 10.0  # s between two visits of one place
-CLEAR = 0.005  # m, a misfit between visits that can be seen
+from mlscorr.estimate import TieResiduals
+from mlscorr.report.render.scout import Scouted
+from mlscorr.report.settings import SETTINGS
+from mlscorr.survey import Ties
 
 
 @dataclass(frozen=True)
@@ -31,12 +25,14 @@ class Place:
     ground, foot : float
         Heights of the lowest point there, and of the wall's lower end. Units: m.
     moved : float
-        How far it moves across itself and upwards; of a wall visited twice, how much the two
-        faces approach or part. Units: m.
-    split : float or None
-        Time between two visits; None where it was seen once. Units: s.
+        How far it moves across itself and upwards; of a wall visited again, how much the faces
+        that were scanned approach or part. Units: m.
+    splits : tuple of float
+        Times between visits; none where it was scanned once. Units: s.
     before, after : float
-        Where it was seen twice, how far apart its two faces lie. Units: m.
+        Where it was scanned again, how far apart its faces lie. Units: m.
+    passes : tuple of int
+        Of each visit, where ties tell it.
     """
 
     focus: np.ndarray
@@ -45,74 +41,128 @@ class Place:
     ground: float
     foot: float
     moved: float
-    split: float | None
+    splits: tuple[float, ...]
     before: float = np.nan
     after: float = np.nan
+    passes: tuple[int, ...] = ()
 
 
-def find_place(scouted):
+def find_place(scouted: Scouted, ties: TieResiduals | None = None) -> Place | None:
     """The wall at which the misfit shows best in a cross-section, or None without any wall.
 
-    One that was visited twice and that the correction moves by different amounts comes first;
-    else the one that it moves the farthest.
+    A facade that ties hold comes first, then a wall that was visited twice and that the correction
+    moves by different amounts; else the one that it moves the farthest.
+
+    Parameters
+    ----------
+    scouted : Scouted
+    ties : TieResiduals, optional
     """
-    places = []
-    for rows in _cells(scouted):
-        if (place := _wall(scouted, rows)) is not None:
-            floats = place.foot - place.ground > FLOATING
-            places.append((place.moved * min(len(rows) / MANY, 1.0) / (1 + 9 * floats), place))
-    twice = [p for p in places if p[1].split is not None and p[1].moved > CLEAR]
-    once = [p for p in places if p[1].split is None]
+    if ties is not None:
+        places = [pair for pair in _places(scouted, _tied(scouted, ties)) if pair[1].splits]
+        if places:
+            place = max(places, key=lambda pair: pair[0])[1]
+            return replace(place, passes=_passes(place, ties.ties))
+    places = _places(scouted, _cells(scouted))
+    twice = [p for p in places if p[1].splits and p[1].moved > SETTINGS.visible / 2]
+    once = [p for p in places if not p[1].splits]
     return max(twice or once or places, key=lambda pair: pair[0], default=(0.0, None))[1]
+
+
+def worst_facades(residuals: TieResiduals) -> Ties:
+    """The facades at which ties show that passes lay the farthest apart, of those used.
+
+    Parameters
+    ----------
+    residuals : TieResiduals
+    """
+    ties = residuals.ties[residuals.used]
+    ties = ties[(ties.kind == "plane") & (np.abs(ties.direction[:, 2]) < 0.5)]
+    return ties[np.argsort(-np.abs(ties.misclosure), kind="stable")[: SETTINGS.facades]]
+
+
+def _places(scouted, cells):
+    """The Place of each cell (rows of the sample) that is a wall, after how well it shows."""
+    places = []
+    clear = 10 * SETTINGS.plane_points  # more points don't make a wall clearer
+    for rows in cells:
+        if (place := _wall(scouted, rows)) is not None:
+            # where wall and ground meet there is more to see
+            floats = place.foot - place.ground > SETTINGS.wall_height / 2
+            places.append((place.moved * min(len(rows) / clear, 1.0) / (1 + 9 * floats), place))
+    return places
+
+
+def _tied(scouted, residuals):
+    """Rows of the sample about each of the worst facades, of every pass."""
+    plan, time = scouted.before.xyz[:, :2], scouted.before.gps_time
+    facades, half = worst_facades(residuals), SETTINGS.plan_cell / 2
+    for places, times in zip(facades.place, facades.gps_time, strict=True):
+        at_first = (np.abs(plan - places[0, :2]) < half).all(axis=1)
+        at_first &= np.abs(time - times[0]) < SETTINGS.visit_pause / 2
+        if at_first.any():
+            middle = np.median(scouted.after.xyz[at_first, :2], axis=0)
+            yield np.flatnonzero((np.abs(scouted.after.xyz[:, :2] - middle) < half).all(axis=1))
 
 
 def _cells(scouted):
     """Rows of the sample in each cell that is high enough to hold a wall."""
     xyz = scouted.after.xyz
-    plan = np.floor((xyz[:, :2] - xyz[:, :2].min(axis=0)) / CELL).astype(np.int64)
+    plan = np.floor((xyz[:, :2] - xyz[:, :2].min(axis=0)) / SETTINGS.plan_cell).astype(np.int64)
     key = plan[:, 0] * (plan[:, 1].max() + 1) + plan[:, 1]
     order = np.argsort(key, kind="stable")
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
     height = xyz[order, 2]
-    tall = np.maximum.reduceat(height, starts) - np.minimum.reduceat(height, starts) > TALL + LOW
-    many = np.diff(np.append(starts, len(order))) >= FEWEST
+    extent = np.maximum.reduceat(height, starts) - np.minimum.reduceat(height, starts)
     ends = np.append(starts[1:], len(order))
-    return [order[starts[k] : ends[k]] for k in np.flatnonzero(tall & many)]
+    kept = (extent > 4 / 3 * SETTINGS.wall_height) & (ends - starts >= SETTINGS.plane_points)
+    return [order[starts[k] : ends[k]] for k in np.flatnonzero(kept)]
 
 
 def _wall(scouted, rows):
     """The Place of a cell, or None when its points are no wall."""
     xyz = scouted.after.xyz[rows]
     ground = float(xyz[:, 2].min())
-    rows = rows[xyz[:, 2] > ground + LOW]
-    if len(rows) < FEWEST:
+    rows = rows[xyz[:, 2] > ground + SETTINGS.wall_height / 3]
+    if len(rows) < SETTINGS.plane_points:
         return None
     xyz = scouted.after.xyz[rows]
     middle = np.median(xyz, axis=0)
     variance, vectors = np.linalg.eigh(np.cov((xyz - middle)[:, :2].T))
-    if variance[0] > FLAT**2 or variance[1] < LONG**2 or np.ptp(xyz[:, 2]) < TALL:
+    length = np.sqrt(12 * variance[1])  # of an evenly covered wall
+    is_flat = variance[0] <= SETTINGS.wall_flatness**2 and length >= SETTINGS.plan_cell / 2
+    if not is_flat or np.ptp(xyz[:, 2]) < SETTINGS.wall_height:
         return None
     normal = np.append(vectors[:, 0], 0.0)
     foot = float(np.percentile(xyz[:, 2], 5))
     shift = np.median(xyz - scouted.before.xyz[rows], axis=0)
     time = scouted.before.gps_time[rows]
-    split = _split(time)
-    if split is None:
+    splits, visits = _visits(time)
+    if len(visits) < 2:
         moved = float(np.hypot(shift @ normal, shift[2]))
-        return Place(middle, normal, shift, ground, foot, moved, None)
-    apart = []
-    for cloud in (scouted.before, scouted.after):
-        across = (cloud.xyz[rows] - middle) @ normal
-        apart.append(float(np.median(across[time > split]) - np.median(across[time <= split])))
-    moved = abs(apart[1] - apart[0])
-    return Place(middle, normal, shift, ground, foot, moved, split, abs(apart[0]), abs(apart[1]))
+        return Place(middle, normal, shift, ground, foot, moved, ())
+    across = [(cloud.xyz[rows] - middle) @ normal for cloud in (scouted.before, scouted.after)]
+    faces = np.array([[np.median(values[visit]) for visit in visits] for values in across])
+    moved = float(np.ptp(faces[1] - faces[0]))
+    before, after = np.ptp(faces, axis=1).tolist()
+    return Place(middle, normal, shift, ground, foot, moved, splits, before, after)
 
 
-def _split(time):
-    """The middle of the longest pause between two visits, or None."""
-    ordered = np.sort(time)
-    steps = np.diff(ordered)
-    k = int(np.argmax(steps))
-    if steps[k] < PAUSE or min(k + 1, len(time) - k - 1) < FEWEST:
-        return None
-    return float((ordered[k] + ordered[k + 1]) / 2)
+def _visits(time):
+    """Times between visits, and the rows of each visit with enough points for a wall."""
+    order = np.argsort(time, kind="stable")
+    last = np.flatnonzero(np.diff(time[order]) >= SETTINGS.visit_pause)
+    splits = (time[order[last]] + time[order[last + 1]]) / 2
+    visits = [rows for rows in np.split(order, last + 1) if len(rows) >= SETTINGS.plane_points]
+    return tuple(splits.tolist()), visits
+
+
+def _passes(place, ties):
+    """Pass of each visit by the nearest tie of its time; () where two visits are of one pass."""
+    time, number = ties.gps_time.ravel(), ties.pass_number.ravel()
+    away = np.linalg.norm(ties.place.reshape(-1, 3) - place.focus, axis=1)
+    visit, passes = np.searchsorted(place.splits, time), []
+    for k in range(len(place.splits) + 1):
+        near = np.where(visit == k, away, np.inf)
+        passes.append(int(number[near.argmin()]))
+    return tuple(passes) if len(set(passes)) == len(passes) else ()

@@ -1,16 +1,17 @@
 """A sheet: one view that is drawn, before and after, while the cloud goes by."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from mlscorr.report.render.open3d_engine import draw_pair
 from mlscorr.report.render.picture import Picture
-from mlscorr.report.render.quantities import GHOST, PAIRS, limits, paint, rgb
+from mlscorr.report.render.quantities import GHOST, PAIRS, CloudPair, limits, paint, rgb
 from mlscorr.report.render.views import View
-from mlscorr.report.render.zbuffer import REACH, Canvas
-
-CUT = 0.004  # least radius of a cut's points over the width of the picture
+from mlscorr.report.render.zbuffer import Canvas
 
 
 @dataclass(frozen=True)
@@ -21,34 +22,46 @@ class Sheet:
     canvases: tuple[Canvas, Canvas]
 
     @classmethod
-    def blank(cls, view):
+    def blank(cls, view: View) -> Sheet:
         """Nothing drawn yet. Before a cut its points may lie anywhere."""
-        depths = (REACH if view.is_cut else view.half_depth, view.half_depth)
-        return cls(view, tuple(Canvas.blank(view.camera, depth) for depth in depths))
+        before = Canvas.blank(view.camera, np.inf if view.is_cut else view.half_depth)
+        return cls(view, (before, Canvas.blank(view.camera, view.half_depth)))
 
-    def add(self, chunk, values):
-        """Draw a chunk with its values before and after."""
-        clouds = [chunk.before.xyz, chunk.after.xyz]
+    def add(self, pair: CloudPair, values: tuple[np.ndarray, np.ndarray]) -> None:
+        """Draw a chunk of the cloud with its values before and after."""
+        clouds = [pair.before.xyz, pair.after.xyz]
         if self.view.is_cut:
             rows = self.canvases[1].holds(clouds[1])
             clouds, values = [xyz[rows] for xyz in clouds], [v[rows] for v in values]
         for canvas, xyz, value in zip(self.canvases, clouds, values, strict=True):
             canvas.draw(xyz, value)
 
-    def finished(self, by_open3d=False, reference=None):
-        """The Picture, by Open3D or the z-buffer. Raises RuntimeError where Open3D fails."""
+    def finished(self, by_open3d: bool = False, reference: str | Path | None = None) -> Picture:
+        """The Picture, by Open3D or the z-buffer.
+
+        Parameters
+        ----------
+        by_open3d : bool
+        reference : path, optional
+            A surface that Open3D draws behind the points.
+
+        Raises
+        ------
+        RuntimeError
+            Where Open3D fails.
+        """
         view, radius = self.view, max(canvas.radius for canvas in self.canvases)
         if view.is_cut:  # a few points in a row are all there is to see
-            radius = max(radius, CUT * view.camera.size[0])
+            radius = max(radius, 0.004 * view.camera.size[0])
         pair = [canvas.grown(radius) for canvas in self.canvases]
         ends = limits(view.colour, *(canvas.value for canvas in pair))
         if by_open3d:
             colours = [paint(view.colour, canvas.value, ends) for canvas in self.canvases]
-            surface = reference if view.half_depth == REACH else None  # it would hide a slice
-            sides = draw_pair(self.canvases, colours, 2 * radius + 1, surface)
+            surface = reference if np.isinf(view.half_depth) else None  # it would hide a slice
+            before, after = draw_pair(self.canvases, colours, 2 * radius + 1, surface)
         else:
-            sides = [_side(view, pair[k], pair[1 - k], ends) for k in (0, 1)]
-        return Picture(view, *sides, ends)
+            before, after = (_side(view, pair[k], pair[1 - k], ends) for k in (0, 1))
+        return Picture(view, before, after, ends)
 
 
 def _side(view, canvas, other, ends):
@@ -57,7 +70,7 @@ def _side(view, canvas, other, ends):
     if view.colour == "state":
         pixels[other.drawn] = rgb(GHOST)[0]
     colours = paint(view.colour, canvas.value, ends)
-    if view.half_depth == REACH and view.colour not in PAIRS:  # in a thin slice edges of single
+    if np.isinf(view.half_depth) and view.colour not in PAIRS:  # in a thin slice edges of single
         colours = np.round(colours * canvas.light[..., None]).astype(np.uint8)  # points are noise
     pixels[canvas.drawn] = colours[canvas.drawn]
     return pixels

@@ -1,44 +1,47 @@
 """What stands beside the points: scale bar, compass and legend."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from mlscorr.report.look import AFTER, BEFORE
-from mlscorr.report.plan import nice
-from mlscorr.report.render.quantities import FIRST, GHOST, LABELS, SECOND, colour_table
+from mlscorr.report.render.camera import Camera
+from mlscorr.report.render.quantities import LABELS, colour_table, swatches
+from mlscorr.report.style import nice
 
 MARK = "#E6007E"  # what was surveyed: a colour that no scale has
 HALO = (withStroke(linewidth=4.0, foreground="white"),)
-SYMBOLS = {
+SYMBOLS: dict[str, dict[str, Any]] = {
     "control": {"marker": "o", "color": "black"},
     "check": {"marker": "D", "color": "black", "markerfacecolor": "white"},
     "unused": {"marker": "x", "color": "black"},
 }
-ARROW = r"$\rightarrow$"
-INCH = 100.0  # pixels
-LETTER = 1 / 58  # height of a letter over that of the page
-SMALLEST = 14.0  # pixels, of a letter
-GAP, HEAD, FOOT = 0.012, 0.105, 0.11  # of the page: between the panels, above and below them
-LENGTHS = 0.25  # of the picture's width, the longest scale bar
-SYMBOL = 0.05  # size of the compass's arrows over that of the picture
-LEVEL = 0.35  # sine of the elevation below which a view is level
 POINTS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
+WORDS = {"control": "Control point", "check": "Check point", "unused": "Not used"}
 
 
-def letter(where, factor):
-    """Font size in points, by the height of the figure."""
+def letter(where: Axes | Figure, factor: float) -> float:
+    """Font size in points: a share of the figure's height, and no less than can be read."""
     figure = where.get_figure()
-    return factor * max(LETTER * figure.get_figheight(), SMALLEST / INCH) * 72
+    return factor * max(figure.bbox.height / 58, 14.0) * 72 / figure.dpi
 
 
-def scale_bar(axes, camera):
+def _unit(size):
+    """Length of the compass's arrows. Units: pixels."""
+    return 0.05 * np.sqrt(size[0] * size[1])
+
+
+def scale_bar(axes: Axes, camera: Camera) -> None:
     """A bar of round length at the lower left, true at the middle of the picture."""
     width, height = camera.size
-    unit = SYMBOL * np.sqrt(width * height)
-    length = nice(LENGTHS * min(width, 1.5 * height) / camera.scale)
+    unit = _unit(camera.size)
+    length = nice(0.25 * min(width, 1.5 * height) / camera.scale)
     left, foot = 0.6 * unit, height - 0.5 * unit
     right = left + length * camera.scale
     _paper(axes, 0.3 * unit, height - 1.45 * unit, right + 0.3 * unit, height - 0.2 * unit)
@@ -60,10 +63,10 @@ def _paper(axes, left, top, right, bottom):
     )
 
 
-def free_corner(*pictures):
+def free_corner(*pictures: np.ndarray) -> tuple[int, int]:
     """The corner (column, row; 0 or 1) other than the scale bar's with the least points."""
     height, width = pictures[0].shape[:2]
-    side = round(4 * SYMBOL * np.sqrt(width * height))
+    side = round(4 * _unit((width, height)))
 
     def drawn(corner):
         columns = slice(width - side, width) if corner[0] else slice(0, side)
@@ -73,13 +76,12 @@ def free_corner(*pictures):
     return min(((1, 1), (1, 0), (0, 0)), key=drawn)
 
 
-def compass(axes, camera, corner):
+def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
     """North and east in a corner; in a level view what is up and what is right."""
-    width, height = camera.size
-    arm = SYMBOL * np.sqrt(width * height)
-    middle = np.array([width, height]) * corner + 2.0 * arm * (1 - 2 * np.array(corner))
+    arm = _unit(camera.size)
+    middle = np.array(camera.size) * corner + 2.0 * arm * (1 - 2 * np.array(corner))
     right, up, away = camera.axes
-    if abs(away[2]) < LEVEL:
+    if abs(away[2]) < 0.35:
         point = round(np.degrees(np.arctan2(right[0], right[1])) / 45) % 8
         arrows = {"up": up[[0, 2]] * [0, 1], POINTS[point]: np.array([1.0, 0.0])}
     else:
@@ -107,17 +109,30 @@ def compass(axes, camera, corner):
         )
 
 
-def legend(figure, picture):
-    """What colours and marks mean, in the foot of the page."""
-    colour = picture.view.colour
-    if colour in LABELS:
-        _colour_bar(figure, colour, picture.limits)
-    handles = list(_handles(picture.view))
+def legend(
+    figure: Figure, view: Any, limits: tuple[float, float], margins: tuple[float, float]
+) -> None:
+    """What colours and marks mean, in the foot of the page.
+
+    Parameters
+    ----------
+    figure : Figure
+    view : View
+    limits : (float, float)
+        Ends of the colour scale.
+    margins : (float, float)
+        Beside the panels and below them, over width and height of the page.
+    """
+    gap, foot = margins
+    has_scale = view.colour in LABELS
+    if has_scale:
+        _colour_bar(figure, view.colour, limits, (1.5 * gap, foot * 0.50, 0.40, foot * 0.14))
+    handles = list(_handles(view))
     if handles:
         figure.legend(
             handles=handles,
-            loc="center left" if colour in LABELS else "lower left",
-            bbox_to_anchor=(0.5, FOOT / 2 + 0.012) if colour in LABELS else (GAP, 0.01),
+            loc="center left" if has_scale else "lower left",
+            bbox_to_anchor=(0.5, foot / 2 + 0.012) if has_scale else (gap, 0.01),
             ncols=len(handles),
             frameon=False,
             fontsize=letter(figure, 0.85),
@@ -126,9 +141,9 @@ def legend(figure, picture):
         )
 
 
-def _colour_bar(figure, colour, limits):
+def _colour_bar(figure, colour, limits, place):
     words, unit = LABELS[colour]
-    axes = figure.add_axes((1.5 * GAP, FOOT * 0.50, 0.40, FOOT * 0.14))
+    axes = figure.add_axes(place)
     axes.imshow(colour_table(colour)[None], aspect="auto", extent=(*limits, 0, 1))
     axes.set_yticks([])
     size = letter(figure, 0.85)
@@ -137,27 +152,22 @@ def _colour_bar(figure, colour, limits):
     axes.set_title(f"{words} ({unit})" if unit else words, fontsize=size, loc="left", pad=4)
 
 
-def _handles(view):
+def _handles(view) -> Iterator[Line2D]:
     """Legend entries of what is drawn in a view."""
-    kinds = {mark.kind for side in view.marks for mark in side}
+    marks = [mark for side in view.marks for mark in side]
+    kinds = {mark.kind for mark in marks}
+    arrow = r"$\rightarrow$"
     if "surveyed" in kinds:
         yield Line2D([], [], color=MARK, linewidth=2.2, label="Where the target was surveyed")
     if "offset" in kinds:
-        yield _handle(ARROW, MARK, "From the scanned centre to the surveyed one")
-    words = {"control": "Control point", "check": "Check point", "unused": "Not used"}
-    for kind, text in words.items():
+        yield _handle(arrow, MARK, "From the scanned centre to the surveyed one")
+    for kind, text in WORDS.items():
         if kind in kinds:
             yield Line2D([], [], linestyle="none", markersize=6, label=text, **SYMBOLS[kind])
-    times = {mark.text for side in view.marks for mark in side if mark.kind == "residual"}
-    for number in times:
-        yield _handle(ARROW, MARK, f"To its surveyed place, {number} times enlarged")
-    if view.colour == "visit":
-        yield _handle("s", FIRST, "Scanned at the first visit")
-        yield _handle("s", SECOND, "Scanned at the second visit")
-    if view.colour == "state":
-        yield _handle("s", BEFORE, "As recorded")
-        yield _handle("s", AFTER, "Corrected")
-        yield _handle("s", GHOST, "The other of the two")
+    for number in {mark.text for mark in marks if mark.kind == "residual"}:
+        yield _handle(arrow, MARK, f"To its surveyed place, {number} times enlarged")
+    for colour, text in swatches(view.colour, view.visits):
+        yield _handle("s", colour, text.capitalize())
 
 
 def _handle(marker, color, text):

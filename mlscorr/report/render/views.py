@@ -1,36 +1,35 @@
-"""The views: what each picture looks at, from where, and what is drawn over the points."""
+"""The views: what each picture shows, from where, and what is drawn over the points."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from mlscorr.estimate import TieResiduals
+from mlscorr.evaluate.rows import TargetRow
 from mlscorr.report import tables
-from mlscorr.report.plan import nice
-from mlscorr.report.render.camera import PLAN, Camera
+from mlscorr.report.render.camera import Camera
+from mlscorr.report.render.scout import Scouted
 from mlscorr.report.render.section import find_place
-from mlscorr.report.render.zbuffer import REACH
+from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import nice
+from mlscorr.survey import ControlPoints, Trajectory
 
 VIEWS = ("overview", "targets", "section")
-OBLIQUE = 45.0  # deg, elevation of an overview of one street
-SPREAD = 250.0  # m; a larger area is seen from straight above, where its streets don't overlap
-LONG = 1.8  # width over height of a street whose pictures stand one above the other
-MARGIN = 1.12  # of the overview about what it shows
-ARROW_SHARE = 0.16  # the longest arrow of an overview, as a share of the picture
-ASIDE = 50.0  # deg, how far at most a target is looked at from aside to see all of its misclosure
-VISIBLE = 0.01  # m, a misclosure worth looking at from aside
-CORNERS = 96  # of the outline of a disc
-SLAB = 0.2  # half the thickness of a cross-section over half its width
-SLABS = 0.25, 0.5  # m, the least and largest half thickness
-LEAST, MOST = 1.0, 6.0  # m, half the width of a cross-section
-ROOM = 4.0  # times the misfit beside the wall
 
 
 @dataclass(frozen=True)
 class Mark:
     """A line, an arrow, a symbol or a name over the points.
 
-    ``kind`` is one of ``surveyed`` (an outline), ``offset`` and ``residual`` (arrows),
-    ``control``, ``check`` and ``unused`` (symbols). ``points`` (n, 3) are map coordinates.
+    Parameters
+    ----------
+    kind : str
+        ``surveyed`` (an outline), ``offset`` and ``residual`` (arrows), ``control``, ``check``
+        and ``unused`` (symbols).
+    points : (n, 3) array
+        Map coordinates. Units: m.
+    text : str
     """
 
     kind: str
@@ -42,8 +41,21 @@ class Mark:
 class View:
     """One pair of pictures: what it shows, from where, and its marks before and after.
 
-    Points farther than half_depth (m) before or behind the focus are left out; in a cut that is
-    decided after the correction, so that both sides show the same points.
+    Parameters
+    ----------
+    name, title, note : str
+    camera : Camera
+    colour : str
+        One of COLOURS, ``visit`` or ``state``.
+    half_depth : float
+        Points farther before or behind the focus are left out. Units: m.
+    is_cut : bool
+        Whether that is decided after the correction, so that both sides show the same points.
+    splits : tuple of float
+        Times between visits. Units: s.
+    visits : tuple of str
+        What each visit is called.
+    marks : pair of tuples of Mark
     """
 
     name: str
@@ -51,17 +63,24 @@ class View:
     note: str
     camera: Camera
     colour: str
-    half_depth: float = REACH
+    half_depth: float = np.inf
     is_cut: bool = False
-    split: float | None = None
+    splits: tuple[float, ...] = ()
+    visits: tuple[str, ...] = ("scanned at the first visit", "scanned at the second visit")
     marks: tuple[tuple[Mark, ...], tuple[Mark, ...]] = ((), ())
 
 
 @dataclass(frozen=True)
-class Look:
-    """What the user asked of the camera; None and 0 leave it to the view.
+class PictureOptions:
+    """What the user asked of pictures; None and 0 leave it to the view.
 
-    size is that of each picture in pixels, wide that of the overview of a long street.
+    Parameters
+    ----------
+    size, wide : (int, int)
+        Width and height of each picture, and of the overview of a long street. Units: pixels.
+    colour : str, optional
+    azimuth, elevation, view_angle : float, optional
+        As in Camera.towards. Units: deg.
     """
 
     size: tuple[int, int]
@@ -71,7 +90,14 @@ class Look:
     elevation: float | None = None
     view_angle: float = 0.0
 
-    def camera(self, focus, azimuth, elevation, scale, size=None):
+    def camera(
+        self,
+        focus: np.ndarray,
+        azimuth: float,
+        elevation: float,
+        scale: float,
+        size: tuple[int, int] | None = None,
+    ) -> Camera:
         """The camera of a view that would look this way by itself."""
         size = self.size if size is None else size
         azimuth = azimuth if self.azimuth is None else self.azimuth
@@ -79,33 +105,40 @@ class Look:
         return Camera.towards(focus, azimuth, elevation, scale, size, self.view_angle)
 
 
-def overview(scouted, rows, look):
-    """The whole survey with the misclosures as enlarged arrows."""
+def overview(scouted: Scouted, rows: list[TargetRow], options: PictureOptions) -> View:
+    """The whole survey with the misclosures as enlarged arrows.
+
+    Parameters
+    ----------
+    scouted : Scouted
+    rows : list of TargetRow
+        Those observed.
+    options : PictureOptions
+    """
     xyz = scouted.before.xyz
     low, high = np.percentile(xyz, [0.5, 99.5], axis=0)
     focus = np.append((low + high)[:2] / 2, np.median(xyz[:, 2]))
-    extent = np.ptp(np.stack([low, high]), axis=0)[:2]
-    elevation = PLAN if extent.min() > SPREAD else OBLIQUE
-    azimuth = 0.0 if elevation == PLAN else _along(xyz[:, :2])
-    unit = look.camera(focus, azimuth, elevation, 1.0)
+    from_above = (high - low)[:2].min() > SETTINGS.largest_street
+    azimuth, elevation = (0.0, 90.0) if from_above else (_along(xyz[:, :2]), 45.0)
+    unit = options.camera(focus, azimuth, elevation, 1.0)
     inside = xyz[((xyz >= low) & (xyz <= high)).all(axis=1)]
-    flat = (unit.axes[:2] @ (inside - focus).T).T
+    flat = (inside - focus) @ unit.axes[:2].T
     ends = np.stack([flat.min(axis=0), flat.max(axis=0)])
     focus = focus + ends.mean(axis=0) @ unit.axes[:2]
     across, up = np.ptp(ends, axis=0)
-    size = look.wide if look.wide and across > LONG * up else look.size
-    scale = float(min(size[0] / across, size[1] / up) / MARGIN)
-    residuals = [np.linalg.norm(r[k]) for r in rows for k in ("before", "after")]
-    room = ARROW_SHARE * np.sqrt(size[0] * size[1]) / scale
-    times = nice(room / max(residuals)) if rows and max(residuals) > 0 else 0.0
-    marks = tuple(tuple(_symbols(rows, key, times)) for key in ("before", "after"))
+    is_long = across > 1.8 * up  # so that both pictures fit one above the other
+    size = options.wide if options.wide and is_long else options.size
+    scale = float(min(size[0] / across, size[1] / up) / 1.12)
+    longest = max((np.linalg.norm(v) for row in rows for v in (row.before, row.after)), default=0)
+    room = 0.16 * np.sqrt(size[0] * size[1]) / scale
+    times = nice(room / longest) if longest > 0 else 0.0
     return View(
         "overview",
         _overview_title(rows),
         "",
-        look.camera(focus, azimuth, elevation, scale, size),
-        look.colour or "correction",
-        marks=marks,
+        options.camera(focus, azimuth, elevation, scale, size),
+        options.colour or "correction",
+        marks=(tuple(_symbols(rows, "before", times)), tuple(_symbols(rows, "after", times))),
     )
 
 
@@ -118,82 +151,90 @@ def _along(plan):
 
 def _overview_title(rows):
     """How far off the independent targets were and are."""
-    role = "check" if any(row["role"] == "check" for row in rows) else "control"
-    some = [row for row in rows if row["role"] == role]
-    if not some:
+    role = "check" if any(row.role == "check" for row in rows) else "control"
+    rows = [row for row in rows if row.role == role]
+    if not rows:
         return "The whole survey; no target was seen"
     before, after = (
-        np.sqrt(np.mean([np.sum(np.square(row[key])) for row in some]))
-        for key in ("before", "after")
+        np.sqrt(np.mean([np.sum(np.square(getattr(row, state))) for row in rows]))
+        for state in ("before", "after")
     )
-    points = len({row["name"] for row in some})
-    often = "" if points == len(some) else f", seen {len(some)} times"
+    points = len({row.name for row in rows})
+    often = "" if points == len(rows) else f", seen {len(rows)} times"
     return (
         f"{points} {role} points{often}: {before:.2f} m off before, {after:.2f} m after (3D RMSE)"
     )
 
 
-def _symbols(rows, key, times):
+def _symbols(rows, state, times) -> Iterator[Mark]:
     """Arrows first, then a symbol for each target over them."""
     for row in rows:
-        place = np.array(row["surveyed"])
-        yield Mark("residual", np.stack([place, place + times * row[key]]), f"{times:,.0f}")
+        arrow = [row.surveyed, row.surveyed + times * getattr(row, state)]
+        yield Mark("residual", np.stack(arrow), f"{times:,.0f}")
     for row in rows:
-        yield Mark(tables.group(row), np.array([row["surveyed"]]), row["name"])
+        yield Mark(row.group, row.surveyed[None], row.name)
 
 
-def target(rows, normal, points, trajectory, look):
+def target(
+    rows: list[TargetRow],
+    normal: np.ndarray,
+    points: ControlPoints,
+    trajectory: Trajectory,
+    options: PictureOptions,
+) -> View:
     """A target close up, turned so that its misclosure is seen at full length.
 
     Parameters
     ----------
-    rows : list of dict
-        Of this target, one for each pass, as report.json has them.
+    rows : list of TargetRow
+        Of this target, one for each pass.
     normal : (3,) array
         Of the target, either sign; NaN where it isn't known.
     points : ControlPoints
         Among them the target.
     trajectory : Trajectory
-    look : Look
+    options : PictureOptions
     """
-    row = max(rows, key=lambda row: np.linalg.norm(row["before"]))  # the pass that is worst off
-    surveyed, observed = np.array(row["surveyed"]), np.array(row["observed"])
-    k = points.name.index(row["name"])
-    size = points.size[k]
-    facing = _facing(normal, trajectory.at(row["gps_time"]).position[0] - observed)
-    seen_from = _aside(facing, row["before"])
-    azimuth = np.degrees(np.arctan2(-seen_from[0], -seen_from[1]))
-    elevation = np.degrees(np.arcsin(seen_from[2]))
-    if elevation > PLAN - 1.0:
-        azimuth = 0.0  # north is up
-    half = np.linalg.norm(row["before"]) / 2 + 1.1 * size
-    outline = Mark("surveyed", surveyed + _outline(points.kind[k], size, facing))
-    marks = tuple(
-        (outline, *(Mark("offset", np.stack([surveyed - r[key], surveyed])) for r in rows))
-        for key in ("before", "after")
+    row = max(rows, key=lambda row: np.linalg.norm(row.before))  # the pass that is worst off
+    k = points.name.index(row.name)
+    kind, size = points.kind[k], points.size[k]
+    facing = _facing(normal, trajectory.at(row.gps_time).position[0] - row.observed)
+    eye = _direction(facing, row.before)
+    elevation = np.degrees(np.arcsin(eye[2]))
+    north_up = elevation > 89.0
+    azimuth = 0.0 if north_up else np.degrees(np.arctan2(-eye[0], -eye[1]))
+    half = np.linalg.norm(row.before) / 2 + 1.1 * size
+    outline = Mark("surveyed", row.surveyed + _outline(kind, size, facing))
+    before, after = (
+        tuple(
+            Mark("offset", np.stack([row.surveyed - getattr(r, state), row.surveyed])) for r in rows
+        )
+        for state in ("before", "after")
     )
-    scale = min(look.size) / 2 / half
+    middle = (row.surveyed + row.observed) / 2
     return View(
-        f"target-{row['name']}",
+        f"target-{row.name}",
         _target_title(rows),
-        f"{points.kind[k].capitalize()} of {size:g} m.",
-        look.camera((surveyed + observed) / 2, azimuth, elevation, scale),
-        look.colour or "intensity",
+        f"{kind.capitalize()} of {size:g} m.",
+        options.camera(middle, azimuth, elevation, min(options.size) / 2 / half),
+        options.colour or "intensity",
         half_depth=2 * half,
-        marks=marks,
+        marks=((outline, *before), (outline, *after)),
     )
 
 
 def _target_title(rows):
     """How far off the target was and is, at most where it was seen several times."""
-    before, after = (max(np.linalg.norm(row[key]) for row in rows) for key in ("before", "after"))
-    group = tables.group(rows[0])
+    before, after = (
+        max(np.linalg.norm(getattr(row, state)) for row in rows) for state in ("before", "after")
+    )
+    group = rows[0].group
     role = "not used" if group == "unused" else f"{group} point"
     often = f" in {len(rows)} passes" if len(rows) > 1 else ""
     made = " (the correction was made with it)" if group == "control" else ""
-    most = " at most" if len(rows) > 1 else ""
+    at_most = " at most" if len(rows) > 1 else ""
     return (
-        f"{rows[0]['name']}, {role}{often}:{most} {before:.2f} m off before, {after:.2f} m after"
+        f"{rows[0].name}, {role}{often}:{at_most} {before:.2f} m off before, {after:.2f} m after"
         f"{made}"
     )
 
@@ -205,10 +246,10 @@ def _facing(normal, to_vehicle):
     return normal if normal @ to_vehicle >= 0 else -normal
 
 
-def _aside(facing, misclosure):
+def _direction(facing, misclosure):
     """Where to look from: across the misclosure, and as near to face on as that allows."""
     length = np.linalg.norm(misclosure)
-    if length < VISIBLE:
+    if length < SETTINGS.visible:
         return facing
     along = misclosure / length
     across = facing - (facing @ along) * along
@@ -216,11 +257,11 @@ def _aside(facing, misclosure):
         across = np.array([0.0, -1.0, 0.0]) if abs(facing[2]) > 0.7 else np.array([0.0, 0.0, 1.0])
         across = across - (across @ facing) * facing
     across /= np.linalg.norm(across)
-    angle = min(np.arccos(np.clip(facing @ across, -1, 1)), np.radians(ASIDE))
-    sideways = across - (across @ facing) * facing
-    if np.linalg.norm(sideways) > 1e-9:
-        sideways /= np.linalg.norm(sideways)
-    direction = np.cos(angle) * facing + np.sin(angle) * sideways
+    angle = min(np.arccos(np.clip(facing @ across, -1, 1)), np.radians(SETTINGS.sideways_angle))
+    turned = across - (across @ facing) * facing
+    if np.linalg.norm(turned) > 1e-9:
+        turned /= np.linalg.norm(turned)
+    direction = np.cos(angle) * facing + np.sin(angle) * turned
     direction[2] = max(direction[2], 0.0)  # not from under the road
     return direction / np.linalg.norm(direction)
 
@@ -234,42 +275,63 @@ def _outline(kind, size, normal):
     if kind == "square":
         corners = size / 2 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
     else:
-        angle = np.linspace(0, 2 * np.pi, CORNERS)
+        angle = np.linspace(0, 2 * np.pi, 96)
         corners = size / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
     return corners @ np.stack([right, up])
 
 
-def section(scouted, look):
-    """A cut through the wall where the correction shows best; None where there is no wall."""
-    place = find_place(scouted)
+def section(
+    scouted: Scouted, options: PictureOptions, ties: TieResiduals | None = None
+) -> View | None:
+    """A cut through the wall where the correction shows best; None where there is no wall.
+
+    Parameters
+    ----------
+    scouted : Scouted
+    options : PictureOptions
+    ties : TieResiduals, optional
+        Walls that passes both saw come first.
+    """
+    place = find_place(scouted, ties)
     if place is None:
         return None
     across = place.normal
-    half = abs(place.shift @ across) + ROOM * place.moved
-    half = float(np.clip(half, LEAST, MOST))
+    half = abs(place.shift @ across) + 4 * place.moved  # so much room is beside the misfit
+    half = float(np.clip(half, *SETTINGS.section_half_width))
     azimuth = float(np.degrees(np.arctan2(across[1], -across[0])))  # along the wall
-    scale = look.size[0] / 2 / half
-    high = look.size[1] / scale  # m
+    scale = options.size[0] / 2 / half
+    high = options.size[1] / scale  # m
     focus = place.focus - place.shift / 2
     base = place.ground if place.foot - place.ground < high / 2 else place.foot
     focus[2] = base - place.shift[2] / 2 + 0.35 * high
-    if place.split is None:
-        title = f"Cross-section of a wall: the correction moves it by {place.moved:.2f} m"
+    if place.splits:
+        number = len(place.splits) + 1
+        often = "twice" if number == 2 else f"{number} times"
+        before, after = (tables.length_in_words(value) for value in (place.before, place.after))
+        title = f"Cross-section of a wall scanned {often}: {before} apart before, {after} after"
     else:
-        title = (
-            f"Cross-section of a wall scanned twice: {place.before:.2f} m apart before, "
-            f"{place.after:.2f} m after"
-        )
-    slab = float(np.clip(SLAB * half, *SLABS))
+        moved = tables.length_in_words(place.moved)
+        title = f"Cross-section of a wall: the correction moves it by {moved}"
+    half_slab = float(np.clip(half / 5, 0.25, 0.5))  # m: enough points, and little of a curve
     east, north = place.focus[:2]
     return View(
         "section",
         title,
-        f"At {east:.0f} E, {north:.0f} N. The same points on both sides: {2 * slab:.1f} m of the "
-        "wall, end on.",
-        look.camera(focus, azimuth, 0.0, scale),
-        look.colour or ("state" if place.split is None else "visit"),
-        half_depth=slab,
+        f"At {east:.0f} E, {north:.0f} N. The same points on both sides: {2 * half_slab:.1f} m of "
+        "the wall, end on.",
+        options.camera(focus, azimuth, 0.0, scale),
+        options.colour or ("visit" if place.splits else "state"),
+        half_depth=half_slab,
         is_cut=True,
-        split=place.split,
+        splits=place.splits,
+        visits=_visits(place),
     )
+
+
+def _visits(place):
+    """What the visits of a place are called: by their passes, or by their order."""
+    if place.passes:
+        return tuple(f"scanned by pass {number}" for number in place.passes)
+    if len(place.splits) < 2:
+        return View.visits
+    return tuple(f"scanned at visit {k + 1}" for k in range(len(place.splits) + 1))

@@ -1,5 +1,7 @@
 """A z-buffer for points: each pixel keeps the nearest one, whatever the order they come in."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,21 +9,21 @@ from numba import njit
 
 from mlscorr.report.render.camera import Camera
 
-REACH = 20_000.0  # m, largest depth before and behind the focus
-DEPTH_STEP = 1e-5  # m: 2 * REACH / DEPTH_STEP fits 32 bits
+DEEPEST = 20_000.0  # m before and behind the focus
+DEPTH_STEP = 1e-5  # m: 2 * DEEPEST / DEPTH_STEP fits 32 bits
 EMPTY = np.uint64(0xFFFFFFFFFFFFFFFF)
-NEAREST = 0.1  # m, nothing nearer to the eye of a perspective camera is drawn
-BLOCK = 16  # pixels, in which the density of points is counted
-TOUCH = 0.85  # radius of a point over the mean distance to the next one, so that surfaces close
-LARGEST = 7  # pixels, radius of a point
-SHADE = 0.35  # how much an edge darkens what lies behind it
-ROUGH = 1.5  # pixels of depth that are no edge
-FARTHER = 3.0  # pixels of depth beyond which an edge is not darker
 
 
 @dataclass(frozen=True)
 class Canvas:
     """The nearest point of each pixel.
+
+    Parameters
+    ----------
+    camera : Camera
+    half_depth : float
+        Points farther before or behind the focus are not drawn. Units: m.
+    pixels : (height, width) array of uint64
 
     A pixel holds one number: depth in steps of 0.01 mm in the upper 32 bits, the bits of the
     point's float32 value in the lower ones. The smallest number wins, so points of equal depth
@@ -29,21 +31,22 @@ class Canvas:
     """
 
     camera: Camera
-    half_depth: float  # m: points farther before or behind the focus are not drawn
-    pixels: np.ndarray  # (height, width) uint64
+    half_depth: float
+    pixels: np.ndarray
 
     @classmethod
-    def blank(cls, camera, half_depth=REACH):
+    def blank(cls, camera: Camera, half_depth: float = np.inf) -> Canvas:
+        """Nothing drawn yet."""
         width, height = camera.size
-        return cls(camera, min(half_depth, REACH), np.full((height, width), EMPTY))
+        return cls(camera, min(half_depth, DEEPEST), np.full((height, width), EMPTY))
 
-    def holds(self, xyz):
+    def holds(self, xyz: np.ndarray) -> np.ndarray:
         """Which points (n, 3) lie within half_depth of the focus: (n,) bool."""
         x, y, z = (xyz - self.camera.focus).T
         away = self.camera.axes[2]
         return np.abs(away[0] * x + away[1] * y + away[2] * z) <= self.half_depth
 
-    def draw(self, xyz, value):
+    def draw(self, xyz: np.ndarray, value: np.ndarray) -> None:
         """Add points: (n, 3) in m, with values (n,)."""
         camera = self.camera
         _draw(
@@ -58,19 +61,20 @@ class Canvas:
         )
 
     @property
-    def radius(self):
+    def radius(self) -> float:
         """Radius in pixels that lets neighbouring points touch, from how dense they lie."""
-        drawn = self.pixels != EMPTY
-        rows, columns = (-np.array(drawn.shape)) % BLOCK
-        blocks = np.pad(drawn, ((0, rows), (0, columns)))
-        blocks = blocks.reshape(blocks.shape[0] // BLOCK, BLOCK, -1, BLOCK).sum(axis=(1, 3))
+        block = 16  # pixels, in which the density of points is counted
+        rows, columns = (-np.array(self.pixels.shape)) % block
+        blocks = np.pad(self.drawn, ((0, rows), (0, columns)))
+        blocks = blocks.reshape(blocks.shape[0] // block, block, -1, block).sum(axis=(1, 3))
         counts = np.sort(blocks[blocks > 0])
         if len(counts) == 0:
             return 0.0
         half = np.searchsorted(np.cumsum(counts), counts.sum() / 2)  # seen from the median point
-        return float(min(TOUCH * BLOCK / np.sqrt(counts[half]), LARGEST))
+        distance = block / np.sqrt(counts[half])  # to the next point
+        return float(min(0.85 * distance, 7.0))  # surfaces close, and few points stay points
 
-    def grown(self, radius):
+    def grown(self, radius: float) -> Canvas:
         """The canvas with each point as a disc of a radius in pixels.
 
         Where discs overlap the nearer point is seen: the same as if every point of the cloud
@@ -84,31 +88,31 @@ class Canvas:
         return Canvas(self.camera, self.half_depth, pixels)
 
     @property
-    def value(self):
+    def value(self) -> np.ndarray:
         """Values (height, width) of the points seen, NaN where there is none."""
         value = (self.pixels & np.uint64(0xFFFFFFFF)).astype(np.uint32).view(np.float32)
         return np.where(self.drawn, value, np.float32(np.nan))
 
     @property
-    def drawn(self):
+    def drawn(self) -> np.ndarray:
         """Whether a point is seen, for each pixel (height, width)."""
         return self.pixels != EMPTY
 
     @property
-    def points(self):
+    def points(self) -> np.ndarray:
         """The points seen (n, 3) float32, to the pixel, in camera axes about the focus.
 
         They are right, up and towards the eye; pixels go row by row. Units: m.
         """
         row, column = np.nonzero(self.drawn)
-        depth = (self.pixels[row, column] >> np.uint64(32)) * DEPTH_STEP - REACH
+        depth = (self.pixels[row, column] >> np.uint64(32)) * DEPTH_STEP - DEEPEST
         height, width = self.pixels.shape
         metres = 1 / self.camera.scale * (1 + depth / self.camera.distance)
         right, up = (column + 0.5 - width / 2) * metres, (height / 2 - row - 0.5) * metres
         return np.column_stack([right, up, -depth]).astype(np.float32)
 
     @property
-    def light(self):
+    def light(self) -> np.ndarray:
         """How light each pixel is, in [0, 1]: those behind a near edge are darker.
 
         From depth alone, as eye-dome lighting (Boucheny 2009); slopes keep their colours.
@@ -128,18 +132,17 @@ def _draw(xyz, value, focus, axes, scale, distance, half_depth, pixels):
             continue
         there = scale
         if distance < np.inf:
-            if distance + depth < NEAREST:
+            if distance + depth <= 0:  # behind the eye
                 continue
             there = scale * distance / (distance + depth)
         column = width / 2 + (axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z) * there
         row = height / 2 - (axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z) * there
         if not (0 <= column < width and 0 <= row < height):
             continue
-        step = np.uint64((depth + REACH) / DEPTH_STEP)
+        step = np.uint64((depth + DEEPEST) / DEPTH_STEP)
         key = (step << np.uint64(32)) | np.uint64(value[p])
         i, j = int(row), int(column)
-        if key < pixels[i, j]:
-            pixels[i, j] = key
+        pixels[i, j] = min(pixels[i, j], key)
 
 
 @njit(cache=True, nogil=True)
@@ -158,6 +161,7 @@ def _grow(pixels, disc, grown):
 
 @njit(cache=True, nogil=True)
 def _light(pixels, pixels_per_step):
+    deepest = 3.0  # pixels of depth beyond which an edge is not darker; half of it is no edge
     height, width = pixels.shape
     light = np.ones((height, width))
     for i in range(2, height - 2):
@@ -167,12 +171,12 @@ def _light(pixels, pixels_per_step):
             here = np.int64(pixels[i, j] >> np.uint64(32))
             edge = 0.0
             for a, b in ((2, 0), (0, 2), (1, 1), (1, -1)):
-                one, other = pixels[i + a, j + b], pixels[i - a, j - b]
-                if one == EMPTY or other == EMPTY:
+                left, right = pixels[i + a, j + b], pixels[i - a, j - b]
+                if EMPTY in (left, right):
                     continue
                 # the mean of opposite pixels: a slope by itself is no edge
-                mean = (np.int64(one >> np.uint64(32)) + np.int64(other >> np.uint64(32))) / 2
-                behind = (here - mean) * pixels_per_step - ROUGH
-                edge += min(max(behind, 0.0), FARTHER)
-            light[i, j] = np.exp(-SHADE * edge / FARTHER)
+                mean = (np.int64(left >> np.uint64(32)) + np.int64(right >> np.uint64(32))) / 2
+                behind = (here - mean) * pixels_per_step - deepest / 2
+                edge += min(max(behind, 0.0), deepest)
+            light[i, j] = np.exp(-0.35 * edge / deepest)
     return light

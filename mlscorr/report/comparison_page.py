@@ -3,11 +3,15 @@
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from mlscorr.effects.wording import joined
 from mlscorr.report import tables
-from mlscorr.report.look import (
+from mlscorr.report.pages import Page, data_uri
+from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import (
     BLUE,
     GREEN,
     GREY,
@@ -17,11 +21,16 @@ from mlscorr.report.look import (
     styled,
     svg,
 )
-from mlscorr.report.skeleton import data_uri, environment, now, versions
 
-ALIKE = 0.002  # m; less is below what surveying a target can tell
-FLOOR = 1e-4  # m, the left end of the figure at least
-OURS = "lsc"
+SECTIONS = {  # in their order; one without anything to show is left out
+    "scores": "What remains",
+    "check": "Check points alone",
+    "absent": "Not determined",
+    "figure": "As a picture",
+    "methods": "The methods",
+    "unseen": "Not seen",
+}
+COLLOCATION = "lsc"
 KINDS = {  # colour, mark and words
     "none": (GREY, "x", "as recorded"),
     "one move": (VERMILLION, "s", "one move of the whole cloud, blind to time"),
@@ -35,7 +44,7 @@ OTHERS = {
 }
 
 
-def write_comparison(path, document):
+def write_comparison(path: str | Path, document: dict) -> None:
     """Write the self-contained page of a comparison.
 
     Parameters
@@ -45,58 +54,77 @@ def write_comparison(path, document):
     document : dict
         The content of compare.json.
     """
-    template = environment(Path(__file__).parent).get_template("compare.html")
-    page = template.render(content(document))
-    Path(path).write_text(page, encoding="utf-8")
-
-
-def content(document):
-    """Everything that the template shows."""
-    by = document["scored_by"]
-    ranked = ranking(document)
-    absent = [row for row in document["methods"] if row not in ranked]
-    return {
+    ranked, by = ranking(document), document["scored_by"]
+    absent = [
+        (row["name"], row["why"] or row[by].get("why") or "no point to score it by")
+        for row in document["methods"]
+        if row not in ranked
+    ]
+    few_checked = by == "cross_validated" and bool(document["check_points"])
+    there = {
+        "scores": bool(ranked),
+        "check": bool(ranked) and few_checked,
+        "absent": bool(absent),
+        "figure": bool(ranked),
+        "unseen": bool(document["unseen"]),
+    }
+    figures = {"comparison": data_uri(svg(comparison_figure(document)))} if ranked else {}
+    content = {
         "document": document,
         "sentences": verdict(document),
         "basis": basis(document),
         "by": by,
-        "ranked": [row | {"score": row[by]} for row in ranked],
-        "absent": [(row, reason(row, by)) for row in absent],
+        "ranked": ranked,
+        "absent": absent,
         "warned": [(row["name"], text) for row in document["methods"] for text in row["warnings"]],
         "kinds": {name: words for name, (_, _, words) in KINDS.items()},
-        "figure": data_uri(svg(comparison_figure(document))) if ranked else None,
-        "versions": versions(),
-        "written": now(),
+        "figures": figures,
     }
+    Page(
+        title=f"{document['name']}: methods of correction compared",
+        summary="compare-summary.html",
+        sections={name: title for name, title in SECTIONS.items() if there.get(name, True)},
+        content=content,
+        prefix="compare-",
+        styles=("compare.css",),
+    ).write(path)
 
 
-def ranking(document):
-    """Rows of the methods that have a score, by their 3D RMSE, the best first."""
+def ranking(document: dict) -> list[dict]:
+    """Rows of the methods that have a score, by their 3D RMSE, the best first.
+
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
     by = document["scored_by"]
     scored = [row for row in document["methods"] if row[by]["rmse_3d"] is not None]
     return sorted(scored, key=lambda row: row[by]["rmse_3d"])
 
 
-def reason(row, by):
-    """Why a method has no score."""
-    return row["why"] or row[by].get("why") or "no point to score it by"
+def basis(document: dict) -> str:
+    """What the scores rest on, in one sentence.
 
-
-def basis(document):
-    """What the scores rest on, in one sentence."""
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
     control, check = document["control_points"], document["check_points"]
     made = f"Every method was fitted to the same {_points(control, 'control point')}"
     if document["scored_by"] == "check":
         return f"{made} and scored by {_points(check, 'check point')} that took no part."
     if document["scored_by"] == "control":
         return f"{made}. Nothing independent is left to score them by: this is the mere fit."
-    few = f"only {_points(check, 'check point')}" if check else "no check points"
+    too_few = f"only {_points(check, 'check point')}" if check else "no check points"
     groups = document["cross_validation_groups"]
     left = "each left out in turn" if groups == control else f"left out in {groups} groups in turn"
     others = "; each check point from all control points" if check else ""
     return (
-        f"{made}. There {'is' if check == 1 else 'are'} {few}, so the scores are cross-validated "
-        f"over all points: control points, {left}, are predicted from the others{others}."
+        f"{made}. There {'is' if check == 1 else 'are'} {too_few}, so the scores are "
+        f"cross-validated over all points: control points, {left}, are predicted from the "
+        f"others{others}."
     )
 
 
@@ -104,64 +132,73 @@ def _points(number, words):
     return f"{number} {words}{'s' * (number != 1)}"
 
 
-def verdict(document):
-    """The result in sentences (list of str)."""
+def verdict(document: dict) -> list[str]:
+    """The result in sentences.
+
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
     ranked, by = ranking(document), document["scored_by"]
     if not ranked:
         return ["No point was found that could score the methods."]
     value = {row["name"]: row[by]["rmse_3d"] for row in ranked}
     best = ranked[0]["name"]
-    alike = [name for name in value if value[name] - value[best] < ALIKE]
+    tied = [name for name in value if value[name] - value[best] < SETTINGS.difference]
     raw = f"{tables.number(value['raw'])} m without any correction"
-    if "raw" in alike:
+    if "raw" in tied:
         text = f"The cloud as recorded, with {tables.number(value['raw'])} m, is as good as any"
-        return [f"No method improves this cloud by {1000 * ALIKE:.0f} mm or more. {text}."]
-    sentences = [_winner(ranked[0], alike, tables.number(value[best]), raw)]
+        return [
+            f"No method improves this cloud by {1000 * SETTINGS.difference:.0f} mm or more. {text}."
+        ]
+    sentences = [_winner(ranked[0], tied, tables.number(value[best]), raw)]
     for kind, words in OTHERS.items():
         rest = [row["name"] for row in ranked if row["kind"] == kind]
-        if rest and rest[0] not in alike:
+        if rest and rest[0] not in tied:
             sentences.append(f"{words}: {rest[0]}, with {tables.number(value[rest[0]])} m.")
-    if OURS in value and OURS not in alike:
-        behind = value[OURS] - value[best]
+    if COLLOCATION in value and COLLOCATION not in tied:
+        own, behind = value[COLLOCATION], value[COLLOCATION] - value[best]
         sentences.append(
-            f"{OURS}, with {tables.number(value[OURS])} m, is {tables.number(behind)} m behind."
+            f"{COLLOCATION}, with {tables.number(own)} m, is {tables.number(behind)} m behind."
         )
     return sentences
 
 
-def _winner(row, alike, value, raw):
+def _winner(row, tied, value, raw):
     """The sentence on the best method, or on those that are too close to tell apart."""
-    if len(alike) == 1:
+    if len(tied) == 1:
         about = row["about"][0].lower() + row["about"][1:].rstrip(".")
         return f"Best is {row['name']} ({about}): 3D RMSE {value} m, against {raw}."
     return (
-        f"Best are {_joined(alike)}: 3D RMSE {value} m, against {raw}. They differ by less than "
-        f"{1000 * ALIKE:.0f} mm, which can't be told apart."
+        f"Best are {joined(tied)}: 3D RMSE {value} m, against {raw}. They differ by less than "
+        f"{1000 * SETTINGS.difference:.0f} mm, which can't be told apart."
     )
 
 
-def _joined(names):
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
 @styled
-def comparison_figure(document):
-    """RMSE of every method on each axis, the best at the top; a logarithmic scale in m."""
+def comparison_figure(document: dict) -> Figure:
+    """RMSE of every method on each axis, the best at the top; a logarithmic scale in m.
+
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
     ranked, by = ranking(document), document["scored_by"]
     figure = new_figure(1.6 + 0.27 * len(ranked))
     panels = figure.subplots(1, 3, sharey=True, sharex=True)
-    values = np.array([row[by]["rmse"] for row in ranked])
+    values = np.maximum([row[by]["rmse"] for row in ranked], 1e-4)  # m, the left end at least
     places = np.arange(len(ranked))
     for axis, panel in enumerate(panels):
-        shown = np.maximum(values[:, axis], FLOOR)
-        least = shown.min()
-        panel.hlines(places, 1e-9, shown, color="#d3d8dc", linewidth=1.0, zorder=1)
-        for place, row, value in zip(places, ranked, shown, strict=True):
+        column = values[:, axis]
+        panel.hlines(places, 1e-9, column, color="#d3d8dc", linewidth=1.0, zorder=1)
+        for place, row, value in zip(places, ranked, column, strict=True):
             color, mark, _ = KINDS[row["kind"]]
             panel.plot(value, place, mark, color=color, markersize=5.5, zorder=3)
-        panel.axvline(least, color=BLUE, linewidth=0.7, linestyle=":", zorder=2)
+        panel.axvline(column.min(), color=BLUE, linewidth=0.7, linestyle=":", zorder=2)
         panel.set_title(("East", "North", "Height")[axis])
-        panel.set_xlim(np.maximum(values, FLOOR).min() / 1.6, values.max(initial=FLOOR) * 1.6)
+        panel.set_xlim(values.min() / 1.6, values.max() * 1.6)
         _ticks_in_words(panel)
     panels[0].set_yticks(places, [row["name"] for row in ranked])
     panels[0].set_ylim(len(ranked) - 0.4, -0.6)

@@ -1,0 +1,85 @@
+"""Numbers of a document for tables, figures and sentences; what was not determined is a dash."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mlscorr.effects.wording import DASH, figures, known, scale
+
+
+def numbers(values: Iterable[float | None]) -> np.ndarray:
+    """Numbers of a document as an array, NaN where it has none.
+
+    Parameters
+    ----------
+    values : iterable of float or None
+    """
+    return np.array([v if known(v) else np.nan for v in values], dtype=float)
+
+
+def column(values: Sequence[float | None], unit: str) -> tuple[list[str], str]:
+    """Numbers of a row of a table in the unit that suits the largest, and that unit.
+
+    Parameters
+    ----------
+    values : sequence of float or None
+    unit : str
+        Of the values.
+
+    >>> column([-0.0045256, 0.000527, None], "s")
+    (['-4.526', '0.5270', '–'], 'ms')
+    """
+    large = max((abs(value) for value in values if known(value)), default=1.0)
+    factor, word = scale(large, None, unit) if large < 1e4 else (1.0, unit)
+    return [plain(value, factor) for value in values], word
+
+
+def plain(value: float | None, factor: float = 1.0) -> str:
+    """A number for tables: four figures, a dash for none.
+
+    Parameters
+    ----------
+    value : float or None
+    factor : float
+        By which it is multiplied.
+
+    >>> plain(-0.0045256), plain(None), plain(357726.276)
+    ('-0.004526', '–', '357726.276')
+    """
+    if not known(value):
+        return DASH
+    value = factor * value
+    return f"{value:.3f}" if abs(value) >= 1e4 else figures(value, 4)
+
+
+def signed(value: float | None, unit: str = "mm") -> str:
+    """A signed gap with one decimal, two below one; below zero it has a true minus sign.
+
+    Parameters
+    ----------
+    value : float or None
+    unit : str
+
+    >>> signed(-1.52), signed(None), signed(0.114, "%")
+    ('−1.5 mm', '–', '0.11 %')
+    """
+    if not known(value):
+        return DASH
+    text = f"{value:.{1 + (abs(value) < 0.95)}f}"
+    return (text.replace("-", "−") if float(text) else text.lstrip("-")) + f" {unit}"
+
+
+def percent(share: float | None) -> str:
+    """A share in percent, with a decimal near nothing and near all.
+
+    Parameters
+    ----------
+    share : float or None
+
+    >>> percent(0.97), percent(0.9952), percent(None), percent(-0.1), percent(0.0004)
+    ('97 %', '99.5 %', '–', '−10 %', '0.0 %')
+    """
+    if not known(share):
+        return DASH
+    fine = 0 < abs(share) < 0.01 or 0.98 <= share < 1
+    return f"{100 * share:.{int(fine)}f} %".replace("-", "−")

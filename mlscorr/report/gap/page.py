@@ -1,0 +1,179 @@
+"""The pages of a diagnosis, and of what a survey could diagnose before it is driven."""
+
+from mlscorr.effects.wording import DASH, joined, known
+from mlscorr.report.gap.innovations import channel_style, innovations_figure
+from mlscorr.report.gap.labels import family, lowered, title, titles
+from mlscorr.report.gap.ladder import ladder, ladder_figure
+from mlscorr.report.gap.numbers import percent
+from mlscorr.report.gap.rows import (
+    bin_rows,
+    cause_rows,
+    detectable_rows,
+    meanings,
+    split_title,
+    worst_rows,
+)
+from mlscorr.report.gap.separability import detectable_figure, heat_figure
+from mlscorr.report.gap.settings import SETTINGS
+from mlscorr.report.gap.site_map import site_map
+from mlscorr.report.gap.splits import closure_figure, where_figure
+from mlscorr.report.gap.verdict import (
+    VerdictBox,
+    advice,
+    facts,
+    is_closed,
+    is_judged,
+    is_named,
+    shrunk,
+    smallest,
+    verdict,
+)
+from mlscorr.report.pages import Page, data_uri
+from mlscorr.report.style import svg
+
+SECTIONS = {  # in their order; one without anything to show is left out
+    "where": "Where it shows",
+    "innovations": "Over time",
+    "evidence": "Candidates",
+    "causes": "Causes in numbers",
+    "separability": "What can be told apart",
+    "closure": "How far it shrinks",
+    "map": "Map",
+    "next": "What to measure next",
+    "used": "What was compared",
+    "method": "Method",
+}
+PLANNED = {
+    "detectable": "How small an error would show",
+    "separability": SECTIONS["separability"],
+    "map": SECTIONS["map"],
+    "next": SECTIONS["next"],
+    "left": "What can't be judged",
+    "method": SECTIONS["method"],
+}
+
+
+def diagnosis_page(document: dict, name: str) -> Page:
+    """The self-contained page of a diagnosis.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json; what was not determined is None.
+    name : str
+        Of the survey.
+    """
+    separability, closure = document["separability"], document["closure"]
+    answer, detectable = document["verdict"], separability["detectable"]
+    is_clean = is_judged(document) and family(answer["label"]) == "none"
+    probable, unlikely = _by_probability(cause_rows(document))
+    figures = {
+        "where": _drawn(where_figure, document, document["where"]),
+        "innovations": _drawn(innovations_figure, document, document["innovations"]["gps_time"]),
+        "evidence": _drawn(ladder_figure, document, ladder(document)),
+        "closure": _drawn(closure_figure, document, is_closed(document)),
+        "map": _drawn(site_map, document, document["map"]["trajectory"]),
+    }
+    is_empty = {key: not figures[key] for key in ("where", "innovations", "evidence", "map")}
+    is_empty["separability"] = not separability["correlation"]["names"]
+    is_empty |= {"closure": not is_judged(document), "causes": not document["causes"]}
+    content = {
+        "figures": figures,
+        "verdict": verdict(document),
+        "facts": facts(document),
+        "smallest": smallest(detectable) if is_clean else [],
+        "splits_in_words": joined(lowered(split_title(split)) for split in document["where"]),
+        "bin_rows": bin_rows(document),
+        "shared": "what the cause explains" if is_named(document) else "the squared gap",
+        "in_set": joined(lowered(title(label)) for label in answer["set"]),
+        "cause_rows": probable,
+        "unlikely_rows": unlikely,
+        "meanings": meanings(document),
+        "smallest_rows": detectable_rows(detectable),
+        "closed": shrunk(closure) if is_closed(document) else "",
+        "tested": lowered(title(closure["effect"] or "none")),
+        "compared": bool(document["map"]["rows"]),
+        "channels": [(channel_style(key).words, n) for key, n in document["channels"].items()],
+        "already": titles(e["name"] for e in document["simulator"]["effects"]) or "none",
+    }
+    sections = {key: text for key, text in SECTIONS.items() if not is_empty.get(key)}
+    headline = f"{name}: what its simulator does not describe"
+    return _page(document, name, headline, "gap-summary.html", sections, separability, content)
+
+
+def plan_page(document: dict, name: str) -> Page:
+    """The self-contained page of what a planned survey could show.
+
+    Parameters
+    ----------
+    document : dict
+        The content of plan.json.
+    name : str
+        Of the survey.
+    """
+    rows = detectable_rows(document["detectable"])
+    worst = worst_rows(rows)
+    figures = {
+        "detectable": _drawn(detectable_figure, worst, any(known(row.ratio) for row in worst)),
+        "map": _drawn(site_map, document, document["map"]["trajectory"]),
+    }
+    is_empty = {"map": not figures["map"], "left": not document.get("left_out")}
+    content = {
+        "figures": figures,
+        "verdict": _plan_verdict(worst, document),
+        "detectable_rows": rows,
+        "smallest_rows": [],
+        "compared": False,
+    }
+    if document["advice"]:
+        content["advice_title"] = "What to add"
+    sections = {key: text for key, text in PLANNED.items() if not is_empty.get(key)}
+    headline = f"{name}: what this survey could show"
+    return _page(document, name, headline, "gap-plan-summary.html", sections, document, content)
+
+
+def _page(document, name, headline, summary, sections, separability, content):
+    """The Page with what both have."""
+    advice_title, sentences = advice(document)
+    parameters = separability["correlation"]["names"]
+    content["figures"]["heat"] = _drawn(heat_figure, separability, len(parameters) > 1)
+    common = {
+        "document": document,
+        "name": name,
+        "percent": percent,
+        "advice_title": advice_title,
+        "advice": sentences,
+        "classes": [titles(members) for members in separability["classes"]],
+        "parameter_count": len(parameters),
+        "left_out": [(title(k), why) for k, why in (document.get("left_out") or {}).items()],
+    }
+    if document.get("created"):
+        common["written"] = document["created"]
+    return Page(headline, summary, sections, common | content, "gap-", ("gap.css",))
+
+
+def _drawn(draw, value, is_there):
+    """A figure of a value as the address of an image; None where there is nothing to show."""
+    return data_uri(svg(draw(value))) if is_there else None
+
+
+def _by_probability(rows):
+    """Rows of causes that are likely, or chosen, and the others."""
+    least = SETTINGS.likely_probability
+    probable = [row for row in rows if row.chosen or (row.probability or 0.0) >= least]
+    probable = probable or rows[:1]
+    return probable, [row for row in rows if row not in probable]
+
+
+def _plan_verdict(worst, document):
+    """The verdict on a plan: what it can see, what not, and what it can't tell apart."""
+    visible = [row.title for row in worst if row.visible == "yes"]
+    hidden = [row.title for row in worst if row.visible not in ("yes", DASH)]
+    errors = "kind of error" if len(visible) == 1 else "kinds of error"
+    sentences = [f"{len(visible)} {errors} would show at the usual size, {len(hidden)} would not."]
+    if hidden:
+        sentences.append(f"Must be larger to show: {joined(map(lowered, hidden))}.")
+    classes = [titles(members) for members in document["classes"]]
+    sentences += [f"Not told apart: {lowered(members)}." for members in classes]
+    tone = "open" if hidden or classes else "good"
+    return VerdictBox(tone, "What this survey could show", sentences)

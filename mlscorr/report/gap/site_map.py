@@ -1,0 +1,120 @@
+"""The map of a diagnosis: trajectory, targets, and each row coloured by its innovation."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from mlscorr.report.gap.innovations import channel_style
+from mlscorr.report.gap.numbers import numbers
+from mlscorr.report.gap.settings import SETTINGS
+from mlscorr.report.map_frame import frame
+from mlscorr.report.settings import SETTINGS as REPORT_SETTINGS
+from mlscorr.report.style import GREY, MARKS, TRACK, label, legend_above, new_figure, styled
+from mlscorr.report.target_map import NEXT, NEXT_WORDS, mark_places
+
+ROLES = {"control": "Control point", "check": "Check point"}
+
+
+@styled
+def site_map(document: dict) -> Figure:
+    """Plan with the rows coloured by innovation, before and after side by side.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json; or of plan.json, which has no rows yet.
+    """
+    site = document["map"]
+    rows = site.get("rows") or []
+    states = ("before", "after") if rows else (None,)
+    low, high = _bounds(site, rows)
+    share = np.clip((high - low)[1] / (high - low)[0], 0.25, 1.6)
+    columns = 2 if share > 0.7 and rows else 1
+    lines = len(states) // columns
+    beside = 1.8  # inch: labels and colours
+    figure = new_figure(
+        0.8 + lines * (0.35 + (REPORT_SETTINGS.figure_width / columns - beside) * share)
+    )
+    figure.set_dpi(180)
+    panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for panel, state in zip(panels, states, strict=True):
+        colours = _draw(panel, site, rows, state)
+        frame(panel, low, high, 4)
+        panel.tick_params(labelsize=7.5)
+        panel.label_outer()
+    if rows:
+        bar = figure.colorbar(colours, ax=panels, shrink=0.8, pad=0.01, extend="both")
+        bar.set_label("Innovation (sigma)")
+    legend_above(figure, _legend(site, rows))
+    return figure
+
+
+def _bounds(site, rows):
+    """Lower left and upper right corner of all that is drawn, with a margin. Units: m."""
+    places = [place[:2] for place in site["trajectory"]]
+    places += [row["position"][:2] for row in (*site["targets"], *rows)]
+    points = np.array([numbers(place) for place in places] or [[0.0, 0.0], [1.0, 1.0]])
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    extent = max(float((high - low).max()), 1.0)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.12 * extent)
+    return middle - half - 0.04 * extent, middle + half + 0.04 * extent
+
+
+def _draw(panel, site, rows, state):
+    """Draw one state; returns what the colours are of, if there are any."""
+    track = np.array([numbers(place[:2]) for place in site["trajectory"]]).reshape(-1, 2)
+    panel.plot(*_parted(track).T, **TRACK, zorder=1)
+    colours, limit = None, SETTINGS.map_sigmas
+    for channel in dict.fromkeys(row["channel"] for row in rows):
+        part = [row for row in rows if row["channel"] == channel]
+        place, values = np.array([row["position"][:2] for row in part]), [r[state] for r in part]
+        values, is_target = numbers(values), channel == "target"
+        front = np.argsort(np.abs(np.nan_to_num(values)), kind="stable")
+        colours = panel.scatter(
+            *place[front].T, 26 if is_target else 9, values[front], vmin=-limit, vmax=limit,
+            marker=channel_style(channel).mark, cmap="RdYlBu_r", rasterized=True, zorder=3,
+            edgecolors="#444444" if is_target else "#999999",
+            linewidths=0.5 if is_target else 0.15,
+        )  # fmt: skip
+    _draw_targets(panel, site["targets"])
+    mark_places(panel, [place[:2] for place in site.get("next_control") or []])
+    if state is not None:
+        panel.set_title(state.capitalize())
+    return colours
+
+
+def _parted(track):
+    """The track with NaN where it leaps, so that no line crosses from pass to pass."""
+    step = np.hypot(*np.diff(track, axis=0).T)
+    usual = np.median(step[step > 0]) if (step > 0).any() else np.inf
+    leaps = np.flatnonzero(step > SETTINGS.pause_steps * usual)
+    return np.insert(track, leaps + 1, np.nan, axis=0)
+
+
+def _draw_targets(panel, targets):
+    for role in ROLES:
+        places = [target["position"][:2] for target in targets if target["role"] == role]
+        if places:
+            symbol = MARKS[role] | {"markerfacecolor": "none", "markersize": 8}
+            panel.plot(*np.array(places).T, linestyle="none", zorder=4, **symbol)
+    for target in targets[: SETTINGS.map_names]:
+        panel.annotate(
+            label(target["name"]), target["position"][:2], xytext=(5, 4), fontsize=6.5,
+            textcoords="offset points", parse_math=False, zorder=5, annotation_clip=True,
+        )  # fmt: skip
+
+
+def _legend(site, rows):
+    handles = [Line2D([], [], label="Trajectory", **TRACK)]
+    for role, words in ROLES.items():
+        if any(target["role"] == role for target in site["targets"]):
+            symbol = MARKS[role] | {"markerfacecolor": "none", "markersize": 7}
+            handles.append(Line2D([], [], linestyle="none", label=words, **symbol))
+    if site.get("next_control"):
+        handles.append(Line2D([], [], label=NEXT_WORDS, **NEXT))
+    for channel in dict.fromkeys(row["channel"] for row in rows):
+        symbol = {"marker": channel_style(channel).mark, "markersize": 4, "color": GREY}
+        handles.append(
+            Line2D([], [], linestyle="none", label=channel_style(channel).words, **symbol)
+        )
+    return handles

@@ -1,0 +1,347 @@
+"""What the first screen of a diagnosis says: what is wrong, how sure, how far the gap shrinks."""
+
+from typing import NamedTuple
+
+from mlscorr.effects import Effect
+from mlscorr.effects.wording import DASH, joined, known, size
+from mlscorr.report.gap.labels import family, lowered, meaning, sentences_of, title
+from mlscorr.report.gap.numbers import percent, signed
+
+CERTAINTY = (  # probability from which on one says so
+    (0.99, "practically certain"),
+    (0.9, "very likely"),
+    (0.66, "likely"),
+    (0.5, "more likely than not"),
+    (0.0, "only the likeliest of several"),
+)
+NUMBER_WORDS = ("none", "one", "two", "three", "four")
+SCATTER = "This is scatter: no correction takes it off, but accuracies must be stated larger."
+NEGATIVE = "It is what the two differ by beyond chance; below zero: less than by chance."
+GAPS = {  # by the kind of gap that a closure measures
+    "systematic": "Systematic part of the gap (a mean over all rows)",
+    "scatter": "Scatter beyond the stated one",
+    "returns": "Returns beyond the expected ones",
+}
+
+
+class VerdictBox(NamedTuple):
+    """The box with the verdict.
+
+    Parameters
+    ----------
+    tone : str
+        good, bad or open.
+    kicker : str
+        Above the sentences.
+    sentences : list of str
+    large : int
+        How many of them, from the first, are the verdict itself.
+    """
+
+    tone: str
+    kicker: str
+    sentences: list[str]
+    large: int = 1
+
+
+class Fact(NamedTuple):
+    """A number beside the verdict: what it is, it, and more in words."""
+
+    title: str
+    number: str
+    more: str = ""
+
+
+def verdict(document: dict) -> VerdictBox:
+    """The box with the verdict of a diagnosis.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    answer, kind = document["verdict"], family(document["verdict"]["label"])
+    if not is_judged(document):
+        short = "Too little of this survey could be compared with the simulator."
+        return VerdictBox("open", "It can't be told yet", [answer["sentence"] or short])
+    make = {"none": _nothing, "unknown": _unknown}.get(kind, _cause)
+    box = make(document)
+    others = not_ruled_out(document)
+    more = [f"Not ruled out: {others}."] if others else []
+    return box._replace(sentences=[*box.sentences, *more])
+
+
+def is_judged(document: dict) -> bool:
+    """Whether anything could be compared at all.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    answer = document["verdict"]
+    return bool(answer["label"]) and known(answer["probability"]) and bool(document["evidence"])
+
+
+def is_named(document: dict) -> bool:
+    """Whether the verdict names a cause.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    return is_judged(document) and family(document["verdict"]["label"]) in ("effect", "noise")
+
+
+def is_closed(document: dict) -> bool:
+    """Whether anything was put into the simulator.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    closure = document["closure"]
+    return closure["effect"] not in (None, "", "none") and known(closure["shrink"])
+
+
+def _nothing(document):
+    kicker = "Nothing is wrong that this survey could show"
+    if document["verdict"]["set"] != ["none"]:
+        kicker = "Nothing is shown to be wrong, but not all is ruled out"
+    text = (
+        "The survey and its simulation differ by no more than chance makes them differ. An error "
+        "smaller than the sizes below might not have shown."
+    )
+    return VerdictBox("good", kicker, [text])
+
+
+def _unknown(document):
+    answer = document["verdict"]
+    if answer.get("hidden"):
+        return VerdictBox(
+            "open", "Nothing shows, but not everything was seen", [answer["sentence"]]
+        )
+    lead = answer["lead"].rstrip(".")
+    text = f"It looks like: {lead}." if lead else "It can't be said what it looks like."
+    more = "This is a lead to follow, not a cause: whatever behaves like that may have made it."
+    return VerdictBox("open", "Something is wrong that no known effect explains", [text, more])
+
+
+def _cause(document):
+    answer, label = document["verdict"], document["verdict"]["label"]
+    sentences, others = _sentences(document, label), _same(document)
+    parts, large = label.count("+") + 1, len(sentences)
+    if others:
+        either, *more = [lowered(" ".join(_sentences(document, name))) for name in (label, *others)]
+        sentences = [f"Either {either}", *(f"Or {text}" for text in more)]
+        large = len(sentences)
+        kicker = f"One of {_number_word(large)} is wrong; this survey can't tell which"
+    elif parts > 1:
+        kicker = f"{_number_word(parts).capitalize()} things are wrong"
+    elif family(label) == "noise":
+        kicker, sentences = "Noisier than stated", [*sentences, SCATTER]
+    else:
+        kicker = "One thing is wrong" if answer["probability"] >= 0.5 else "Possibly wrong"
+    return VerdictBox("bad", kicker, sentences, large)
+
+
+def _number_word(number):
+    return NUMBER_WORDS[number] if number < len(NUMBER_WORDS) else str(number)
+
+
+def _same(document):
+    """Labels that this survey can't tell from the verdict's at its size."""
+    answer = document["verdict"]
+    return [name for name in answer["same"] if name != answer["label"]]
+
+
+def _sentences(document, label):
+    """A sentence with its numbers for each effect of a label; what it is, where it has none."""
+    cause = next((cause for cause in document["causes"] if cause["effect"] == label), None)
+    if cause is None:
+        return [meaning(label)]
+    return sentences_of(label, cause["parameters"], lambda kind: _where(document, cause, kind))
+
+
+def _where(document, cause, kind: type[Effect]):
+    """When an effect acts, or on which target, in words."""
+    if kind.is_on_target():
+        return f"target {cause['target']}" if cause.get("target") else "one target"
+    for window in document["windows"]:
+        start, end = window["start"], window["end"]
+        if window["effect"] == kind.name and known(start) and known(end):
+            if end - start < 1.0:  # times are written in whole seconds
+                return f" at gps_time {start:.1f} s"
+            return f" between gps_time {start:.0f} s and {end:.0f} s"
+    return ""
+
+
+def not_ruled_out(document: dict) -> str:
+    """Labels of the 95 % set besides the verdict's own, with their probabilities, in words.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    answer, share = document["verdict"], _probabilities(document)
+    names = [name for name in answer["set"] if name not in {answer["label"], *answer["same"]}]
+    return joined([f"{lowered(title(n))} ({in_hundred(share.get(n))})" for n in names], "or")
+
+
+def _probabilities(document):
+    """Probability of each label that is known."""
+    share = {cause["effect"]: cause["probability"] for cause in document["causes"]}
+    return share | {rung["label"]: rung["probability"] for rung in document["evidence"]}
+
+
+def facts(document: dict) -> list[Fact]:
+    """The numbers beside the verdict: how sure, where it shows most, how far it shrinks.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    if not is_judged(document):
+        return []
+    gap, headline = document["gap"], document["headline"]
+    if not is_named(document) and not is_closed(document):
+        whole = Fact("The gap between survey and simulation", headline, NEGATIVE)
+        return [_certainty(document), whole]
+    is_pattern = _is_within(gap["before"], gap["null_band"])
+    more = "What gives it away is its pattern, not its size." if is_pattern else ""
+    where = Fact("Where it shows most", headline, more)
+    return [_certainty(document), where, _shrinking(document)]
+
+
+def _certainty(document):
+    answer, share = document["verdict"], _probabilities(document)
+    share = answer["probability"] + sum(share.get(name) or 0.0 for name in _same(document))
+    share = min(1.0, share)
+    words = next(words for least, words in CERTAINTY if share >= least)
+    more = [chance(answer["p_value"]), "± is one sigma." if is_named(document) else ""]
+    return Fact("How sure", f"{in_hundred(share)}: {words}", " ".join(filter(None, more)))
+
+
+def in_hundred(share: float | None) -> str:
+    """A probability in words.
+
+    Parameters
+    ----------
+    share : float or None
+
+    >>> in_hundred(0.9817), in_hundred(0.999), in_hundred(0.002), in_hundred(None)
+    ('98 in 100', 'more than 99 in 100', 'less than 1 in 100', '–')
+    """
+    if not known(share):
+        return DASH
+    if share >= 0.995:
+        return "more than 99 in 100"
+    return f"{100 * share:.0f} in 100" if share >= 0.005 else "less than 1 in 100"
+
+
+def chance(p_value: float | None) -> str:
+    """How often a survey in which nothing is wrong would look as odd.
+
+    Parameters
+    ----------
+    p_value : float or None
+
+    >>> chance(0.04976), chance(1e-19)
+    ('Of 100 surveys in which nothing is wrong, 5 would look as odd.', 'Of 10 000 surveys in which
+    nothing is wrong, not one would look as odd.')
+    """
+    if not known(p_value):
+        return ""
+    number = next((n for n in (100, 1000) if round(n * p_value) > 0), 10_000)
+    count = f"{number * p_value:.0f}" if p_value >= 1e-4 else "not one"
+    words = f"{number:,}".replace(",", " ") if number > 1000 else number
+    return f"Of {words} surveys in which nothing is wrong, {count} would look as odd."
+
+
+def _is_within(value, band):
+    """Whether a gap is what it may be when nothing is wrong; not, when one is not known."""
+    return all(map(known, [value, *band])) and value <= band[1]
+
+
+def _shrinking(document):
+    """How far the gap shrinks once the simulator has the cause."""
+    closure, gap = document["closure"], document["gap"]
+    if not is_closed(document):
+        before, more = signed(gap["before"], gap["unit"]), f"When nothing is wrong: {span(gap)}."
+        return Fact("The gap between survey and simulation", before, more)
+    pair = " → ".join(signed(closure[when], closure["unit"]) for when in ("before", "after"))
+    if document["verdict"]["label"] == "unknown":
+        nearest = f"With the nearest known effect, {lowered(title(closure['effect']))},"
+        return Fact(f"{nearest} in the simulator", pair, shrunk(closure))
+    more = ""
+    if _is_within(closure["after"], closure["null_band"]):
+        more = " What is left is what chance leaves when nothing is wrong."
+    part = f"{GAPS.get(closure.get('kind'), 'Gap')} on held-out data"
+    return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)
+
+
+def shrunk(closure: dict) -> str:
+    """By how much the squared gap shrinks, with its interval, in words.
+
+    Parameters
+    ----------
+    closure : dict
+        Of gap.json.
+    """
+    (low, high), share, between = closure["interval"], closure["shrink"], ""
+    if known(low) and known(high):
+        between = f" (95 %: {percent(low)} to {percent(min(high, 1.0))})"
+    if share < 0:
+        text = f"The squared gap grew by {percent(-share)}{between}."
+    else:
+        part = "All" if share > 1 else percent(share)
+        text = f"{part} of the squared gap is gone{between}."
+    if _is_within(closure["before"], closure["null_band"]):
+        text += " Before, it was within chance already: the share says little."
+    return text
+
+
+def span(gap: dict) -> str:
+    """What a gap is when nothing is wrong, in words.
+
+    Parameters
+    ----------
+    gap : dict
+        Of gap.json.
+    """
+    if not all(map(known, gap["null_band"])):
+        return DASH
+    return " to ".join(signed(end, gap["unit"]) for end in gap["null_band"])
+
+
+def advice(document: dict) -> tuple[str, list[str]]:
+    """What to do now: a title and sentences.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json or plan.json.
+    """
+    if document["advice"]:
+        return "What to do now", document["advice"]
+    return "What to measure next", [f"Measure {r['survey']}." for r in document["next_data"]]
+
+
+def smallest(detectable: dict[str, list[dict]]) -> list[tuple[str, str]]:
+    """Each effect in words and the smallest size of it that shows, by its worst part.
+
+    Parameters
+    ----------
+    detectable : dict
+        By effect, of gap.json.
+    """
+    rows = []
+    for effect, parts in detectable.items():
+        sizes = [part["detectable"] for part in parts]
+        worst = max(sizes) if sizes and all(map(known, sizes)) else None
+        rows.append((title(effect), size(worst, None, parts[0]["unit"] if parts else "")))
+    return rows

@@ -1,0 +1,43 @@
+"""What all maps share: the track of a drive, equal scales, whole metres as tick labels."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from mlscorr.report.style import break_at_gaps, thin
+from mlscorr.survey import Trajectory
+
+
+def track(trajectory: Trajectory) -> np.ndarray:
+    """Thinned plan positions (m, 2) of a trajectory, with NaN at its gaps. Units: m.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    """
+    plan = trajectory.position[:, :2]
+    rows = thin(plan, trajectory.gps_time, trajectory.gaps)
+    return break_at_gaps(trajectory.gps_time[rows], trajectory.gaps, plan[rows])[1]
+
+
+def frame(axes: Axes, low: np.ndarray, high: np.ndarray, ticks: int = 5) -> None:
+    """Limits, equal scale on both axes, and whole metres as tick labels.
+
+    Parameters
+    ----------
+    axes : Axes
+    low, high : (2,) array
+        Corners. Units: m.
+    ticks : int
+        Intervals of an axis, at most.
+    """
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    for axis, name in ((axes.xaxis, "Easting (m)"), (axes.yaxis, "Northing (m)")):
+        axis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10], min_n_ticks=2))
+        decimals = 0 if np.ptp(axis.get_view_interval()) > 5 else 1
+        axis.set_major_formatter(
+            FuncFormatter(lambda v, _, d=decimals: f"{v:,.{d}f}".replace(",", " "))
+        )
+        axis.set_label_text(name)

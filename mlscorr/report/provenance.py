@@ -1,0 +1,118 @@
+"""What a correction was made of: files, coordinate and time systems, beliefs, coverage."""
+
+import numpy as np
+
+from mlscorr.correction import Correction
+from mlscorr.report.correction_report import CorrectionReport, FileRow
+from mlscorr.report.tables import number, thousands
+from mlscorr.survey import Survey
+
+FRAMES = (
+    ("Map", "easting, northing, height in m, as the files have them"),
+    ("Body", "X right, Y forward, Z up, at the trajectory's navigation centre"),
+    (
+        "Attitude",
+        "heading clockwise from grid north, pitch nose up, roll right side down; "
+        "R = Rz(−heading) Rx(pitch) Ry(roll)",
+    ),
+)
+
+TIMES = {"week": "GPS seconds of week", "standard": "adjusted standard GPS time"}
+
+
+def systems(survey: Survey) -> list[tuple[str, str]]:
+    """Pairs (what, value) on systems, frames, and what was believed of the instruments."""
+    trajectory, time = survey.trajectory, survey.trajectory.gps_time
+    crs = survey.crs or "not stated in survey.toml; coordinates are taken as E, N, H in m"
+    pairs = [("Coordinate reference system", crs)]
+    pairs += [(f"Frame: {name[:1].lower()}{name[1:]}", text) for name, text in FRAMES]
+    pairs.append(("Time of the trajectory", f"gps_time {time[0]:.3f} to {time[-1]:.3f} s"))
+    pairs += [(f"Time of {cloud.path.name}", _time(cloud)) for cloud in survey.clouds]
+    rate = 1 / np.median(np.diff(time))
+    pairs.append(("Epochs of the trajectory", f"{thousands(len(time))} at {rate:.4g} Hz"))
+    if trajectory.position_sigma is None:
+        sigma = f"{survey.pos.position_sigma:g} m at all times, as survey.toml or the default says"
+    else:
+        sigma = "its own at each epoch"
+    pairs.append(("Stated sigma of the trajectory's position", sigma))
+    arm = survey.mounting
+    text = "not given (not needed: it cancels where only the trajectory is corrected)"
+    if arm is not None:
+        text = f"right, forward, up {', '.join(f'{v:g}' for v in arm.lever_arm)} m"
+    return [*pairs, ("Lever arm of the scanner", text)]
+
+
+def _time(cloud):
+    system = TIMES.get(cloud.time_system, cloud.time_system)
+    if not cloud.time_constant:
+        return f"{system}, as the trajectory's"
+    return f"{system}; {cloud.time_constant:+.3f} s gives the trajectory's"
+
+
+def files(report: CorrectionReport) -> dict[str, list[tuple[str, str, str, str]]]:
+    """Rows (what, name, size in words, SHA-256) of what went in and what came out.
+
+    Parameters
+    ----------
+    report : CorrectionReport
+    """
+    groups = {"Read": report.inputs, "Written": report.files + report.outputs}
+    return {
+        title: [(row.what or "corrected cloud", row.name, _size(row), row.sha256) for row in rows]
+        for title, rows in groups.items()
+        if rows
+    }
+
+
+def _size(row: FileRow):
+    if row.points is not None:
+        return f"{thousands(row.points)} points"
+    return "–" if row.bytes is None else f"{thousands(row.bytes)} bytes"
+
+
+def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str, object]]:
+    """Pairs (what, value) on what the control points and the trajectory cover.
+
+    Parameters
+    ----------
+    correction : Correction
+    report : CorrectionReport
+    """
+    covered, total = report.coverage, report.cloud_points
+    time = correction.recorded.gps_time
+
+    def span(first, last):
+        return f"{first:.3f} to {last:.3f} s ({last - first:.1f} s)"
+
+    def points(n):
+        return thousands(n) + (f" ({100 * n / total:.2f} %)" if n and total else "")
+
+    return [
+        ("Trajectory", span(time[0], time[-1])),
+        (
+            "Control span (first to last control epoch)",
+            span(*covered.control_span) if report.control.n else "no control point takes part",
+        ),
+        ("Longest time without control", f"{number(covered.longest_gap_s)} s"),
+        (
+            "Points outside the trajectory (left as they were)",
+            points(covered.points_outside_trajectory),
+        ),
+        (
+            "Points before the first or past the last control point",
+            points(covered.points_outside_control),
+        ),
+        (
+            "Points whose correction is extrapolated: no control point holds them",
+            points(covered.points_extrapolated),
+        ),
+        (
+            "Time and way whose correction is extrapolated",
+            f"{number(report.seconds_extrapolated, 1)} s, "
+            f"{number(report.metres_extrapolated, 0)} m",
+        ),
+        (
+            "Gaps of the trajectory (nothing is interpolated across them)",
+            len(correction.recorded.gaps),
+        ),
+    ]

@@ -1,0 +1,53 @@
+"""The numbers that pages, figures and pictures are made with."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Sizes and limits of what the report shows.
+
+    None of them changes a result; they were set by looking at the pages of wuhan_drive and of the
+    practice surveys, on a screen and on paper, where no other source is named. Sizes of letters
+    and lines of figures are those of ``mlscorr.report.style.STYLE``.
+    """
+
+    # words and figures
+    difference: float = 0.002  # m; surveying a target tells no less, so no axis is finer either
+    figure_width: float = 7.6  # inch: A4 without its margins
+    dots_per_inch: int = 200  # of PNGs: letters of 8.5 pt stay sharp on paper
+    curve_epochs: int = 3000  # rows of a curve: two for each dot of a figure's width
+    longest_arrow: float = 0.12  # of the map's width
+    axis_names: int = 60  # more names under an axis would touch each other
+
+    # targets, as they were found
+    ellipse_scale: float = 10.0  # one sigma itself is too small to be seen
+    low_score: float = 0.9  # most true targets have more; less is a reason to look, not to reject
+    target_figure: tuple[float, float] = (1.85, 2.15)  # inch
+
+    # what is taken of the cloud
+    sample_points: int = 1_000_000  # of each part; up to twice as many while they are gathered
+    plan_cell: float = 2.0  # m, of the grid that tells what is near a target, and of walls
+    viewer_points: tuple[int, int] = (36_000, 24_000)  # even and near targets: 3 MB of a page
+    close_ups: int = 24  # targets: 15 MB of a page
+    panel: tuple[int, int] = (640, 480)  # pixels
+    close_up: tuple[int, int] = (440, 330)  # pixels, as the page shows it: so are its letters
+
+    # how pictures are taken of it
+    canvas_bytes: float = 400e6  # B: as many views as fit are drawn at once, the others after them
+    picture_sizes: tuple[int, int] = (64, 8192)  # pixels, the least and largest width and height
+    page_margins: tuple[float, float, float, float] = (0.012, 0.105, 0.11, 0.045)
+    # of width or height: beside the panels, above and below them, between stacked ones
+    open3d_timeout: float = 60.0  # s for a pair of pictures; a software driver takes some 5 s
+    largest_street: float = 250.0  # m; more is seen from above, where its streets don't overlap
+    sideways_angle: float = 50.0  # deg, at most, to see all of a target's misclosure
+    visible: float = 0.01  # m, a misclosure that is looked at from aside
+    section_half_width: tuple[float, float] = (1.0, 6.0)  # m, at least and at most
+    wall_height: float = 1.5  # m, of the least wall
+    wall_flatness: float = 0.05  # m, the largest standard deviation of its points from a plane
+    facades: int = 20  # of ties, where passes lie the farthest apart: some of them are well covered
+    plane_points: int = 15  # that tell how a wall or a target is turned
+    visit_pause: float = 10.0  # s between two visits of one place
+
+
+SETTINGS = Settings()

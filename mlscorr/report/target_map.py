@@ -1,0 +1,194 @@
+"""The map: trajectory, targets and their horizontal residuals as arrows."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from mlscorr.correction import Correction
+from mlscorr.report.correction_report import GROUPS, CorrectionReport, array, ordered
+from mlscorr.report.map_frame import frame, track
+from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import (
+    AFTER,
+    BEFORE,
+    MARKS,
+    TRACK,
+    label,
+    legend_above,
+    mark_handles,
+    new_figure,
+    nice,
+    styled,
+)
+
+WORDS = {"control": "Control point", "check": "Check point", "unused": "Not used"}
+NEXT: dict[str, Any] = {
+    "color": "#009e73",
+    "marker": "*",
+    "markersize": 11.0,
+    "linestyle": "none",
+    "zorder": 6,
+}
+NEXT_WORDS = "Where another control point helps most"
+
+
+@styled
+def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
+    """Plan of the trajectory and the targets with residual arrows before and after.
+
+    Parameters
+    ----------
+    correction : Correction
+    report : CorrectionReport
+    """
+    way = track(correction.corrected)
+    rows = ordered(report.targets)
+    points = np.vstack([way[np.isfinite(way).all(axis=1)], array(rows, "surveyed")[:, :2]])
+    extent = max(float(np.ptp(points, axis=0).max()), 1.0)
+    arrows = [row for row in ordered(rows, "control", "check") if row.is_observed]
+    times = _enlargement(array(arrows, "before")[:, :2], extent)
+    tips = array(arrows, "surveyed")[:, :2] + times * array(arrows, "before")[:, :2]
+    low, high, strip = _bounds(np.vstack([points, tips]), extent)
+    width, height = high - low
+    figure = new_figure(1.25 + (SETTINGS.figure_width - 1.1) * height / width)
+    axes = figure.add_subplot()
+    axes.plot(*way.T, **TRACK)
+    short = _arrows(axes, arrows, times, 0.008 * width) if times else 0  # hides under its mark
+    for group in GROUPS[::-1]:
+        places = array(ordered(rows, group), "surveyed")
+        axes.plot(*places[:, :2].T, linestyle="none", **MARKS[group])
+    _names(axes, rows, width)
+    mark_places(axes, [(place.easting, place.northing) for place in report.next_control])
+    frame(axes, low, high)
+    axes.set_title("Where the targets lie, and their horizontal residuals")
+    _key(axes, low, high, strip, times)
+    handles = _legend(rows, len(arrows), times, short)
+    handles += [Line2D([], [], label=NEXT_WORDS, **NEXT)] * bool(report.next_control)
+    legend_above(figure, handles)
+    return figure
+
+
+def mark_places(axes: Axes, places: Sequence[tuple[float, float]]) -> None:
+    """Number the places where another control point belongs, the best first.
+
+    Parameters
+    ----------
+    axes : Axes
+        Of a map.
+    places : sequence of (easting, northing)
+        Units: m.
+    """
+    for number, place in enumerate(places, start=1):
+        axes.plot(*place, **NEXT)
+        axes.annotate(
+            str(number), place, xytext=(6, 5), textcoords="offset points",
+            color=NEXT["color"], fontsize=9, fontweight="bold", zorder=6,
+        )  # fmt: skip
+
+
+def _enlargement(residuals, extent):
+    """How many times the arrows are larger than the map: 1, 2, 5, 10, ...; 0 without arrows."""
+    longest = np.hypot(*residuals.T).max(initial=0.0)
+    return nice(SETTINGS.longest_arrow * extent / longest) if longest > 0 else 0.0
+
+
+def _bounds(points, extent):
+    """Lower left and upper right corner with a margin, and the height of the strip at the foot.
+
+    The strip is kept free of data for the scale bar and the north arrow.
+    """
+    low, high = points.min(axis=0) - 0.06 * extent, points.max(axis=0) + 0.06 * extent
+    size = high - low
+    extent_drawn = np.maximum(size, [size[1], 0.4 * size[0]])
+    low, high = low - (extent_drawn - size) / 2, high + (extent_drawn - size) / 2
+    strip = 0.11 * extent_drawn[0]
+    return low - [0.0, strip], high, strip
+
+
+def _arrows(axes, rows, times, shortest):
+    """Draw horizontal residuals from the surveyed place, broad before and thin after.
+
+    Returns how many after the correction are too short to draw.
+    """
+    place = array(rows, "surveyed")[:, :2]
+    for name, color, width in (("before", BEFORE, 0.026), ("after", AFTER, 0.018)):
+        residual = times * array(rows, name)[:, :2]
+        long = np.hypot(*residual.T) > shortest
+        _quiver(axes, place[long], residual[long], color, width)
+    return int((~long).sum())
+
+
+def _quiver(axes, place, vector, color, width):
+    style = {"units": "inches", "angles": "xy", "scale_units": "xy", "scale": 1.0, "zorder": 3}
+    heads = {"headwidth": 4.5, "headlength": 5.0}
+    axes.quiver(*place.T, *vector.T, color=color, width=width, **style, **heads)
+
+
+def _names(axes, rows, width):
+    """Each target's name once, beside its arrow; left out where it would cover another name."""
+    taken, letter = np.empty((0, 4)), np.array([0.0105, 0.018]) * width  # m on the map
+    for name, row in {row.name: row for row in rows[::-1]}.items():
+        text = label(name)
+        side = -1 if row.before[0] > 0 else 1
+        half = letter * [len(text) / 2, 0.5]
+        middle = np.add(row.surveyed[:2], [side * (half[0] + letter[0]), 0.0])
+        apart = np.abs(taken[:, :2] - middle) >= taken[:, 2:] + half
+        if not apart.any(axis=1).all():
+            continue
+        taken = np.vstack([taken, [*middle, *half]])
+        axes.annotate(
+            text,
+            row.surveyed[:2],
+            xytext=(5 * side, 0),
+            textcoords="offset points",
+            horizontalalignment="left" if side > 0 else "right",
+            verticalalignment="center",
+            fontsize=7,
+            parse_math=False,
+            zorder=5,
+        )
+
+
+def _key(axes, low, high, strip, times):
+    """Scale bar, arrow scale and north arrow in the free strip at the foot."""
+    width = high[0] - low[0]
+    axes.axhspan(low[1], low[1] + strip, color="white", zorder=2.5)
+    axes.axhline(low[1] + strip, color="#bbbbbb", linewidth=0.6, zorder=2.6)
+    middle, top = low[1] + 0.35 * strip, low[1] + 0.62 * strip
+    text = {"horizontalalignment": "left", "verticalalignment": "center", "fontsize": 8.5}
+    bar, west = nice(0.22 * width), low[0] + 0.03 * width
+    axes.plot([west, west + bar], [middle] * 2, color="black", linewidth=3, zorder=3)
+    axes.text(west, top, f"{bar:g} m on the map", **text)
+    if times:
+        west = low[0] + 0.36 * width
+        length = nice(SETTINGS.longest_arrow * width / times)
+        _quiver(axes, np.array([[west, middle]]), np.array([[times * length, 0]]), "black", 0.02)
+        axes.text(
+            west, top, f"Residual of {length:g} m (arrows enlarged {times:,.0f} times)", **text
+        )
+    east = low[0] + 0.95 * width
+    axes.annotate(
+        "N",
+        (east, low[1] + 0.9 * strip),
+        xytext=(east, low[1] + 0.22 * strip),
+        arrowprops={"arrowstyle": "-|>", "color": "black", "linewidth": 1.4},
+        horizontalalignment="center",
+        verticalalignment="center",
+        fontweight="bold",
+        zorder=4,
+    )
+
+
+def _legend(rows, arrows, times, short):
+    """Legend entries of what is really drawn."""
+    handles = [Line2D([], [], label="Trajectory (corrected)", **TRACK)]
+    handles += mark_handles(WORDS, {row.group for row in rows})
+    if times:
+        hidden = f" ({short} of {arrows} too short to show)" if short else ""
+        for text, color in (("Residual before", BEFORE), (f"Residual after{hidden}", AFTER)):
+            handles.append(Line2D([], [], color=color, linewidth=2.5, label=text))
+    return handles

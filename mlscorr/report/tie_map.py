@@ -1,0 +1,75 @@
+"""The map of what two passes both saw, coloured by how far apart they lie there."""
+
+import numpy as np
+from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from mlscorr.correction import Correction
+from mlscorr.estimate import TieResiduals
+from mlscorr.report.map_frame import frame, track
+from mlscorr.report.render.quantities import colour_table
+from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import MARKS, TRACK, legend_above, new_figure, styled
+
+STATES = ("Before the correction", "After the correction")
+
+
+@styled
+def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
+    """Plan of the ties, before and after: side by side, or one above the other on a long street.
+
+    Parameters
+    ----------
+    correction : Correction
+    residuals : TieResiduals
+        What the correction leaves of the ties.
+    """
+    way, used = track(correction.corrected), residuals.used
+    places = residuals.ties.place.mean(axis=1)[:, :2]
+    misfits = [1000 * np.abs(v) for v in (residuals.ties.misclosure, residuals.after)]  # mm
+    low, high = _bounds(np.vstack([way[np.isfinite(way).all(axis=1)], places]))
+    share = (high - low)[1] / (high - low)[0]
+    columns = 2 if share > 0.7 else 1
+    lines, beside = 2 // columns, 1.8  # inch: labels and colours
+    height = 0.8 + lines * (0.35 + (SETTINGS.figure_width / columns - beside) * share)
+    figure = new_figure(height)
+    figure.set_dpi(SETTINGS.dots_per_inch)
+    panels = figure.subplots(lines, columns, sharex=True, sharey=True).ravel()
+    largest = max(np.max(misfit[used], initial=10.0) for misfit in misfits)
+    scale = {"norm": LogNorm(1.0, largest), "cmap": ListedColormap(colour_table("sigma") / 255)}
+    for panel, misfit, title in zip(panels, misfits, STATES, strict=True):
+        panel.plot(*way.T, **TRACK, zorder=1)
+        panel.plot(*places[~used].T, linestyle="none", zorder=2, rasterized=True, **MARKS["unused"])
+        front = np.flatnonzero(used)[np.argsort(misfit[used], kind="stable")]  # the worst on top
+        dots = panel.scatter(
+            *places[front].T, 9, np.maximum(misfit[front], 1.0), linewidths=0, zorder=3,
+            rasterized=True, **scale,
+        )  # fmt: skip
+        frame(panel, low, high, 4)
+        panel.set_title(title)
+        panel.label_outer()
+    bar = figure.colorbar(dots, ax=panels, pad=0.01, extend="min", format="%g")
+    bar.set_label("How far apart the two passes lie (mm)")
+    legend_above(figure, _legend(used))
+    return figure
+
+
+def _bounds(points):
+    """Corners of all that is drawn, with a margin; no map is a thin line. Units: m."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = max(float((high - low).max()), 1.0)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.1 * extent) + 0.04 * extent
+    return middle - half, middle + half
+
+
+def _legend(used):
+    """Legend entries of what is drawn."""
+    handles = [Line2D([], [], label="Trajectory (corrected)", **TRACK)]
+    dot = {"linestyle": "none", "marker": "o", "markersize": 3, "color": "#5b2a86"}
+    if used.any():
+        handles.append(Line2D([], [], label="Seen by two passes", **dot))
+    if not used.all():
+        words = "Not used: contradicts the others"
+        handles.append(Line2D([], [], linestyle="none", label=words, **MARKS["unused"]))
+    return handles

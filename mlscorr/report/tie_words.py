@@ -1,0 +1,80 @@
+"""What ties between passes did, in sentences for a reader who never heard of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mlscorr.report.tables import length_in_words, thousands
+
+
+def tie_sentences(section: dict[str, Any] | None, control: int) -> list[str]:
+    """What two passes both saw, how far apart they are, and what that spares.
+
+    Parameters
+    ----------
+    section : dict or None
+        ``ties`` of report.json.
+    control : int
+        Number of control points that took part.
+
+    Returns
+    -------
+    list of str
+        Why there are none in one sentence; nothing where nobody looked for any.
+    """
+    if section is None:
+        return []
+    if section["n"] == 0:
+        return [section["reason"]]
+    if section["used"] == 0:
+        return [
+            f"None of the {thousands(section['n'])} places that two passes both saw is used, since "
+            "more than half of them contradict the others: "
+            + ("control points alone made the correction." if control else "passes stay apart.")
+        ]
+    return [*_misfit(section), *_share(section, control)]
+
+
+def _misfit(section):
+    """How far apart passes lay and lie, and how many ties contradict the others."""
+    before, after = (length_in_words(section[state]["median"]) for state in ("before", "after"))
+    yield (
+        f"Two passes both saw the same wall, road surface or pole in {thousands(section['n'])} "
+        f"places: there they lay {before} apart before the correction and lie {after} apart after "
+        "it (median)."
+    )
+    wrong = section["n"] - section["used"]
+    if wrong:
+        yield (
+            f"{thousands(wrong)} of these places {'is' if wrong == 1 else 'are'} not used, as the "
+            "others contradict them: cars that moved, people, leaves, or one row of windows taken "
+            "for the next."
+        )
+
+
+def _share(section, control):
+    """What control and ties each bring, and how many control points would have done."""
+    if control == 0:
+        yield (
+            "This is relative only; nothing is claimed in absolute terms: no control point takes "
+            "part, and an error that all passes share stays in the cloud."
+        )
+        return
+    share = 100 * section["share"]["control"]
+    percent = "less than 1" if share < 1 else f"{share:.0f}"
+    rest = "more than 99" if share < 1 else f"{100 - round(share):.0f}"
+    yield (
+        f"Of what the result knows of the drive, {percent} % comes from control points and "
+        f"{rest} % from these places."
+    )
+    sufficient = section["sufficient_control"]
+    if sufficient is None or control < 2:
+        return
+    if sufficient < control:
+        points = "1 of them" if sufficient == 1 else f"{sufficient} of them, evenly spread,"
+        yield (
+            f"{control} control points took part; {points} would have sufficed to know the drive "
+            "about as well (to a tenth of its sigma)."
+        )
+    else:
+        yield f"All {control} control points were needed: with fewer the drive is known less well."
