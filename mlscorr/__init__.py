@@ -2,9 +2,9 @@
 
 from importlib import import_module
 
-_PIPELINE = ("calibrate", "compare", "correct", "diagnose", "extract", "plan")
+_PIPELINE = ("calibrate", "compare", "correct", "diagnose", "extract", "find_ties", "plan")
 _HOMES = {
-    "read_simulator": "mlscorr.simulate.beliefs",
+    "read_simulator": "mlscorr.simulate.simulator_file",
     "read_survey": "mlscorr.io.survey_file",
 } | dict.fromkeys(_PIPELINE, "mlscorr.pipeline")
 __all__ = [*_PIPELINE, "read_simulator", "read_survey", "simulate"]
@@ -12,7 +12,7 @@ __all__ = [*_PIPELINE, "read_simulator", "read_survey", "simulate"]
 
 def __getattr__(name):
     """Load what is asked for, and the libraries it needs, only then."""
-    if name == "simulate":  # a package that can be called
+    if name == "simulate":  # the package: mlscorr.simulate.simulate(scenario, rng)
         return import_module("mlscorr.simulate")
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)

@@ -1,6 +1,6 @@
 """The commands: read, call, write; nothing else. What they do is told by pipeline."""
 
-import signal
+import os
 import warnings
 
 import typer
@@ -16,10 +16,11 @@ from mlscorr.cli.extract import extract
 from mlscorr.cli.plan import plan
 from mlscorr.cli.render import render
 from mlscorr.cli.simulate import simulate
-from mlscorr.cli.terminal import interrupt, warn
+from mlscorr.cli.terminal import deafen, listen, warn
+from mlscorr.cli.ties import ties
 
 COMMANDS = (
-    *(correct, extract, calibrate, compare, render, demo),
+    *(correct, extract, ties, calibrate, compare, render, demo),
     *(simulate, diagnose, plan, doctor),
 )
 
@@ -35,11 +36,12 @@ for command in COMMANDS:
 app.add_typer(blind, name="blind")
 
 
-def main():
+def main() -> None:
     """Entry point of the command line."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
-        signal.signal(number, interrupt)
-    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as it is under nohup
-        signal.signal(signal.SIGHUP, interrupt)
+    listen()
+    os.environ["RUST_BACKTRACE"] = "0"  # of a decoder that meets a damaged file
     warnings.showwarning = lambda message, *_, **__: warn(f"Warning: {message}")
-    app()
+    try:
+        app()
+    finally:
+        deafen()

@@ -1,4 +1,4 @@
-"""python -m mlscorr.cli"""
+"""Run the command line by ``python -m mlscorr.cli``."""
 
 from mlscorr.cli import main
 

@@ -1,6 +1,5 @@
 """The commands that check the diagnosis blindly: make surveys, diagnose them, score."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +7,7 @@ import typer
 
 from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.terminal import Exit, Json, Quiet, exit_code, say
+from mlscorr.cli.work import print_json
 
 Check = Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the blind check.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes side by side.")]
@@ -27,7 +27,7 @@ def make(
     ] = None,
     workers: Workers = 2,
     quiet: Quiet = False,
-):
+) -> None:
     """Make surveys, seal their labels, and put those into key.json. Goes on where it stopped."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline.blind import make_blind
@@ -37,7 +37,7 @@ def make(
 
 
 @blind.command()
-def run(out: Check, workers: Workers = 2, quiet: Quiet = False):
+def run(out: Check, workers: Workers = 2, quiet: Quiet = False) -> None:
     """Diagnose each survey that has no answer yet, from its folder alone."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline.blind import run_blind
@@ -47,22 +47,22 @@ def run(out: Check, workers: Workers = 2, quiet: Quiet = False):
 
 
 @blind.command(name="score")
-def score_(out: Check, as_json: Json = False, quiet: Quiet = False):
+def score_(out: Check, as_json: Json = False, quiet: Quiet = False) -> None:
     """Verify the seals and compare answers with labels."""
     with exit_code(Exit.BAD_DATA):
         from mlscorr.pipeline.blind import score_blind
 
-        told = score_blind(out)
-    if as_json:
-        print(json.dumps(told))
-    for line in _table(told["rows"]):
+        score = score_blind(out)
+    print_json(score, as_json)
+    for line in _table(score["rows"]):
         say(line)
-    say(f"{told['answered']} of {told['cases']} cases are answered, {len(told['failed'])} failed.")
-    for one in told["wrong"]:
-        size = f" of {one['mdb']:.1f} MDB" if one["mdb"] else ""
+    failed = len(score["failed"])
+    say(f"{score['answered']} of {score['cases']} cases are answered, {failed} failed.")
+    for case in score["wrong"]:
+        size = f" of {case['mdb']:.1f} MDB" if case["mdb"] else ""
         say(
-            f"{one['case']} {one['kind']}: {one['truth']}{size}, said {one['said']} "
-            f"({one['probability']:.2f}){': ' + one['lead'] if one['lead'] else ''}"
+            f"{case['case']} {case['kind']}: {case['truth']}{size}, said {case['said']} "
+            f"({case['probability']:.2f}){': ' + case['lead'] if case['lead'] else ''}"
         )
     say(f"Score:  {out / 'score.json'}")
 
@@ -79,7 +79,7 @@ def _table(rows):
         )
 
 
-def _goal(least, most):
-    if least is not None and most is not None:
-        return f"{least:g} to {most:g}"
-    return f">= {least:g}" if least is not None else f"<= {most:g}" if most is not None else ""
+def _goal(low, high):
+    if low is not None and high is not None:
+        return f"{low:g} to {high:g}"
+    return f">= {low:g}" if low is not None else f"<= {high:g}" if high is not None else ""

@@ -1,28 +1,22 @@
 """The command that calibrates the mounting of a scanner."""
 
-import json
 from typing import Annotated
 
 import typer
 
-from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import (
-    Exit,
-    Json,
-    Out,
-    Overwrite,
-    Quiet,
-    SurveyFile,
-    exit_code,
-    say,
-)
+import mlscorr
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.work import print_json, work
 
 
 def calibrate(
-    survey: SurveyFile,
+    survey: SurveyArgument,
     out: Out,
     with_drift: Annotated[
         bool, typer.Option("--with-drift", help="Estimate the POS error too; write trajectory.csv.")
+    ] = False,
+    no_ties: Annotated[
+        bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")
     ] = False,
     clouds: Annotated[
         bool, typer.Option("--clouds", help="Write the clouds as the calibration puts them.")
@@ -30,23 +24,16 @@ def calibrate(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
-    """Calibrate lever arm and boresight of a survey's scanner with its control points."""
-    with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
-        from mlscorr.io.survey_file import input_files, read_survey
-
-        check_output(out, input_files(survey), overwrite)
-    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
-        recorded = read_survey(survey)
-        from mlscorr.pipeline import calibrate
-
-        result = calibrate(recorded, progress=progress)
+) -> None:
+    """Calibrate lever arm and boresight of a survey's scanner by control points and ties."""
+    with work(out, overwrite, survey) as progress:
+        recorded = mlscorr.read_survey(survey)
+        result = mlscorr.calibrate(recorded, progress=progress, ties=False if no_ties else None)
         content = result.write(out, with_drift, clouds, overwrite, progress)
-    if as_json:
-        print(json.dumps(content))
+    print_json(content, as_json)
     _tell_mounting(content)
     _tell_misclosures(content)
+    _tell_ties(content["ties"])
     say(f"Calibration: {out / 'calibration.json'}")
     say(f"Survey:      {out / 'survey.toml'}, with the calibrated mounting")
     if not clouds:
@@ -65,8 +52,25 @@ def _tell_mounting(content):
                 for kind in ("correction", "sigma")
             ]
             about = f"{part.replace('_', ' ')} {'about ' * (start > 0)}{name} ({unit})"
-            told = "yes" if content["determined"][start + axis] else "no"
-            say(f"{about:34s}" + "{:9.4f}{:8.4f}{:9.4f}{:8.4f}".format(*numbers) + f"  {told}")
+            determined = "yes" if content["determined"][start + axis] else "no"
+            say(
+                f"{about:34s}" + "{:9.4f}{:8.4f}{:9.4f}{:8.4f}".format(*numbers) + f"  {determined}"
+            )
+
+
+def _tell_ties(ties):
+    """How far what two passes both saw lies apart before and after, by pairs of passes."""
+    if ties is None:
+        return
+    say(f"Planes and poles in two passes: {ties['used']} of {ties['n']} ties used")
+    for pair in ties["pairs"]:
+        if pair["used"]:
+            first, second = pair["passes"]
+            before, after = (1e3 * pair[state]["median"] for state in ("before", "after"))
+            say(
+                f"  passes {first} and {second}: {pair['used']} ties, median misfit "
+                f"{before:.1f} mm before, {after:.1f} mm after"
+            )
 
 
 def _tell_misclosures(content):
@@ -76,9 +80,9 @@ def _tell_misclosures(content):
     if "with_drift" in content:
         methods.append(("LSC with drift", content["with_drift"]))
     for role in ("control", "check"):
-        for title, method in methods:
+        for method_title, method in methods:
             group = method[role]
-            title = f"{role} points, {title}"
+            title = f"{role} points, {method_title}"
             if group["n"] == 0:
                 say(f"{title:34s}   0  none")
                 continue

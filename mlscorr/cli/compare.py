@@ -1,26 +1,26 @@
 """The command that compares all methods on one survey."""
 
-import json
 from typing import Annotated
 
 import typer
 
-from mlscorr.cli.progress import progress_bars
+import mlscorr
 from mlscorr.cli.terminal import (
     Exit,
     Json,
     Out,
     Overwrite,
     Quiet,
-    SurveyFile,
+    SurveyArgument,
     exit_code,
     say,
     warn,
 )
+from mlscorr.cli.work import print_json, work
 
 
 def compare(
-    survey: SurveyFile,
+    survey: SurveyArgument,
     out: Out,
     clouds: Annotated[
         list[str],
@@ -33,22 +33,18 @@ def compare(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
+) -> None:
     """Correct a survey by every method, and score them by the same check points."""
     with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
-        from mlscorr.io.survey_file import input_files, read_survey
         from mlscorr.pipeline.methods import method_named
 
         clouds = list(dict.fromkeys(method_named(name).name for name in clouds))
-        check_output(out, input_files(survey), overwrite)
-    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
-        recorded = read_survey(survey)
-        from mlscorr.pipeline import compare
-
-        result = compare(recorded, progress=progress)
+    with work(out, overwrite, survey) as progress:
+        recorded = mlscorr.read_survey(survey)
+        result = mlscorr.compare(recorded, progress=progress)
         report = result.write(out, clouds, overwrite, progress)
-    tell(report, out, as_json)
+    print_json(report, as_json)
+    _tell(report, out)
     left = [file for file in report["files"] if file["points_outside_trajectory"]]
     for file in left:
         warn(
@@ -59,10 +55,8 @@ def compare(
         raise typer.Exit(Exit.IN_PART)
 
 
-def tell(report, out, as_json):
+def _tell(report, out):
     """The table of scores, the verdict, and where the results lie."""
-    if as_json:
-        print(json.dumps(report))
     by = report["scored_by"]
     say(report["basis"])
     say(f"{'RMSE (m)':16s}{'E':>8s}{'N':>8s}{'H':>8s}{'3D':>9s}{'fit, 3D':>9s}")

@@ -1,26 +1,27 @@
 """The command that corrects a survey."""
 
-import json
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mlscorr.cli.progress import progress_bars
+import mlscorr
 from mlscorr.cli.terminal import (
     Exit,
     Json,
     Out,
     Overwrite,
     Quiet,
-    SurveyFile,
+    SurveyArgument,
     exit_code,
     say,
     warn,
 )
+from mlscorr.cli.work import print_json, work
 
 
 def correct(
-    survey: SurveyFile,
+    survey: SurveyArgument,
     out: Out,
     order: Annotated[
         int, typer.Option(min=0, max=9, help="Order of the polynomial trend of the position.")
@@ -28,31 +29,40 @@ def correct(
     sigma: Annotated[
         bool, typer.Option("--sigma", help="Add to each point one sigma of its E, N and H.")
     ] = False,
+    no_ties: Annotated[
+        bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")
+    ] = False,
+    ties_only: Annotated[
+        bool,
+        typer.Option("--ties-only", help="Bring passes together without any control point."),
+    ] = False,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Leave out report.html and the pictures: faster.")
+    ] = False,
     fail_if: Annotated[
         list[str],
         typer.Option(
-            help='A quality gate, as "check.rmse_3d > 0.05" (m); e, n, h stand for easting, '
-            "northing, height. Exit code 6 if one is met; all results are written."
+            help='A quality gate, as "check.rmse_3d > 0.05" (m; e, n, h are easting, northing, '
+            'height), "check.n_seen < 8", "check.n_unseen > 0", "coverage.share_extrapolated > '
+            '0.1", "weak.sigma > 0.1" (m). Exit code 6 if one is met; all results are written.'
         ),
     ] = (),
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
+) -> None:
     """Correct the cloud of a survey with its control points, and report on it."""
     with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
-        from mlscorr.io.survey_file import input_files, read_survey
-        from mlscorr.quality import failures, read_gate
+        from mlscorr.evaluate.quality import failures, read_gate
 
         gates = [read_gate(text) for text in fail_if]
-        check_output(out, input_files(survey), overwrite)
-    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
-        recorded = read_survey(survey)
-        from mlscorr.pipeline import correct
-
-        result = correct(recorded, order, progress=progress)
-        report = result.write(out, overwrite, progress, sigma)
+        if no_ties and ties_only:
+            raise ValueError("--no-ties and --ties-only leave nothing to correct with: give one.")
+    with work(out, overwrite, survey) as progress:
+        recorded = mlscorr.read_survey(survey)
+        ties = "off" if no_ties else "only" if ties_only else None
+        result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
+        report = result.write(out, overwrite, progress, sigma, page=not no_report)
     tell(report, out, as_json)
     outside = report["coverage"]["points_outside_trajectory"]
     if outside:
@@ -69,10 +79,24 @@ def correct(
         raise typer.Exit(Exit.QUALITY_GATE if failed else Exit.IN_PART)
 
 
-def tell(report, out, as_json):
-    """The misclosures' RMSE before and after, and where the results lie."""
-    if as_json:
-        print(json.dumps(report))
+def tell(report: dict, out: Path, as_json: bool) -> None:
+    """Say the headline, the RMSE of misclosures before and after, and where the results lie.
+
+    Parameters
+    ----------
+    report : dict
+        report.json.
+    out : Path
+        Folder of the results.
+    as_json : bool
+        Whether to print the report on stdout.
+    """
+    from mlscorr.report.tie_words import tie_sentences
+
+    print_json(report, as_json)
+    say(report["headline"])
+    for sentence in tie_sentences(report["ties"], report["control"]["n_scored"]):
+        say(sentence)
     say(f"{'RMSE of misclosures (m)':24s}{'n':>4s}  {'E before':>9s}{'N':>8s}{'H':>8s}"
          f"  {'E after':>9s}{'N':>8s}{'H':>8s}")  # fmt: skip
     rows = [
@@ -89,9 +113,15 @@ def tell(report, out, as_json):
             f"{'  ' * (i % 3 == 0)}{v:{9 - (i % 3 > 0)}.3f}" for i, v in enumerate(numbers)
         )
         say(f"{title:24s}{group['n']:4d}{text}")
+    for row in report["weak"]:
+        say(
+            f"Extrapolated: {row['from']:.1f} to {row['to']:.1f} s ({row['length_m']:.0f} m): "
+            f"{row['why']}; sigma up to {row['sigma']:.3f} m"
+        )
     for target in report["targets"]:
         if not target["used"] and target["reason"] != "check point":
             say(f"Not used: {target['name']}: {target['reason']}")
-    say(f"Report:    {out / 'report.html'}")
-    say(f"Pictures:  {out / 'pictures'}")
+    if (out / "report.html").exists():
+        say(f"Report:    {out / 'report.html'}")
+        say(f"Pictures:  {out / 'pictures'}")
     say(f"Corrected: {', '.join(str(out / file['name']) for file in report['files'])}")

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.correct import tell
-from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, exit_code, say
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, say
+from mlscorr.cli.work import work
 
 
 def demo(
@@ -16,13 +16,9 @@ def demo(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
+) -> None:
     """Make a small simulated survey, correct it, and show the report."""
-    with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
-
-        check_output(out, [], overwrite)
-    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
+    with work(out, overwrite) as progress:
         from mlscorr.pipeline import demo
 
         say("Simulating a street, a drive with a GNSS outage, and a scanner ...")

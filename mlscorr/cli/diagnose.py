@@ -1,17 +1,17 @@
 """The command that diagnoses the gap between a survey and its simulation."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyFile, exit_code, say
+import mlscorr
+from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyArgument, exit_code, say
+from mlscorr.cli.work import print_json, work
 
 
 def diagnose(
-    survey: SurveyFile,
+    survey: SurveyArgument,
     out: Out,
     simulator: Annotated[
         Path | None,
@@ -23,24 +23,16 @@ def diagnose(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
+) -> None:
     """Find where reality and simulation differ, why, and how far the gap can be closed."""
     with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
-        from mlscorr.io.survey_file import input_files
-        from mlscorr.simulate.beliefs import read_simulator
+        from mlscorr.simulate.simulator_file import read_simulator
 
-        check_output(out, [*input_files(survey), *([simulator] if simulator else [])], overwrite)
         believed = read_simulator(simulator) if simulator else None
-    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
-        from mlscorr.io.survey_file import read_survey
-
-        recorded = read_survey(survey)
-        from mlscorr.pipeline import diagnose
-
-        content = diagnose(recorded, believed, progress=progress).write(out, overwrite)
-    if as_json:
-        print(json.dumps(content))
+    with work(out, overwrite, survey, [simulator] if simulator else []) as progress:
+        recorded = mlscorr.read_survey(survey)
+        content = mlscorr.diagnose(recorded, believed, progress=progress).write(out, overwrite)
+    print_json(content, as_json)
     _tell(content)
     say(f"Page:      {out / 'gap.html'}")
     say(f"Numbers:   {out / 'gap.json'}")

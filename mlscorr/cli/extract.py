@@ -1,46 +1,37 @@
 """The command that lists target-like objects."""
 
-import json
-
-from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyFile, exit_code, say
+import mlscorr
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.work import print_json, work
 
 
 def extract(
-    survey: SurveyFile,
+    survey: SurveyArgument,
     out: Out,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
+) -> None:
     """List all target-like objects in the cloud of a survey, with or without control points."""
-    with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
-        from mlscorr.io.survey_file import input_files, read_survey
-
-        check_output(out, input_files(survey), overwrite)
-    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
-        recorded = read_survey(survey)
-        from mlscorr.pipeline import extract
-
-        found = extract(recorded, progress=progress).write(out, overwrite)
-    if as_json:
-        print(json.dumps(found))
-    _tell(found, out)
+    with work(out, overwrite, survey) as progress:
+        recorded = mlscorr.read_survey(survey)
+        content = mlscorr.extract(recorded, progress=progress).write(out, overwrite)
+    print_json(content, as_json)
+    _tell(content, out)
 
 
-def _tell(found, out):
+def _tell(content, out):
     """How many objects were found and matched, and where the results lie."""
-    targets = found["targets"]
+    targets = content["targets"]
     matched = sum(row["matched"] for row in targets)
     say(f"{len(targets)} target-like objects in {len({row['pass'] for row in targets})} passes.")
-    if found["surveyed"]:
+    if content["surveyed"]:
         points = len({row["name"] for row in targets if row["matched"]})
         say(
-            f"{matched} of them are observations of {points} of the {found['surveyed']} surveyed "
+            f"{matched} of them are observations of {points} of the {content['surveyed']} surveyed "
             "points."
         )
-    for row in found["unseen"]:
+    for row in content["unseen"]:
         say(f"Not found: {row['name']}: {row['reason']}")
     say(f"Targets:  {out / 'targets.csv'} and {out / 'targets.json'}")
     say(f"Pictures: {out / 'targets.png'}")

@@ -1,30 +1,21 @@
 """The command that says what a survey will show before it is driven."""
 
-import json
-
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyFile, exit_code, say
+import mlscorr
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.work import print_json, work
 
 
 def plan(
-    survey: SurveyFile,
+    survey: SurveyArgument,
     out: Out,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
+) -> None:
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
-    with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
-        from mlscorr.io.survey_file import input_files
-
-        check_output(out, input_files(survey, planned=True), overwrite)
-    with exit_code(Exit.BAD_DATA):
-        from mlscorr.io.survey_file import read_survey
-        from mlscorr.pipeline import plan
-
-        content = plan(read_survey(survey, planned=True)).write(out, overwrite)
-    if as_json:
-        print(json.dumps(content))
+    with work(out, overwrite, survey, planned=True):
+        content = mlscorr.plan(mlscorr.read_survey(survey, planned=True)).write(out, overwrite)
+    print_json(content, as_json)
     say(f"{'Smallest effect that shows':34s}{'':>12s}  unit      usual size")
     for parts in content["detectable"].values():
         for part in parts:

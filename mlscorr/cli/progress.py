@@ -1,6 +1,7 @@
 """Bars or lines on stderr, for work that takes longer than a person likes to wait unsure."""
 
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
 
@@ -9,15 +10,20 @@ from mlscorr.cli.terminal import is_quiet, say
 PATIENCE = 2.0  # s; quicker work shows nothing
 INTERVAL = 10.0  # s between the lines where stderr is no terminal
 
+Progress = Callable[[str, int], Callable[[int], object]]
+
 
 @contextmanager
-def progress_bars():
-    """Gives progress(title, total), which gives a function of the number of points just done.
+def progress_bars() -> Iterator[Progress]:
+    """Bars on a terminal, lines elsewhere, nothing for quick work or when asked to be quiet.
 
-    Bars on a terminal, lines elsewhere, nothing for quick work or when asked to be quiet.
+    Yields
+    ------
+    progress : function
+        progress(title, total) gives a function of the number of points just done.
     """
     if is_quiet():
-        yield lambda title, total: lambda points: None
+        yield lambda *_: lambda _: None
     elif sys.stderr.isatty():
         with _bars() as progress:
             yield progress

@@ -1,14 +1,13 @@
 """The command that draws pictures of a survey before and after its correction."""
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyFile, exit_code, say
+from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyArgument, exit_code, say
+from mlscorr.cli.work import print_json, work
 
 View = StrEnum("View", ("overview", "targets", "section"))
 Colour = StrEnum("Colour", ("intensity", "height", "correction", "sigma"))
@@ -16,7 +15,7 @@ Engine = StrEnum("Engine", ("zbuffer", "open3d"))
 
 
 def render(
-    survey: SurveyFile,
+    survey: SurveyArgument,
     out: Out,
     corrected: Annotated[
         Path | None,
@@ -43,15 +42,12 @@ def render(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
+) -> None:
     """Draw a survey before and after its correction; neither a display nor a GPU is needed."""
     with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
-        from mlscorr.io.survey_file import input_files, read_survey
-
-        pixels = read_size(size)
-        check_output(out, input_files(survey), overwrite)
-    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
+        pixels = _read_size(size)
+    with work(out, overwrite, survey) as progress:
+        from mlscorr.io.survey_file import read_survey
         from mlscorr.pipeline.rendering import render
 
         drawn = render(
@@ -68,14 +64,13 @@ def render(
             elevation=elevation,
             view_angle=view_angle,
         )
-    if as_json:
-        print(json.dumps(drawn))
+    print_json(drawn, as_json)
     for picture in drawn["pictures"]:
         say(f"{out / picture['file']}: {picture['title']}")
 
 
-def read_size(text):
-    """Width and height of a text such as 1920x1080. Raises ValueError for another."""
+def _read_size(text):
+    """Width and height of a text such as 1920x1080."""
     width, times, height = text.lower().partition("x")
     if not (times and width.strip().isdecimal() and height.strip().isdecimal()):
         raise ValueError(f"The size '{text}' is not width x height in pixels, as 1920x1080.")

@@ -1,13 +1,12 @@
 """The command that simulates a survey."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, exit_code, say
+from mlscorr.cli.work import print_json, work
 
 
 def simulate(
@@ -17,19 +16,17 @@ def simulate(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
-):
+) -> None:
     """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
     with exit_code(Exit.USAGE):
-        from mlscorr.io.output import check_output
         from mlscorr.simulate.scenario_file import read_scenario, scenario_files
 
-        check_output(out, [scenario, *scenario_files(read_scenario(scenario))], overwrite)
-    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
+        inputs = [scenario, *scenario_files(read_scenario(scenario))]
+    with work(out, overwrite, inputs=inputs) as progress:
         from mlscorr.pipeline import simulate_survey
 
         made = simulate_survey(scenario, out, seed, overwrite, progress)
-    if as_json:
-        print(json.dumps(made))
+    print_json(made, as_json)
     points = sum(file["points"] for file in made["files"])
     say(
         f"Simulated {made['name']}: {points} points in {len(made['files'])} files, "

@@ -2,6 +2,7 @@
 
 import signal
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
@@ -9,21 +10,32 @@ from typing import Annotated
 
 import typer
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)
 _voice = {"quiet": False}  # of this process's stderr
 
 
-def be_quiet(quiet):
-    """Say nothing more than errors and warnings, if so."""
+def be_quiet(quiet: bool) -> bool:
+    """Say nothing more than errors and warnings, if so.
+
+    Parameters
+    ----------
+    quiet : bool
+
+    Returns
+    -------
+    bool
+        The same.
+    """
     _voice["quiet"] = quiet
     return quiet
 
 
-def is_quiet():
+def is_quiet() -> bool:
     """Whether only errors and warnings are said."""
     return _voice["quiet"]
 
 
-SurveyFile = Annotated[Path, typer.Argument(help="survey.toml, or the folder that holds it.")]
+SurveyArgument = Annotated[Path, typer.Argument(help="survey.toml, or the folder that holds it.")]
 Out = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
 Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in the folder.")]
 Quiet = Annotated[
@@ -45,48 +57,100 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-def interrupt(number, frame):
-    """Raise KeyboardInterrupt, and again after a second where a library swallowed it."""
+def interrupt(number: int, frame: object) -> None:
+    """Raise KeyboardInterrupt, and again after a second where a library swallowed it.
+
+    Parameters
+    ----------
+    number : int
+        Of the signal.
+    frame : object
+
+    Raises
+    ------
+    KeyboardInterrupt
+    """
     signal.setitimer(signal.ITIMER_REAL, 1.0)
     raise KeyboardInterrupt
 
 
+def listen() -> None:
+    """End in order when the user, a scheduler or a closed terminal interrupts."""
+    for number in SIGNALS:
+        if signal.getsignal(number) != signal.SIG_IGN or number != signal.SIGHUP:  # nohup
+            signal.signal(number, interrupt)
+
+
+def deafen() -> None:
+    """Ignore interruptions from here on, where they were listened to: nothing is left to undo."""
+    for number in SIGNALS:
+        if signal.getsignal(number) is interrupt:
+            signal.signal(number, signal.SIG_IGN)
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
 @contextmanager
-def exit_code(code):
-    """End with one sentence and an exit code where the user's input or the system is at fault."""
+def exit_code(code: Exit, has_results: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    """End with one sentence and an exit code where the user's input or the system is at fault.
+
+    Parameters
+    ----------
+    code : Exit
+        For a ValueError.
+    has_results : function
+        Whether results stand already; asked when an interruption comes.
+
+    Raises
+    ------
+    typer.Exit
+    """
     try:
         yield
     except KeyboardInterrupt:
-        stop()
+        _stop(has_results())
     except OSError as error:
         if isinstance(error, FileNotFoundError) and error.errno is None:  # survey.toml names it
-            fail(error, Exit.USAGE)
-        fail(f"Reading or writing failed: {error}", Exit.READ_OR_WRITE)
+            _fail(error, Exit.USAGE)
+        _fail(f"Reading or writing failed: {error}", Exit.READ_OR_WRITE)
     except ImportError as error:
         if signal.getitimer(signal.ITIMER_REAL)[0]:  # it was the import that was interrupted
-            stop()
-        fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
+            _stop(False)
+        _fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
     except ValueError as error:
-        fail(error, code)
+        _fail(error, code)
 
 
-def fail(message, code):
+def _fail(message, code):
+    """Say what went wrong and end with an exit code."""
     warn(f"Error: {message}")
     raise typer.Exit(code) from None
 
 
-def stop():
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    warn("Interrupted; nothing was written.")
+def _stop(has_results):
+    """End as interrupted."""
+    deafen()
+    done = "all results were written before" if has_results else "nothing was written"
+    warn(f"Interrupted; {done}.")
     raise typer.Exit(Exit.INTERRUPTED) from None
 
 
-def say(text):
-    """A sentence on stderr, unless it should be quiet."""
+def say(text: object) -> None:
+    """Print a sentence on stderr, unless it should be quiet.
+
+    Parameters
+    ----------
+    text : str
+    """
     if not is_quiet():
         warn(text)
 
 
-def warn(text):
-    """A sentence on stderr in any case."""
-    print(text, file=sys.stderr)
+def warn(text: object) -> None:
+    """Print a sentence on stderr in any case.
+
+    Parameters
+    ----------
+    text : str
+    """
+    shown = "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in str(text))
+    print(shown, file=sys.stderr)  # names of files and points may hold what moves the cursor

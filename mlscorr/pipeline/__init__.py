@@ -5,24 +5,6 @@ from mlscorr.pipeline.comparison import ComparedSurvey, compare
 from mlscorr.pipeline.correction import CorrectedSurvey, correct
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose
 from mlscorr.pipeline.extraction import ExtractedSurvey, extract
-from mlscorr.pipeline.finding import find_targets
 from mlscorr.pipeline.planning import PlannedSurvey, plan
 from mlscorr.pipeline.simulation import demo, simulate_survey
-
-__all__ = [
-    "CalibratedSurvey",
-    "ComparedSurvey",
-    "CorrectedSurvey",
-    "DiagnosedSurvey",
-    "ExtractedSurvey",
-    "PlannedSurvey",
-    "calibrate",
-    "compare",
-    "correct",
-    "demo",
-    "diagnose",
-    "extract",
-    "find_targets",
-    "plan",
-    "simulate_survey",
-]
+from mlscorr.pipeline.ties import TiedSurvey, find_ties

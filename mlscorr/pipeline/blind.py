@@ -7,6 +7,7 @@ import secrets
 import shutil
 import tempfile
 import warnings
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -16,18 +17,26 @@ from time import monotonic
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from mlscorr.blind.cases import load_mechanisms, make_case
+from mlscorr.blind.mix import mix
+from mlscorr.blind.scoring import score
 from mlscorr.effects import EFFECTS
-from mlscorr.gap.mix import mix
-from mlscorr.gap.scoring import score
 from mlscorr.io.output import document, write_json
 from mlscorr.io.survey_file import read_survey
-from mlscorr.pipeline.blind_cases import load_mechanisms, make_case
+from mlscorr.pipeline.finding import find_targets, silent
 
 WORKERS = 2  # processes: each wants a core and a gigabyte
 SECRET = ("truth*", "key*")  # names of files that no diagnosis may see
 
 
-def make_blind(out, cases, seed, mechanisms=None, workers=WORKERS, progress=None):
+def make_blind(
+    out: Path,
+    cases: int,
+    seed: int,
+    mechanisms: Path | None = None,
+    workers: int = WORKERS,
+    progress: Callable | None = None,
+) -> int:
     """Make the surveys of a blind check: OUT/cases, seals.json (public) and key.json (labels).
 
     What was interrupted goes on where it stopped. Returns the number of cases that are there.
@@ -43,37 +52,57 @@ def make_blind(out, cases, seed, mechanisms=None, workers=WORKERS, progress=None
     progress : function, optional
         progress(title, total) returns a function of the number of cases just done.
 
-    Raises ValueError when OUT holds another check, or a case can't be made.
+    Raises
+    ------
+    ValueError
+        When OUT holds another check, or a case can't be made.
     """
     out, names = Path(out), ()
     if mechanisms is not None:
         names = tuple(load_mechanisms(mechanisms).MECHANISMS)
     plan = {"cases": cases, "seed": seed, "mechanisms": list(names)}
     key = _opened(out, plan)
-    several = mix(cases, np.random.default_rng([seed]), names)
+    drawn = mix(cases, np.random.default_rng([seed]), names)
     todo = {
         _name(i): (case, (seed, i), mechanisms)
-        for i, case in enumerate(several, start=1)
+        for i, case in enumerate(drawn, start=1)
         if _name(i) not in key["labels"]
     }
-    done = (progress or _silent)("Making surveys", len(todo))
+    done = (progress or silent)("Making surveys", len(todo))
     jobs = [(_make, out / "cases" / name, *job) for name, job in todo.items()]
     for folder, label in _in_processes(jobs, workers):
         key["labels"][folder.name] = {"label": label, "salt": secrets.token_hex(16)}
         _write_key(out, key)
         done(1)
-    seals = {name: _seal(one) for name, one in sorted(key["labels"].items())}
+    seals = {name: _seal(sealed) for name, sealed in sorted(key["labels"].items())}
     write_json(out / "seals.json", document("seals", {"seals": seals}))
     return len(seals)
 
 
-def run_blind(out, workers=WORKERS, progress=None):
+def run_blind(
+    out: Path, workers: int = WORKERS, progress: Callable | None = None
+) -> tuple[int, int]:
     """Diagnose each survey of a blind check that has no answer yet: OUT/answers.
 
     Each diagnosis sees a copy of its survey's folder in a process of its own; the key can't be
-    read meanwhile. Returns the numbers of answers there, and of those that failed.
+    read meanwhile.
 
-    Raises ValueError when there are no cases, or a folder holds a truth or a key.
+    Parameters
+    ----------
+    out : Path
+    workers : int
+    progress : function, optional
+        As in ``make_blind``.
+
+    Returns
+    -------
+    answered, failed : int
+        Numbers of answers there, and of diagnoses that gave up.
+
+    Raises
+    ------
+    ValueError
+        When there are no cases, or a folder holds a truth or a key.
     """
     out = Path(out)
     folders = sorted(path for path in (out / "cases").glob("*") if not path.name.startswith("."))
@@ -84,7 +113,7 @@ def run_blind(out, workers=WORKERS, progress=None):
     answers = out / "answers"
     answers.mkdir(exist_ok=True)
     todo = [folder for folder in folders if not (answers / f"{folder.name}.json").exists()]
-    done = (progress or _silent)("Diagnosing", len(todo))
+    done = (progress or silent)("Diagnosing", len(todo))
     with _locked(out / "key.json"):
         for folder, answer in _in_processes([(_diagnose, folder) for folder in todo], workers):
             part = answers / f".{folder.name}.part"
@@ -95,11 +124,17 @@ def run_blind(out, workers=WORKERS, progress=None):
     return len(folders), failed
 
 
-def score_blind(out):
+def score_blind(out: Path) -> dict:
     """Unseal the labels of a blind check and score its answers: OUT/score.json, returned.
 
-    Raises ValueError when a label or its key was changed after it was sealed, or nothing is
-    answered yet.
+    Parameters
+    ----------
+    out : Path
+
+    Raises
+    ------
+    ValueError
+        When a label or its key was changed after it was sealed, or nothing is answered yet.
     """
     out = Path(out)
     key, seals = _read(out / "key.json")["labels"], _read(out / "seals.json")["seals"]
@@ -118,18 +153,14 @@ def score_blind(out):
     answered = [name for name in sorted(seals) if name in answers]
     if not answered:
         raise ValueError(f"{out} has no answers yet: run mlscorr blind run first.")
-    told = score({name: (key[name]["label"], answers[name]) for name in answered})
-    told = document("score", {"cases": len(seals), "answered": len(answered), **told})
-    write_json(out / "score.json", told)
-    return told
+    scored = score({name: (key[name]["label"], answers[name]) for name in answered})
+    content = document("score", {"cases": len(seals), "answered": len(answered), **scored})
+    write_json(out / "score.json", content)
+    return content
 
 
 def _name(number):
     return f"{number:04d}"
-
-
-def _silent(title, total):
-    return lambda done: None
 
 
 def _read(path):
@@ -183,17 +214,18 @@ def _locked(path):
 
 def _check_blind(folder):
     """Refuse a folder in which a diagnosis could read what it should find."""
-    seen = sorted(path for name in SECRET for path in folder.rglob(name) if path.is_file())
-    if seen:
+    readable = sorted(p for name in SECRET for p in folder.rglob(name) if p.is_file())
+    if readable:
         raise ValueError(
-            f"{seen[0]} can be read by the diagnosis, which must not know the truth: remove it, or "
-            "make the cases anew."
+            f"{readable[0]} can be read by the diagnosis, which must not know the truth: remove "
+            "it, or make the cases anew."
         )
 
 
 def _in_processes(jobs, workers):
     """Results of jobs (function, folder, ...) as (folder, result), in the order in which they
-    are done. A process is a fresh interpreter with one thread in BLAS."""
+    are done. A process is a fresh interpreter with one thread in BLAS.
+    """
     context = get_context("spawn")
     with ProcessPoolExecutor(workers, context, threadpool_limits, (1,)) as pool:
         futures = {pool.submit(*job): job[1] for job in jobs}
@@ -209,7 +241,7 @@ def _make(folder, case, entropy, mechanisms):
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory(prefix=".", dir=folder.parent) as place:
         made = Path(place) / folder.name
-        label = make_case(made, case, entropy, mechanisms)
+        label = make_case(made, case, entropy, find_targets, mechanisms)
         if folder.exists():  # of a run that was interrupted before it had the label
             shutil.rmtree(folder)
         os.replace(made, folder)
@@ -229,8 +261,8 @@ def _diagnose(folder):
         (copy / "library.json").unlink()
         library = tuple(kind for kind in EFFECTS if kind.name not in without)
         try:
-            found = diagnose(read_survey(copy), library=library, rng=np.random.default_rng(0))
-            answer = {"document": found.document}
+            rng = np.random.default_rng(0)
+            answer = {"document": diagnose(read_survey(copy), library=library, rng=rng).document}
         except ValueError as error:
             answer = {"error": str(error)}
     return answer | {"seconds": round(monotonic() - start, 2)}

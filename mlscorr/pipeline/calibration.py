@@ -1,26 +1,40 @@
 """``calibrate``: from a survey to its lever arm and boresight."""
 
+from __future__ import annotations
+
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
-from mlscorr.calibration import Calibration, estimate_mounting
-from mlscorr.evaluation import CHECK_REASON, before_and_after, target_rows, unseen_rows
-from mlscorr.io.las import sample_gps_times, write_corrected
-from mlscorr.io.output import check_output, document, output_folder, write_json
+from mlscorr.correction import Correction
+from mlscorr.estimate import Calibration
+from mlscorr.evaluate.rows import TargetRow
+from mlscorr.evaluate.scores import score
+from mlscorr.evaluate.target_rows import surveyed_rows, unseen_rows
+from mlscorr.evaluate.ties import misfit_section
+from mlscorr.io.las import sample_gps_times
+from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.survey_copy import mounting_values, write_survey_copy
-from mlscorr.io.survey_file import FILE_NAME, input_files
+from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.pipeline.finding import find_control, silent
-from mlscorr.survey import Survey, TargetObservations
+from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.pipeline.tied_calibration import estimate_site
+from mlscorr.survey import Matched, Survey
 
-TOGETHER = 0.1  # of the shorter file's time: more than the overlap of two tiles of one scan
 
-
-def calibrate(survey, rng=None, progress=None):
-    """Find the targets of a survey and estimate what its recorded mounting lacks.
+def calibrate(
+    survey: Survey,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    ties: bool | None = None,
+) -> CalibratedSurvey:
+    """Estimate what a survey's recorded mounting lacks by its targets, and what passes both saw.
 
     Parameters
     ----------
@@ -30,9 +44,19 @@ def calibrate(survey, rng=None, progress=None):
         For the plane fit's random samples; the same seed each time by default.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
+    ties : bool, optional
+        Whether planes and poles that two passes both saw take part; where they do, less than 3
+        control points, or none, are enough. What survey.toml says by default.
 
-    Returns a CalibratedSurvey. Raises ValueError without a mounting, when fewer than 3 control
-    points are found, or all of them at one time. The check points take no part.
+    Returns
+    -------
+    CalibratedSurvey
+        The check points take no part.
+
+    Raises
+    ------
+    ValueError
+        Without a mounting, and as ``estimate_site``.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -56,32 +80,47 @@ def calibrate(survey, rng=None, progress=None):
             "(deg) that the cloud was georeferenced with. Add that section."
         )
     warn_of_scanners(survey)
-    control, check, finding = find_control(survey, rng, progress)
-    calibration = estimate_mounting(
-        survey.trajectory, survey.mounting, control, survey.control, survey.pos
-    )
+    ties = survey.use_ties if ties is None else ties
+    control, check, finding, calibration = estimate_site(survey, ties, rng, progress)
     for sentence in calibration.warnings:
         warnings.warn(sentence, stacklevel=2)
-    unseen = unseen_rows(survey, finding.matches.refusals, finding.candidates)
-    return CalibratedSurvey(survey, calibration, control, check, unseen)
+    missing = unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned)
+    return CalibratedSurvey(survey, calibration, control, check, missing)
 
 
 @dataclass(frozen=True)
 class CalibratedSurvey:
-    """A calibrated survey: the calibration, the targets, and ``write``."""
+    """A calibrated survey: the calibration, the targets, and ``write``.
+
+    Parameters
+    ----------
+    survey : Survey
+    calibration : Calibration
+    matched_control, matched_check : Matched
+    missing : list of TargetRow
+        Surveyed points without an observation.
+    """
 
     survey: Survey
     calibration: Calibration
-    control_observations: TargetObservations
-    check_observations: TargetObservations
-    unseen: list[dict] = field(default_factory=list)
+    matched_control: Matched
+    matched_check: Matched
+    missing: list[TargetRow] = field(default_factory=list)
 
-    def write(self, out, with_drift=False, clouds=False, overwrite=False, progress=None):
+    def write(
+        self,
+        out: str | Path,
+        with_drift: bool = False,
+        clouds: bool = False,
+        overwrite: bool = False,
+        progress: Callable | None = None,
+    ) -> dict:
         """Write calibration.json, and survey.toml with the calibrated mounting, into a folder.
 
         Parameters
         ----------
         out : path
+            The folder, which appears whole or not at all.
         with_drift : bool
             Estimate the POS error along with the mounting, and write trajectory.csv.
         clouds : bool
@@ -90,27 +129,28 @@ class CalibratedSurvey:
         overwrite : bool
         progress : function, optional
 
-        The folder appears whole or not at all. Returns the document of calibration.json. Raises
-        as ``CorrectedSurvey.write`` does.
+        Returns
+        -------
+        dict
+            The document of calibration.json.
+
+        Raises
+        ------
+        ValueError, OSError
+            As ``CorrectedSurvey.write`` does.
         """
-        check_output(out, input_files(self.survey.path), overwrite)
         calibration = self.calibration
-        drift = calibration.correction_with_drift() if with_drift else None
+        drift = calibration.correction_with_drift if with_drift else None
         names = [file.path.name for file in self.survey.clouds]
-        with output_folder(out) as folder:
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
             content = document("calibration", self.report(drift))
             write_json(folder / "calibration.json", content)
             if with_drift:
                 write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
             if clouds:
-                done = (progress or silent)("Writing the cloud", self._points)
-                for file in self.survey.clouds:
-                    write_corrected(
-                        file,
-                        folder / file.path.name,
-                        drift or calibration.correction(),
-                        lambda times: done(len(times)),
-                    )
+                done = (progress or silent)("Writing the cloud", self.survey.points)
+                correction = drift or calibration.correction()
+                write_clouds(self.survey, folder, correction, lambda times: done(len(times)))
             write_survey_copy(
                 self.survey.path,
                 folder / FILE_NAME,
@@ -121,12 +161,14 @@ class CalibratedSurvey:
             )
         return content
 
-    @property
-    def _points(self):
-        return sum(file.points for file in self.survey.clouds)
+    def report(self, drift: Correction | None = None) -> dict[str, object]:
+        """The content of calibration.json.
 
-    def report(self, drift=None):
-        """The content of calibration.json; drift is a Correction of mounting and POS error."""
+        Parameters
+        ----------
+        drift : Correction, optional
+            Of mounting and POS error.
+        """
         calibration = self.calibration
         content = {
             "name": self.survey.name,
@@ -139,6 +181,7 @@ class CalibratedSurvey:
             "parameters": _parameters(calibration.parameters),
             "outliers": [vars(outlier) for outlier in calibration.outliers],
             "targets": self._targets(calibration.correction()),
+            "ties": misfit_section(calibration.ties),
             "warnings": list(calibration.warnings),
             "notes": list(self.survey.notes),
         }
@@ -170,26 +213,15 @@ class CalibratedSurvey:
 
     def _statistics(self, role, correction):
         if role == "check":
-            return before_and_after(self.check_observations, self.survey.check, correction)
-        used = self.control_observations[self.calibration.used]
-        return before_and_after(used, self.survey.control, correction)
+            return score(self.matched_check, correction).document()
+        used = self.matched_control[self.calibration.used]
+        return score(used, correction).document()
 
     def _targets(self, correction):
         """Rows of every surveyed point and pass, as in report.json."""
-        outliers = {outlier.name: outlier for outlier in self.calibration.outliers}
-        reasons = [
-            f"outlier: statistic {outliers[name].statistic:.1f} against "
-            f"{outliers[name].critical:.1f}"
-            if name in outliers
-            else None
-            for name in self.control_observations.name
-        ]
-        rows = target_rows(
-            self.control_observations, self.survey.control, correction, "control", reasons
-        )
-        none = [CHECK_REASON] * len(self.check_observations)
-        rows += target_rows(self.check_observations, self.survey.check, correction, "check", none)
-        return rows + self.unseen
+        points = self.matched_control, self.matched_check
+        rows = surveyed_rows(*points, correction, self.calibration.outliers)
+        return [row.document() for row in rows + self.missing]
 
 
 def _mounting(mounting):
@@ -198,26 +230,35 @@ def _mounting(mounting):
 
 def _parameters(weighed):
     """The POS error's parameters on average, and the probability of each covariance family."""
-    names = ("position_scale", "position_time", "attitude_scale", "attitude_time")
-    mean = {name: np.exp(sum(p * np.log(getattr(v, name)) for v, p in weighed)) for name in names}
+    names = {"position_scale": "drift_scale", "position_time": "drift_time"}
+    names |= {name: name for name in ("attitude_scale", "attitude_time")}
+    mean = {
+        title: np.exp(sum(p * np.log(getattr(parameters, name)) for parameters, p in weighed))
+        for title, name in names.items()
+    }
     families = {}
     for parameters, probability in weighed:
         families[parameters.family] = families.get(parameters.family, 0.0) + probability
     return {**{name: float(value) for name, value in mean.items()}, "families": families}
 
 
-def warn_of_scanners(survey):
-    """Warn where two cloud files were measured at the same time, as by two scanners."""
+def warn_of_scanners(survey: Survey) -> None:
+    """Warn where two cloud files were measured at the same time, as by two scanners.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
     spans = []
     for file in survey.clouds:
         times = sample_gps_times(file.path)[2] + file.time_constant
         spans.append((times.min(), times.max(), file.path.name))
     spans.sort()
     for (start, end, name), (first, last, other) in pairwise(spans):
-        together = min(end, last) - first
-        if together > TOGETHER * min(end - start, last - first):
+        overlap = min(end, last) - first
+        if overlap > SETTINGS.tile_overlap * min(end - start, last - first):
             warnings.warn(
-                f"{name} and {other} were measured at the same time for {together:.1f} s. If two "
+                f"{name} and {other} were measured at the same time for {overlap:.1f} s. If two "
                 "scanners did so, calibrate each with a survey.toml of its own, which names its "
                 "files and its mounting: all files here are taken to be of the one mounting.",
                 stacklevel=3,

@@ -1,26 +1,30 @@
 """``compare``: every method on the same control and check points."""
 
+from __future__ import annotations
+
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
 from mlscorr.baselines import Undetermined
-from mlscorr.evaluation import misclosures, statistics, unseen_rows
-from mlscorr.io.las import write_corrected
-from mlscorr.io.output import check_output, document, output_folder, write_json
-from mlscorr.io.survey_file import input_files
+from mlscorr.evaluate.rows import Statistics, TargetRow
+from mlscorr.evaluate.scores import misclosures
+from mlscorr.evaluate.target_rows import unseen_rows
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.pipeline.methods import METHODS, load_open3d, method_named
-from mlscorr.survey import Survey, TargetObservations
-
-FEW = 5  # observed check points below which all points are cross-validated as well
-SINGLY = 10  # control points up to which each is left out by itself; else in five groups
-GROUPS = 5
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.survey import Matched, Survey
 
 
-def compare(survey, rng=None, progress=None):
+def compare(
+    survey: Survey, rng: np.random.Generator | None = None, progress: Callable | None = None
+) -> ComparedSurvey:
     """Correct a survey by every method, each fitted to the same control points alone.
 
     Parameters
@@ -31,8 +35,15 @@ def compare(survey, rng=None, progress=None):
     progress : function, optional
         ``progress(title, total)`` returns a function of how much was just done.
 
-    Returns a ComparedSurvey. Raises ValueError when no target is found or matched, or no control
-    point among them. A method that the control points don't determine says why in its row.
+    Returns
+    -------
+    ComparedSurvey
+        A method that the control points don't determine says why in its row.
+
+    Raises
+    ------
+    ValueError
+        When no target is found or matched, or no control point among them.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -50,7 +61,7 @@ def compare(survey, rng=None, progress=None):
     control, check, finding = find_control(survey, rng, progress)
     candidates = finding.candidates
     load_open3d()  # takes seconds, which are not the method's
-    is_few = len(set(check.name)) < FEW
+    is_few = len(set(check.name)) < SETTINGS.check_points
     groups = _groups(control) if is_few else []
     done = (progress or silent)("Fitting", len(METHODS) * (1 + len(groups)))
     rows, corrections = [], {}
@@ -58,7 +69,7 @@ def compare(survey, rng=None, progress=None):
         row, correction = _row(method, survey, control, check, candidates)
         done(1)
         if is_few:
-            left = misclosures(check, survey.check, correction)
+            left = misclosures(check, correction)
             row["cross_validated"] = _cross_validated(
                 method, survey, control, candidates, groups, left, done
             )
@@ -67,12 +78,12 @@ def compare(survey, rng=None, progress=None):
             corrections[method.name] = correction
     return ComparedSurvey(
         survey=survey,
-        control_observations=control,
-        check_observations=check,
+        matched_control=control,
+        matched_check=check,
         rows=tuple(rows),
         corrections=corrections,
         groups=len(groups),
-        unseen=unseen_rows(survey, finding.matches.refusals, candidates),
+        missing=unseen_rows(survey, finding.matches.refusals, candidates, finding.scanned),
     )
 
 
@@ -90,8 +101,8 @@ def _row(method, survey, control, check, candidates):
         "about": method.about,
         "status": "not determined" if correction is None else "determined",
         "why": why,
-        "check": _score(check, survey.check, correction),
-        "control": _score(control, survey.control, correction),
+        "check": _score(check, correction),
+        "control": _score(control, correction),
         "seconds": seconds,
         "warnings": doubts,
         "details": details,
@@ -99,32 +110,39 @@ def _row(method, survey, control, check, candidates):
     return row, correction
 
 
-def _fitted(method, survey, observations, candidates):
+def _fitted(method, survey, matched, candidates):
     """Correction or None, details, why there is none, and seconds."""
     start = perf_counter()
     try:
-        correction, details = method.fit(survey, observations, candidates)
+        correction, details = method.fit(survey, matched, candidates)
     except Undetermined as problem:
         return None, {}, str(problem), None
     return correction, details, None, perf_counter() - start
 
 
-def _score(observations, points, correction):
-    """n and the statistics of the misclosures; None where there is no correction."""
-    left = misclosures(observations, points, correction)
-    return {"n": len(left), **statistics(left if correction is not None else left[:0])}
+def _score(matched, correction):
+    """N and the statistics of the misclosures; None where there is no correction."""
+    left = misclosures(matched, correction)
+    return _statistics(left, correction is not None)
+
+
+def _statistics(residuals, determined):
+    """N and the statistics of residuals, None where they tell nothing."""
+    known = residuals if determined else residuals[:0]
+    return {"n": len(residuals), **Statistics.of(known).document()}
 
 
 def _groups(control):
     """Names of control points to leave out together: one by one, or five groups spread in time."""
     names = list(dict.fromkeys(control.name[i] for i in np.argsort(control.gps_time)))
-    number = len(names) if len(names) <= SINGLY else GROUPS
+    number = len(names) if len(names) <= SETTINGS.single_points else SETTINGS.groups
     return [set(names[i::number]) for i in range(number)] if len(names) > 1 else []
 
 
 def _cross_validated(method, survey, control, candidates, groups, of_check, done):
-    """n and the statistics over all points: each control point as the others correct it, each
-    check point as all control points do. Without any group there is nothing to validate."""
+    """N and the statistics over all points: each control point as the others correct it, each
+    check point as all control points do. Without any group there is nothing to validate.
+    """
     parts, why = [of_check], None
     for group in groups:
         left_out = np.array([name in group for name in control.name])
@@ -135,59 +153,73 @@ def _cross_validated(method, survey, control, candidates, groups, of_check, done
         if correction is None:
             why = f"Without {', '.join(sorted(group))}: {problem}"
         else:
-            parts.append(misclosures(control[left_out], survey.control, correction))
+            parts.append(misclosures(control[left_out], correction))
     left = np.vstack(parts)
-    is_whole = why is None and bool(groups)
-    return {"n": len(left), **statistics(left if is_whole else left[:0]), "why": why}
+    return {**_statistics(left, why is None and bool(groups)), "why": why}
 
 
 @dataclass(frozen=True)
 class ComparedSurvey:
     """All methods' rows of compare.json, their corrections by name, and ``write``.
 
-    ``unseen`` are the surveyed points without an observation; ``groups`` is how many times
-    control points were left out, zero without cross-validation.
+    Parameters
+    ----------
+    survey : Survey
+    matched_control, matched_check : Matched
+    rows : tuple of dict
+        As ``methods`` of compare.json has them.
+    corrections : dict
+        What has ``apply(cloud)``, by the methods' names.
+    groups : int
+        How many times control points were left out, zero without cross-validation.
+    missing : list of TargetRow
+        Surveyed points without an observation.
     """
 
     survey: Survey
-    control_observations: TargetObservations
-    check_observations: TargetObservations
+    matched_control: Matched
+    matched_check: Matched
     rows: tuple[dict, ...]
     corrections: dict
     groups: int
-    unseen: list[dict] = field(default_factory=list)
+    missing: list[TargetRow] = field(default_factory=list)
 
-    def row(self, name):
+    def row(self, name: str) -> dict:
         """The row of one method."""
         return next(row for row in self.rows if row["name"] == name)
 
     @property
-    def scored_by(self):
+    def scored_by(self) -> str:
         """What the methods are ranked by: check, cross_validated, or the mere fit to control."""
         if "cross_validated" in self.rows[0] and self.groups:
             return "cross_validated"
-        return "check" if len(self.check_observations) else "control"
+        return "check" if len(self.matched_check) else "control"
 
     @property
-    def document(self):
+    def document(self) -> dict:
         """The document of compare.json."""
-        seen = (self.control_observations, self.check_observations)
         return document(
             "compare",
             {
                 "name": self.survey.name,
                 "crs": self.survey.crs,
                 "misclosure": "surveyed - observed, m",
-                "control_points": len(set(seen[0].name)),
-                "check_points": len(set(seen[1].name)),
+                "control_points": len(set(self.matched_control.name)),
+                "check_points": len(set(self.matched_check.name)),
                 "scored_by": self.scored_by,
                 "cross_validation_groups": self.groups,
                 "methods": list(self.rows),
-                "unseen": [{"name": row["name"], "why": row["reason"]} for row in self.unseen],
+                "unseen": [{"name": row.name, "why": row.reason} for row in self.missing],
             },
         )
 
-    def write(self, out, clouds=(), overwrite=False, progress=None):
+    def write(
+        self,
+        out: str | Path,
+        clouds: Sequence[str] = (),
+        overwrite: bool = False,
+        progress: Callable | None = None,
+    ) -> dict:
         """Write compare.json and compare.html, and the clouds as some methods correct them.
 
         Parameters
@@ -197,19 +229,27 @@ class ComparedSurvey:
         clouds : sequence of str
             Names of methods; each one's clouds go into a folder of its name.
 
-        Returns the document. Its ``files`` name what was written, with the points outside the
-        trajectory, which time-dependent methods leave as they were. Raises ValueError for a
-        method that doesn't exist or wasn't determined, or when the folder holds an input, or
-        holds anything without overwrite; OSError when writing fails.
+        Returns
+        -------
+        dict
+            The document. Its ``files`` name what was written, with the points outside the
+            trajectory, which time-dependent methods leave as they were.
+
+        Raises
+        ------
+        ValueError
+            For a method that doesn't exist or wasn't determined, or when the folder holds an
+            input, or holds anything without overwrite.
+        OSError
+            When writing fails.
         """
         from mlscorr.report import basis, verdict, write_comparison
 
         for name in clouds:
             self._check_cloud(name)
-        check_output(out, input_files(self.survey.path), overwrite)
         content = self.document
         content |= {"basis": basis(content), "verdict": verdict(content)}
-        with output_folder(out) as folder:
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
             content["files"] = self._write_clouds(folder, clouds, progress or silent)
             write_json(folder / "compare.json", content)
             write_comparison(folder / "compare.html", content)
@@ -222,19 +262,21 @@ class ComparedSurvey:
 
     def _write_clouds(self, folder, names, progress):
         """Rows on the files that were written."""
-        points = sum(file.points for file in self.survey.clouds)
-        done = progress("Writing the clouds", points * len(names)) if names else None
+        done = progress("Writing the clouds", self.survey.points * len(names)) if names else None
         files = []
         for name in names:
             (folder / name).mkdir()
-            for file in self.survey.clouds:
-                outside = write_corrected(
-                    file,
-                    folder / name / file.path.name,
-                    self.corrections[name],
-                    lambda times: done(len(times)),
-                )
-                path = f"{name}/{file.path.name}"
-                row = {"method": name, "name": path, "points": file.points}
-                files.append({**row, "points_outside_trajectory": outside})
+            correction = self.corrections[name]
+            clouds = write_clouds(
+                self.survey, folder / name, correction, lambda times: done(len(times))
+            )
+            files += [
+                {
+                    "method": name,
+                    "name": f"{name}/{path.name}",
+                    "points": points,
+                    "points_outside_trajectory": outside,
+                }
+                for path, points, outside in clouds
+            ]
         return files

@@ -1,38 +1,44 @@
 """``correct``: from a survey to corrected clouds, trajectory and report."""
 
+from __future__ import annotations
+
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
-from mlscorr.correction import ORDER, Estimate, estimate_correction
-from mlscorr.evaluation import (
-    CHECK_REASON,
-    accuracy,
-    before_and_after,
-    model_section,
-    statistics,
-    target_rows,
-    unseen_rows,
-)
-from mlscorr.io.las import sha256, write_corrected
-from mlscorr.io.output import (
-    check_output,
-    document,
-    output_folder,
-    write_json,
-    write_targets_csv,
-)
-from mlscorr.io.survey_file import input_files, named_files
+from mlscorr.correction import PointSigma
+from mlscorr.estimate import SETTINGS, Estimate, NextControl, place_control
+from mlscorr.evaluate.datum import datum_warnings
+from mlscorr.evaluate.model import model_section
+from mlscorr.evaluate.rows import PointCounts, Score, TargetRow
+from mlscorr.evaluate.scores import accuracy, score
+from mlscorr.evaluate.target_rows import surveyed_rows, unseen_rows
+from mlscorr.evaluate.ties import tie_section
+from mlscorr.io.las import sha256
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.result_tables import write_targets_csv
 from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.pipeline.finding import find_control, silent
-from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
-from mlscorr.targets.fit import FittedTarget
-from mlscorr.uncertainty import PointSigma
+from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.tying import TieUse, estimate_survey
+from mlscorr.survey import Matched, Survey, Trajectory
+from mlscorr.targets import FittedTarget
 
 
-def correct(survey, order=ORDER, rng=None, progress=None):
+def correct(
+    survey: Survey,
+    order: int = SETTINGS.order,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    ties: TieUse | None = None,
+) -> CorrectedSurvey:
     """Find the targets of a survey and estimate the POS error from its control points.
+
+    Planes and poles that two passes both saw hold the passes together, where there are any.
 
     Parameters
     ----------
@@ -43,9 +49,20 @@ def correct(survey, order=ORDER, rng=None, progress=None):
         For the plane fit's random samples; the same seed each time by default.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
+    ties : str, optional
+        ``auto`` where passes overlap, ``off``, or ``only``: then no control point takes part, all
+        of them are check points, and the passes are brought together where the POS says they are.
+        What survey.toml says by default.
 
-    Returns a CorrectedSurvey. Raises ValueError when no target is found or matched. The check
-    points take no part.
+    Returns
+    -------
+    CorrectedSurvey
+        The check points take no part.
+
+    Raises
+    ------
+    ValueError
+        When no target is found or matched.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -60,17 +77,18 @@ def correct(survey, order=ORDER, rng=None, progress=None):
     >>> max(result.check["after"]["rmse"]) < 0.03
     True
     """
-    control, check, finding = find_control(survey, rng, progress)
-    estimate = estimate_correction(survey.trajectory, control, survey.control, survey.pos, order)
-    for sentence in estimate.warnings:
+    survey, control, check, finding, estimate = estimate_survey(survey, order, ties, rng, progress)
+    datum = datum_warnings(control[estimate.used], survey.trajectory, survey.pos)
+    for sentence in (*datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
     return CorrectedSurvey(
         survey=survey,
         estimate=estimate,
-        control_observations=control,
-        check_observations=check,
-        unseen=unseen_rows(survey, finding.matches.refusals, finding.candidates),
+        matched_control=control,
+        matched_check=check,
+        missing=unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned),
         fitted=finding.fitted,
+        warnings=(*finding.warnings, *datum),
     )
 
 
@@ -78,17 +96,26 @@ def correct(survey, order=ORDER, rng=None, progress=None):
 class CorrectedSurvey:
     """A corrected survey: the estimate, the targets, the statistics, and ``write``.
 
-    ``control`` and ``check`` hold n and the misclosures' statistics before and after, in m;
-    ``unseen`` are the surveyed points without an observation, as rows of report.json; ``fitted``
-    the targets by (pass number, gps_time), for their figures.
+    Parameters
+    ----------
+    survey : Survey
+    estimate : Estimate
+    matched_control, matched_check : Matched
+    missing : list of TargetRow
+        Surveyed points without an observation.
+    fitted : dict
+        The targets by (pass number, gps_time), for their figures.
+    warnings : tuple of str
+        On clouds and control, beside those of the estimate.
     """
 
     survey: Survey
     estimate: Estimate
-    control_observations: TargetObservations
-    check_observations: TargetObservations
-    unseen: list[dict] = field(default_factory=list)
+    matched_control: Matched
+    matched_check: Matched
+    missing: list[TargetRow] = field(default_factory=list)
     fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     @property
     def trajectory(self) -> Trajectory:
@@ -96,128 +123,155 @@ class CorrectedSurvey:
         return self.estimate.correction.corrected
 
     @property
-    def control(self):
-        fit = self._statistics(self.control_observations, self.survey.control)
-        left_out = self.estimate.left_out[np.isfinite(self.estimate.left_out).all(axis=1)]
-        return {**fit, "leave_one_out": {"n": len(left_out), **statistics(left_out)}}
+    def control(self) -> dict:
+        """What remains at the control points, as report.json has it."""
+        return self._control.document() | PointCounts.of(self.targets, "control").document()
 
     @property
-    def check(self):
-        return self._statistics(self.check_observations, self.survey.check)
+    def check(self) -> dict:
+        """What remains at the check points, as report.json has it."""
+        return self._check.document() | PointCounts.of(self.targets, "check").document()
 
     @property
-    def targets(self):
-        """Rows of every surveyed point and pass, as report.json has them."""
-        correction = self.estimate.correction
-        outliers = {outlier.name: outlier for outlier in self.estimate.outliers}
-        reasons = [
-            f"outlier: statistic {outliers[name].statistic:.1f} against "
-            f"{outliers[name].critical:.1f}"
-            if name in outliers
-            else None
-            for name in self.control_observations.name
-        ]
-        rows = target_rows(
-            self.control_observations,
-            self.survey.control,
-            correction,
-            "control",
-            reasons,
-            self.estimate.left_out,
-        )
-        none = [CHECK_REASON] * len(self.check_observations)
-        rows += target_rows(self.check_observations, self.survey.check, correction, "check", none)
-        return rows + self.unseen
+    def _control(self) -> Score:
+        return score(self.matched_control, self.estimate.correction, self.estimate.left_out)
 
     @property
-    def accuracy(self):
-        """Accuracy by ASPRS 2023, as report.json has it: mlscorr.accuracy."""
+    def _check(self) -> Score:
+        return score(self.matched_check, self.estimate.correction)
+
+    @property
+    def targets(self) -> list[TargetRow]:
+        """Rows of every surveyed point and pass."""
+        estimate = self.estimate
+        points = self.matched_control, self.matched_check
+        rows = surveyed_rows(*points, estimate.correction, estimate.outliers, estimate.left_out)
+        return rows + self.missing
+
+    @property
+    def accuracy(self) -> dict[str, object]:
+        """Accuracy by ASPRS 2023, as report.json has it: mlscorr.evaluate.accuracy."""
         return accuracy(
-            self.check_observations,
-            self.survey.check,
-            self.control_observations,
-            self.survey.control,
+            self.matched_check,
+            self.matched_control,
             self.estimate.correction,
             self.estimate.left_out,
         )
 
-    def _statistics(self, observations, points: ControlPoints):
-        return before_and_after(observations, points, self.estimate.correction)
-
-    def write(self, out, overwrite=False, progress=None, sigma=False):
+    def write(
+        self,
+        out: str | Path,
+        overwrite: bool = False,
+        progress: Callable | None = None,
+        sigma: bool = False,
+        page: bool = True,
+    ) -> dict:
         """Write corrected clouds, trajectory, targets and report into a folder.
 
-        With sigma, each point gets the fields sigma_easting, sigma_northing and sigma_height.
+        Parameters
+        ----------
+        out : path
+            The folder, which appears whole or not at all.
+        overwrite : bool
+            Whether files of the same name are replaced.
+        progress : function, optional
+        sigma : bool
+            Give each point the fields sigma_easting, sigma_northing and sigma_height.
+        page : bool
+            Draw report.html and the pictures too, which takes longer than all else where the
+            survey is short.
 
-        The folder appears whole or not at all. Returns the document of report.json. Raises
-        ValueError when the folder holds an input, or holds anything without overwrite; OSError
-        when writing fails.
+        Returns
+        -------
+        dict
+            The document of report.json.
+
+        Raises
+        ------
+        ValueError
+            When the folder holds an input, or holds anything without overwrite.
+        OSError
+            When writing fails.
         """
+        from mlscorr.report import headline
+
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
+            files, uncontrolled = self._write_clouds(folder, progress or silent, sigma)
+            write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
+            write_targets_csv(folder / "targets.csv", [row.document() for row in self.targets])
+            report = self._report(folder, files, uncontrolled)
+            content = document("report", {"headline": headline(report), **report.document()})
+            write_json(folder / "report.json", content)
+            if page:
+                self._draw(folder, report, progress or silent)
+        return content
+
+    def _draw(self, folder, report, progress):
+        """Write report.html and the pictures."""
         from mlscorr.report import view_cloud, write_pictures, write_report
 
-        check_output(out, input_files(self.survey.path), overwrite)
-        correction = self.estimate.correction
-        with output_folder(out) as folder:
-            files, outside = self._write_clouds(folder, progress or silent, sigma)
-            report = document("report", self._report(files, outside))
-            write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
-            write_targets_csv(folder / "targets.csv", report["targets"])
-            made = ("corrected trajectory", "trajectory.csv"), ("targets", "targets.csv")
-            report["outputs"] = [described(what, folder / name) for what, name in made]
-            write_json(folder / "report.json", report)
-            seen = view_cloud(self.survey, correction, report["targets"], progress or silent)
-            page = folder / "report.html"
-            write_report(page, self.survey, correction, report, seen, self.fitted)
-            (folder / "pictures").mkdir()
-            write_pictures(folder / "pictures", self.survey, correction, report)
-        return report
+        correction, ties = self.estimate.correction, self.estimate.ties
+        views = view_cloud(self.survey, correction, report.targets, progress, ties)
+        page = folder / "report.html"
+        write_report(page, self.survey, correction, report, views, self.fitted, ties)
+        (folder / "pictures").mkdir()
+        write_pictures(folder / "pictures", correction, report, ties)
+
+    @cached_property
+    def next_control(self) -> tuple[NextControl, ...]:
+        """Where one more control point each would help most, the best first."""
+        return place_control(self.estimate)
 
     @property
-    def point_sigma(self):
+    def point_sigma(self) -> PointSigma:
         """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m."""
         correction = self.estimate.correction
         return PointSigma.of(correction, self.survey.scanner, self.survey.mounting)
 
     def _write_clouds(self, folder, progress, sigma):
-        """The corrected clouds; rows of report.json, and points outside (trajectory, control)."""
-        first, last = self.estimate.span
-        files, outside_trajectory, outside_control = [], 0, 0
-        done = progress("Writing the cloud", sum(file.points for file in self.survey.clouds))
+        """Write the clouds: (path, points, outside) of each, and points outside of control and
+        extrapolated (2,).
+        """
+        first, last = self.estimate.span if self.estimate.used.any() else (np.inf, -np.inf)
+        uncontrolled = np.zeros(2, int)
+        done = progress("Writing the cloud", self.survey.points)
 
         def watch(times):
-            nonlocal outside_control
-            outside_control += int(np.count_nonzero((times < first) | (times > last)))
+            is_outside = (times < first) | (times > last)
+            is_weak = self.estimate.support.contains(times)
+            uncontrolled[:] += np.count_nonzero([is_outside, is_weak], axis=1)
             done(len(times))
 
-        correction, point_sigma = self.estimate.correction, self.point_sigma if sigma else None
-        for file in self.survey.clouds:
-            target = folder / file.path.name
-            outside_trajectory += write_corrected(file, target, correction, watch, point_sigma)
-            files.append({"name": file.path.name, "points": file.points, "sha256": sha256(target)})
-        return files, (outside_trajectory, outside_control)
+        sigmas = self.point_sigma if sigma else None
+        files = write_clouds(self.survey, folder, self.estimate.correction, watch, sigmas)
+        return files, uncontrolled.tolist()
 
-    def _report(self, files, outside):
-        epochs = np.unique(self.control_observations.gps_time[self.estimate.used])
-        return {
-            "name": self.survey.name,
-            "crs": self.survey.crs,
-            "notes": list(self.survey.notes),
-            "targets": self.targets,
-            "control": self.control,
-            "check": self.check,
-            "accuracy": self.accuracy,
-            "model": model_section(self.estimate),
-            "coverage": {
-                "control_span": list(self.estimate.span),
-                "longest_gap_s": float(np.diff(epochs).max(initial=0.0)),
-                "points_outside_trajectory": outside[0],
-                "points_outside_control": outside[1],
-            },
-            "files": files,
-            "inputs": [described(what, path) for what, path in named_files(self.survey.path)],
-        }
+    def _report(self, folder, files, uncontrolled):
+        """The CorrectionReport, once all that it names stands in the folder."""
+        from mlscorr.report.correction_report import CorrectionReport, Coverage, FileRow
 
+        def described(what, path):
+            return FileRow(path.name, sha256(path), what, bytes=path.stat().st_size)
 
-def described(what, path):
-    """A file as a row of report.json."""
-    return {"what": what, "name": path.name, "bytes": path.stat().st_size, "sha256": sha256(path)}
+        epochs = np.unique(self.matched_control.gps_time[self.estimate.used])
+        longest = float(np.diff(epochs if len(epochs) else self.estimate.span).max(initial=0.0))
+        outside, total = (sum(file[k] for file in files) for k in (2, 1))
+        span, support = self.estimate.span, self.estimate.support
+        outputs = ("corrected trajectory", "trajectory.csv"), ("targets", "targets.csv")
+        return CorrectionReport(
+            name=self.survey.name,
+            crs=self.survey.crs,
+            notes=(*self.survey.notes, *filter(None, [self.estimate.untied])),
+            targets=self.targets,
+            control=self._control,
+            check=self._check,
+            accuracy=self.accuracy,
+            model=model_section(self.estimate, self.warnings),
+            coverage=Coverage(span, longest, outside, *uncontrolled, total - outside),
+            support=support,
+            files=tuple(FileRow(path.name, sha256(path), points=n) for path, n, _ in files),
+            inputs=tuple(described(file.what, file.path) for file in self.survey.inputs),
+            outputs=tuple(described(what, folder / name) for what, name in outputs),
+            next_control=self.next_control,
+            ties=tie_section(self.estimate),
+        )

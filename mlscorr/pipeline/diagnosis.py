@@ -1,35 +1,58 @@
 """``diagnose``: where a survey and its simulation differ, why, and how far that can be mended."""
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
-from mlscorr.effects import EFFECTS
-from mlscorr.gap.advice import advise
-from mlscorr.gap.believed import as_believed, compared, with_cause
-from mlscorr.gap.causes import Inference, cause_of, infer
-from mlscorr.gap.changes import expected
-from mlscorr.gap.closure import Closure, close
-from mlscorr.gap.document import gap_document
-from mlscorr.gap.folds import best_known
-from mlscorr.gap.pairing import build_rows
-from mlscorr.gap.plan import NextData, next_data
-from mlscorr.gap.rerun import Beams, collect_beams, rerun
-from mlscorr.gap.rows import Rows, background
+from mlscorr.effects import Effect, known_effects
+from mlscorr.gap import (
+    Absence,
+    Beams,
+    BeamSimulator,
+    Closure,
+    Inference,
+    NextData,
+    PatchCollector,
+    Rows,
+    Surroundings,
+    as_believed,
+    background,
+    build_rows,
+    cause_for_simulator,
+    close_gap,
+    collect_beams,
+    find_absence,
+    gap_document,
+    infer_causes,
+    next_data,
+    with_cause,
+    without_effects,
+)
+from mlscorr.gap.observe import Pairing
 from mlscorr.gap.signatures import select, signatures
-from mlscorr.io.output import check_output, document, output_folder, write_json
-from mlscorr.io.survey_file import input_files
-from mlscorr.pipeline.finding import SEED, found_or_nothing, silent
+from mlscorr.io.las import read_chunks
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.pipeline.finding import find_or_compare_surfaces, silent
 from mlscorr.pipeline.planning import too_little
-from mlscorr.simulate.beliefs import Simulator, beliefs_of, write_simulator
-from mlscorr.survey import Survey
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.simulate.simulator_file import Simulator, beliefs_of, write_simulator
+from mlscorr.survey import Survey, TargetObservations
 
 STEPS = 6  # of the progress beside reading: the inference, folds, plan
-FEWEST = 6  # things seen with a residual in m: fewer than the pose has parameters say nothing
+LEAST_VIEWS = 6  # with a residual in m: fewer than the pose has parameters say nothing
 
 
-def diagnose(survey, simulator=None, library=EFFECTS, rng=None, progress=None):
+def diagnose(
+    survey: Survey,
+    simulator: Simulator | None = None,
+    library: Iterable[type[Effect]] | None = None,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+) -> DiagnosedSurvey:
     """Find where a survey differs from its simulation, why, and how far the gap can be closed.
 
     Parameters
@@ -38,15 +61,18 @@ def diagnose(survey, simulator=None, library=EFFECTS, rng=None, progress=None):
         With surveyed targets, a reference surface, or planes that two passes share.
     simulator : Simulator, optional
         What is believed already, as read_simulator reads it; what survey.toml says by default.
-    library : iterable of Effect classes
-        Effects to consider.
+    library : iterable of Effect classes, optional
+        Effects to consider; all known ones by default.
     rng : numpy.random.Generator, optional
         For replicas and the simulator's noise; the same seed each time by default.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number just done.
 
-    Returns a DiagnosedSurvey. Raises ValueError when there is too little to say anything, or when
-    a reference surface or the simulator can't be used.
+    Raises
+    ------
+    ValueError
+        When there is too little to say anything, or when a reference surface or the simulator
+        can't be used.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -62,78 +88,95 @@ def diagnose(survey, simulator=None, library=EFFECTS, rng=None, progress=None):
     >>> found.document["verdict"]["label"]
     'time_offset'
     """
-    rng = np.random.default_rng(SEED) if rng is None else rng
+    rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
+    library = known_effects() if library is None else library
     progress = progress or silent
     simulator = beliefs_of(survey) if simulator is None else simulator
     believed, effects = as_believed(survey, simulator)
-    pairing, rows, beams = _observed(survey, believed, library, progress)
-    again = _Again(rows, believed, beams, effects, rng.integers(2**63))
+    pairing, rows, beams, absence = _observed(survey, believed, library, progress)
+    simulator_of_beams = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
     step = progress("Weighing the causes", STEPS)
-    observed = compared(rows, believed, effects)
+    observed = without_effects(rows, believed, effects)
     used = np.arange(len(rows)) < len(pairing.rows)
     signs, left_out = signatures(observed, believed, library, rng)
-    part, mine = observed.select(used), select(signs, used)
-    inference = infer(part, background(part, believed), believed, mine, rng)
-    step(2)
-    cause = _tested(part, mine, inference)
-    unknown = inference.verdict.label == "unknown"
-    closure = close(
-        observed, used, believed, signs, inference.found, cause, again.added, rng, unknown, step
+    part, signs_of_part = observed.select(used), select(signs, used)
+    inference = infer_causes(
+        part, background(part, believed), believed, signs_of_part, rng, absence=absence
     )
-    open_ = [n for n in (*inference.verdict.set, *inference.same) if n != "unknown"]
-    plan = next_data(part, believed, library, tuple(dict.fromkeys(open_)), inference.separability)
+    step(2)
+    closure = close_gap(
+        observed,
+        used,
+        believed,
+        signs,
+        inference.evidence,
+        cause_for_simulator(part, signs_of_part, inference),
+        simulator_of_beams.added,
+        rng,
+        impostor=inference.verdict.label == "unknown" and not inference.verdict.is_hidden,
+        progress=step,
+    )
+    labels = [n for n in (*inference.verdict.set, *inference.same) if n != "unknown"]
+    plan = next_data(part, believed, library, tuple(dict.fromkeys(labels)), inference.separability)
+    plan = (*_looks_again(absence), *plan)
     step(2)
     return DiagnosedSurvey(
-        survey, simulator, effects, part, inference, closure, plan, left_out, pairing.notes
+        survey, simulator, effects, part, inference, closure, plan, left_out, pairing.notes, absence
     )
 
 
-def _observed(survey, believed, library, progress):
-    """The Pairing, all its rows, check points last, and the Beams on which they stand."""
-    finding, notes = found_or_nothing(believed, progress)
-    points = sum(file.points for file in survey.clouds)
-    done = progress("Looking for surfaces", points)
-    pairing = build_rows(believed, finding.matches.matched, finding.candidates, progress=done)
-    looks = len(np.unique(pairing.rows.item[pairing.rows.metric]))
-    if looks < FEWEST:
-        raise ValueError(too_little(survey, pairing.rows, looks, library, notes))
+def _looks_again(absence):
+    """What to measure where surveyed targets have no residual."""
+    return [
+        NextData(
+            f"the stretch from {run.gps_time[0]:.1f} to {run.gps_time[-1]:.1f} s again, and its "
+            f"targets {', '.join(run.name)}",
+            f"{len(run.name)} neighbours within sight have no residual: nothing is known there.",
+        )
+        for run in absence.runs
+    ]
+
+
+def _with_moved(finding, survey):
+    """The Finding with observations of control points that stand elsewhere than was surveyed.
+
+    Their misclosures are what target_outlier is known by. Check points stay as they were matched.
+    """
+    moved = finding.matches.moved
+    if moved is None:
+        return finding
+    moved = moved[np.isin(np.array(moved.name, dtype=str), survey.control.name)]
+    matched = TargetObservations.concatenate([finding.matches.matched, moved])
+    matches = replace(finding.matches, matched=matched)
+    return replace(finding, matches=matches)
+
+
+def _observed(survey, believed, library, progress) -> tuple[Pairing, Rows, Beams, Absence]:
+    """The Pairing, all its rows, check points last, the Beams on which they stand, the Absence.
+
+    The clouds are read once: targets, patches and what lies about targets are taken from each
+    chunk as it comes.
+    """
+    collector, surroundings = PatchCollector(believed), Surroundings(believed)
+
+    def read(file):
+        for chunk in read_chunks(file):
+            collector.add(file, chunk)
+            surroundings.add(chunk)
+            yield chunk
+
+    finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
+    patches = collector.patches()
+    absence = find_absence(believed, finding.matches)
+    finding = _with_moved(finding, believed)
+    pairing = build_rows(believed, finding.matches.matched, finding.candidates, patches)
+    views = len(np.unique(pairing.rows.item[pairing.rows.metric]))
+    if views < LEAST_VIEWS:
+        raise ValueError(too_little(survey, pairing.rows, views, library, notes))
     pairing = replace(pairing, notes=(*notes, *pairing.notes))
     rows = Rows.concatenate([pairing.rows, pairing.check])
-    done = progress("Simulating the survey's own beams", points)
-    return pairing, rows, collect_beams(believed, rows, finding, done)
-
-
-@dataclass(frozen=True)
-class _Again:
-    """The simulator, run again on a survey's own beams with the same noise each time."""
-
-    rows: Rows
-    survey: Survey
-    beams: Beams
-    effects: tuple
-    seed: int
-
-    def added(self, more):
-        """What further effects add to each row (m,); to the first order where no run tells it."""
-        added = self._run((*self.effects, *more)) - self._plain
-        linear = expected(self.rows, self.survey, more).shift
-        return np.where(np.isfinite(added) & self.rows.metric, added, linear)
-
-    @cached_property
-    def _plain(self):
-        return self._run(self.effects)
-
-    def _run(self, effects):
-        rng = np.random.default_rng(self.seed)
-        return rerun(self.rows, self.survey, self.beams, effects, rng)
-
-
-def _tested(rows, signs, inference):
-    """The cause that is put into the simulator: the verdict's; the best known one for unknown."""
-    if inference.verdict.label != "unknown":
-        return inference.cause
-    best = best_known(inference.probability)
-    return cause_of(rows, signs, inference.found, best, inference.probability.get(best, 0.0))
+    beams = collect_beams(believed, rows, finding, patches, surroundings)
+    return pairing, rows, beams, absence
 
 
 @dataclass(frozen=True)
@@ -142,19 +185,18 @@ class DiagnosedSurvey:
 
     survey: Survey
     simulator: Simulator
-    effects: tuple
+    effects: tuple[Effect, ...]
     rows: Rows
     inference: Inference
     closure: Closure
     next_data: tuple[NextData, ...]
     left_out: dict[str, str]
     warnings: tuple[str, ...]
+    absence: Absence = field(default_factory=Absence)
 
     @property
-    def document(self):
+    def document(self) -> dict:
         """The document of gap.json."""
-        verdict = self.inference.verdict
-        unknown = self.closure if verdict.label == "unknown" else None
         return document(
             "gap",
             gap_document(
@@ -163,32 +205,45 @@ class DiagnosedSurvey:
                 inference=self.inference,
                 closure=self.closure,
                 next_data=self.next_data,
-                advice=advise(verdict, self.inference.same, self.next_data, unknown),
                 effects=self.effects,
                 left_out=self.left_out,
                 warnings=self.warnings,
+                absence=self.absence,
             ),
         )
 
     @property
-    def improved(self):
+    def improved(self) -> Simulator:
         """The Simulator with the cause in it; the same where there is none that it could take."""
         if self.inference.verdict.label in ("none", "unknown"):
             return self.simulator
         return with_cause(self.simulator, self.survey, self.inference.cause)
 
-    def write(self, out, overwrite=False):
+    def write(self, out: Path, overwrite: bool = False) -> dict:
         """Write gap.json, gap.html and simulator.toml into a folder, whole or not at all.
 
-        Returns the document of gap.json. Raises as ``CorrectedSurvey.write`` does.
-        """
-        from mlscorr.report.gap_page import gap_page
+        Parameters
+        ----------
+        out : Path
+        overwrite : bool
+            An older folder.
 
-        check_output(out, input_files(self.survey.path), overwrite)
+        Returns
+        -------
+        document : dict
+            That of gap.json.
+
+        Raises
+        ------
+        Exception
+            As ``CorrectedSurvey.write`` does.
+        """
+        from mlscorr.report.gap import diagnosis_page
+
         content = self.document
-        page = gap_page(content, self.survey.name)
-        with output_folder(out) as folder:
+        page = diagnosis_page(content, self.survey.name)
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
             write_json(folder / "gap.json", content)
-            (folder / "gap.html").write_text(page, encoding="utf-8")
+            page.write(folder / "gap.html")
             write_simulator(self.improved, folder / "simulator.toml")
         return content

@@ -1,32 +1,34 @@
 """``extract``: from a survey to the list of all target-like objects in its cloud."""
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from mlscorr.io.las import read_chunks
-from mlscorr.io.output import (
-    check_output,
-    document,
-    output_folder,
-    write_extracted_csv,
-    write_json,
-)
-from mlscorr.io.survey_file import input_files
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.result_tables import write_extracted_csv
 from mlscorr.matching import Matches
-from mlscorr.pipeline.finding import SEED, Finding, fit_while_reading, matched, silent
-from mlscorr.survey import Survey
-from mlscorr.targets.extract import as_observations
-from mlscorr.targets.intensity import why_useless
-from mlscorr.targets.search import are_same, distinct, search_targets
-from mlscorr.targets.shapes import BY_EDGES
+from mlscorr.pipeline.finding import (
+    Finding,
+    by_pass_and_time,
+    fit_while_reading,
+    match_targets,
+    silent,
+)
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.survey import Survey, TargetObservations
+from mlscorr.targets import BY_EDGES, as_observations, distinct, search_targets, why_useless
 
-UNKNOWN = ("circle", "square", "checkerboard")  # kinds that stand out without a surveyed place
+BRIGHT_KINDS = ("circle", "square", "checkerboard")  # kinds that stand out without a surveyed place
 NO_CONTROL = "No control point is known: every object was taken as it looks."
 
 
-def extract(survey, rng=None, progress=None):
+def extract(
+    survey: Survey, rng: np.random.Generator | None = None, progress: Callable | None = None
+) -> "ExtractedSurvey":
     """List all target-like objects in the cloud of a survey, with and without control.
 
     Objects of the control points' kinds and sizes are found everywhere, near control points
@@ -42,7 +44,10 @@ def extract(survey, rng=None, progress=None):
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
 
-    Returns an ExtractedSurvey. Warns when the intensity tells nothing, or no object was found.
+    Returns
+    -------
+    ExtractedSurvey
+        Warns when the intensity tells nothing, or no object was found.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -57,65 +62,57 @@ def extract(survey, rng=None, progress=None):
     >>> sum(row["matched"] for row in found.targets)
     5
     """
-    rng = np.random.default_rng(SEED) if rng is None else rng
-    surveyed = survey.control + survey.check
+    rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
+    surveyed = survey.surveyed
     kinds = dict.fromkeys(zip(surveyed.kind, surveyed.size.tolist(), strict=True))
     shapes = [shape for shape in kinds if shape[0] not in BY_EDGES]
     if len(surveyed) == 0:
-        shapes = [(kind, None) for kind in UNKNOWN]
-    done = (progress or silent)("Searching the cloud", sum(file.points for file in survey.clouds))
-    seen, found = np.zeros(1 << 16, bool), {}
+        shapes = [(kind, None) for kind in BRIGHT_KINDS]
+    done = (progress or silent)("Searching the cloud", survey.points)
+    present, objects = np.zeros(1 << 16, bool), {}
 
     def searched(file):
         """The chunks of a file, each searched as it passes."""
-        objects = found.setdefault(len(found), [])
-        chunks = read_chunks(file)
-        for chunk, some in search_targets(
-            chunks, survey.trajectory, shapes, survey.scanner, rng, _lever_arm(survey)
-        ):
-            seen[chunk.intensity] = True
-            objects += some
+        of_file = objects.setdefault(len(objects), [])
+        for chunk, targets in search_targets(read_chunks(file), survey, shapes, rng):
+            present[chunk.intensity] = True
+            of_file += targets
             yield chunk
 
     near, candidates, _ = fit_while_reading(survey, searched, rng, done)
-    everywhere = []
-    for file, objects in found.items():
-        for target in distinct(objects):
-            segment = int(survey.trajectory.segment(target.gps_time))
-            everywhere.append((candidates.passes[file, segment], target))
+    everywhere = [
+        (candidates.passes[file, int(survey.trajectory.segment(target.gps_time))], target)
+        for file, targets in objects.items()
+        for target in distinct(targets)
+    ]
     result = _without_doubles(near, everywhere)
-    sentences = _sentences(survey, np.flatnonzero(seen), result)
+    sentences = _sentences(survey, np.flatnonzero(present), result)
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=2)
     return ExtractedSurvey(survey, _finding(result, candidates, survey), sentences)
 
 
-def _lever_arm(survey):
-    return np.zeros(3) if survey.mounting is None else survey.mounting.lever_arm
-
-
 def _without_doubles(near, everywhere):
-    """Both lists as one, in order of pass and time; near control, the surveyed size is known."""
+    """Both lists together, in order of pass and time; near control, the surveyed size is known."""
     others = [
         (number, target)
         for number, target in everywhere
-        if not any(number == n and are_same(target, other) for n, other in near)
+        if not any(number == n and target.overlaps(other) for n, other in near)
     ]
     return sorted(near + others, key=lambda pair: (pair[0], pair[1].gps_time))
 
 
-def _finding(found, candidates, survey):
+def _finding(targets, candidates, survey):
     """The Finding, which has no match where nothing was surveyed or found."""
-    if found and len(survey.control) + len(survey.check):
-        return matched(found, candidates, survey)
-    observations = as_observations(found)
-    none = np.zeros(len(found), bool)
-    reasons = (NO_CONTROL,) * len(found)
-    matches = Matches(observations[none], observations, (), np.empty(0), reasons)
-    return Finding(matches, candidates, {(n, t.gps_time): t for n, t in found})
+    if targets and len(survey.surveyed):
+        return match_targets(targets, candidates, survey)
+    observations = as_observations(targets)
+    nothing, reasons = observations[np.zeros(len(targets), bool)], (NO_CONTROL,) * len(targets)
+    matches = Matches(nothing, observations, (), np.empty(0), reasons)
+    return Finding(matches, candidates, by_pass_and_time(targets))
 
 
-def _sentences(survey, intensities, found):
+def _sentences(survey, intensities, targets):
     """What a reader of the list must know."""
     sentences = []
     useless = why_useless(intensities)
@@ -125,8 +122,8 @@ def _sentences(survey, intensities, found):
             f"The cloud has no useful intensity (values: {values}), so that only plates that "
             "stand free, told by their edges, were looked for. Export the cloud with intensity."
         )
-    if len(found) == 0:
-        points = sum(file.points for file in survey.clouds)
+    if len(targets) == 0:
+        points = survey.points
         sentences.append(
             f"No target-like object was found among {points} points. Flat circles, squares and "
             "checkerboards, brighter than what surrounds them and with 25 points or more, are "
@@ -137,14 +134,21 @@ def _sentences(survey, intensities, found):
 
 @dataclass(frozen=True)
 class ExtractedSurvey:
-    """What was found in a survey's cloud, and ``write``."""
+    """What was found in a survey's cloud, and ``write``.
+
+    Parameters
+    ----------
+    survey : Survey
+    finding : Finding
+    warnings : tuple of str
+    """
 
     survey: Survey
     finding: Finding
     warnings: tuple[str, ...]
 
     @property
-    def targets(self):
+    def targets(self) -> list[dict]:
         """Rows of every object and pass, as targets.json has them, in order of pass and time."""
         matches = self.finding.matches
         rows = self._rows(matches.matched, [None] * len(matches.matched))
@@ -152,14 +156,14 @@ class ExtractedSurvey:
         return sorted(rows, key=lambda row: (row["pass"], row["gps_time"]))
 
     @property
-    def unseen(self):
+    def missing(self) -> list[dict]:
         """Surveyed points without an observation, with the pass and the reason."""
         return [
             {"name": refusal.name, "pass": refusal.pass_number, "reason": refusal.reason}
             for refusal in self.finding.matches.refusals
         ]
 
-    def _rows(self, observations, reasons):
+    def _rows(self, observations: TargetObservations, reasons) -> list[dict]:
         rows = []
         for i, reason in enumerate(reasons):
             number, time = int(observations.pass_number[i]), float(observations.gps_time[i])
@@ -183,29 +187,43 @@ class ExtractedSurvey:
             )
         return rows
 
-    def write(self, out, overwrite=False):
+    def write(self, out: str | Path, overwrite: bool = False) -> dict:
         """Write targets.csv, targets.json and the contact sheet targets.png into a folder.
 
-        The folder appears whole or not at all. Returns the document of targets.json. Raises
-        ValueError when the folder holds an input, or holds anything without overwrite; OSError
-        when writing fails.
+        The folder appears whole or not at all.
+
+        Parameters
+        ----------
+        out : path
+        overwrite : bool
+
+        Returns
+        -------
+        dict
+            The document of targets.json.
+
+        Raises
+        ------
+        ValueError
+            When the folder holds an input, or holds anything without overwrite.
+        OSError
+            When writing fails.
         """
         from mlscorr.report import write_contact_sheet
 
-        check_output(out, input_files(self.survey.path), overwrite)
         rows = self.targets
         content = document(
             "targets",
             {
                 "name": self.survey.name,
                 "crs": self.survey.crs,
-                "surveyed": len(self.survey.control) + len(self.survey.check),
+                "surveyed": len(self.survey.surveyed),
                 "targets": rows,
-                "unseen": self.unseen,
+                "unseen": self.missing,
                 "warnings": list(self.warnings),
             },
         )
-        with output_folder(out) as folder:
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
             write_extracted_csv(folder / "targets.csv", rows)
             write_json(folder / "targets.json", content)
             write_contact_sheet(folder / "targets.png", rows, self.finding.fitted)

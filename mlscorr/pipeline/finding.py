@@ -1,105 +1,252 @@
-"""From cloud files to matched targets."""
+"""From cloud files to matched targets: read, fit, match."""
 
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.las import read_chunks
 from mlscorr.matching import Matches, match
-from mlscorr.survey import PointCloud
-from mlscorr.targets.candidates import NO_POINTS, Candidates, collect, search_radius
-from mlscorr.targets.extract import as_observations, fit_near_control
-from mlscorr.targets.fit import FittedTarget
-
-SEED = 0  # of the random samples in the plane fit: the same survey gives the same result
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.survey import Matched, PointCloud, Survey
+from mlscorr.targets import (
+    NO_POINTS,
+    Candidates,
+    FittedTarget,
+    Neighbourhoods,
+    PassTarget,
+    as_observations,
+    collect,
+    fit_near_control,
+    search_radius,
+)
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Targets of a survey: the matches; the points on all targets, with their passes, and those
-    without a pose; and each target as fitted, by (pass number, gps_time), for its figure.
+    """Targets of a survey.
+
+    Parameters
+    ----------
+    matches : Matches
+    candidates : Candidates
+        The points on all targets, with their passes, and those without a pose.
+    fitted : dict
+        Each FittedTarget by (pass number, gps_time), for its figure.
+    scanned : frozenset of str
+        Names of the surveyed points that have points of the cloud about them.
+    warnings : tuple of str
+        On cloud files whose beams can't have been measured so.
     """
 
     matches: Matches
     candidates: Candidates
     fitted: dict[tuple[int, float], FittedTarget]
+    scanned: frozenset[str] = frozenset()
+    warnings: tuple[str, ...] = ()
 
 
-def find_targets(survey, rng=None, progress=None):
-    """Find the surveyed targets in the cloud and match them: a Finding.
+def find_targets(
+    survey: Survey,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    read: Callable = read_chunks,
+) -> Finding:
+    """Find the surveyed targets in the cloud and match them.
 
-    Raises ValueError when no target is found, or none of those found matches.
+    Parameters
+    ----------
+    survey : Survey
+    rng : numpy.random.Generator, optional
+        For the random samples of flat patches; the same seed each time by default.
+    progress : function, optional
+        ``progress(title, total)`` returns a function of the number of points just done.
+    read : function of a CloudFile
+        Gives an iterator of PointCloud.
+
+    Raises
+    ------
+    ValueError
+        When no target is found, or none of those found matches.
     """
-    surveyed = survey.control + survey.check
-    progress = progress or silent
-    done = progress("Reading the cloud", sum(file.points for file in survey.clouds))
-    found, candidates, near = fit_while_reading(survey, read_chunks, rng, done)
-    if len(found) == 0:
-        raise ValueError(nothing_found(survey, candidates, near))
-    finding = matched(found, candidates, survey)
+    done = _bar(survey, progress)
+    return _checked(survey, *fit_while_reading(survey, read, rng, done))
+
+
+def _bar(survey, progress):
+    return (progress or silent)("Reading the cloud", survey.points)
+
+
+def _checked(survey, targets, candidates, near):
+    """The Finding of what fit_while_reading gives; raises as find_targets does."""
+    sentences = tuple(near.beams.warnings())
+    for sentence in sentences:
+        warnings.warn(sentence, stacklevel=4)
+    if len(targets) == 0:
+        raise ValueError(_nothing_found(survey, candidates, near))
+    finding = match_targets(targets, candidates, survey)
     if len(finding.matches.matched) == 0:
         reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
         raise ValueError(
-            f"{len(found)} targets were found, and none of them matches one of the "
-            f"{len(surveyed)} surveyed points. {reasons} Are control and cloud in the same CRS?"
+            f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
+            f"were found (intensity {near.darkest:.0f} to {near.brightest:.0f} there). {reasons} "
+            "Are control and cloud in the same CRS?"
         )
-    return finding
+    names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
+    return replace(finding, scanned=names, warnings=sentences)
 
 
 @dataclass
-class Near:
-    """Points near surveyed points that were looked at: their number and range of intensity."""
+class NearPoints:
+    """Points near surveyed points that were looked at: their number and range of intensity.
 
+    Parameters
+    ----------
+    balls : Neighbourhoods
+        About the surveyed points.
+    beams : BeamCheck
+    is_scanned : (b,) bool array
+        Which balls hold points.
+    points : int
+    darkest, brightest : float
+    """
+
+    balls: Neighbourhoods
+    beams: BeamCheck
+    is_scanned: np.ndarray
     points: int = 0
     darkest: float = np.inf
     brightest: float = -np.inf
 
+    @classmethod
+    def of(cls, survey: Survey) -> NearPoints:
+        """None yet of a survey."""
+        places = survey.surveyed.position
+        balls = Neighbourhoods(places, np.full(len(places), SETTINGS.scanned_radius))
+        return cls(balls, BeamCheck(survey), np.zeros(len(places), bool))
 
-def fit_while_reading(survey, read, rng=None, progress=None):
+    def add(self, cloud: PointCloud) -> None:
+        """Count more of them.
+
+        Parameters
+        ----------
+        cloud : PointCloud
+            At least one point.
+        """
+        if not self.is_scanned.all():
+            some = cloud.xyz[:: SETTINGS.scanned_stride]
+            self.is_scanned |= [len(rows) > 0 for rows in self.balls.each(some)]
+        self.points += len(cloud)
+        self.darkest = min(self.darkest, float(cloud.intensity.min()))
+        self.brightest = max(self.brightest, float(cloud.intensity.max()))
+
+
+def fit_while_reading(
+    survey: Survey,
+    read: Callable,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    settle: Callable | None = None,
+) -> tuple[list[PassTarget], Candidates, NearPoints]:
     """Fit targets near surveyed points while the clouds are read.
 
-    Returns pairs (pass number, FittedTarget) in order of pass and time, the Candidates that are
-    left, which hold the passes and the points without a pose, and Near.
+    Parameters
+    ----------
+    survey : Survey
+    read : function of a CloudFile
+        Gives an iterator of PointCloud.
+    rng, progress
+        As of ``find_targets``, progress already with its title.
+    settle : function, optional
+        ``settle(fitted, since)`` is told of each FittedTarget, and of the time (s) before which
+        no other will have points.
+
+    Returns
+    -------
+    targets : list of (pass number, FittedTarget)
+        In order of pass and time.
+    candidates : Candidates
+        Those that are left, which hold the passes and the points without a pose.
+    near : NearPoints
     """
-    surveyed = survey.control + survey.check
-    rng = np.random.default_rng(SEED) if rng is None else rng
+    rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
     seed = rng.integers(2**63)
-    fitted, near = [], Near()
+    fitted, near = [], NearPoints.of(survey)
 
-    def finished(file, cloud, segment):
-        if len(cloud) == 0:
-            return
-        near.points += len(cloud)
-        near.darkest = min(near.darkest, float(cloud.intensity.min()))
-        near.brightest = max(near.brightest, float(cloud.intensity.max()))
-        part = Candidates(cloud, segment, NO_POINTS, {})
-        same = np.random.default_rng(seed)  # whatever was looked at before
-        arguments = part, surveyed, survey.trajectory, survey.scanner, same, survey.mounting
-        fitted.extend((file, segment, t) for segment, t in fit_near_control(*arguments))
+    def finished(file, cloud, segment, since):
+        targets = []
+        if len(cloud):
+            near.add(cloud)
+            generator = np.random.default_rng(seed)  # whatever was looked at before
+            part = Candidates(cloud, segment, NO_POINTS, {})
+            targets = fit_near_control(part, survey, generator)
+        fitted.extend((file, *target) for target in targets)
+        if settle is not None:
+            settle([target for _, target in targets], since)
 
-    clouds, trajectory = survey.clouds, survey.trajectory
-    candidates = collect(clouds, trajectory, surveyed, read, progress, finished)
-    found = [(candidates.passes[file, segment], t) for file, segment, t in fitted]
-    return sorted(found, key=lambda pair: (pair[0], pair[1].gps_time)), candidates, near
-
-
-def matched(found, candidates, survey):
-    """The Finding of pairs (pass number, FittedTarget)."""
-    surveyed = survey.control + survey.check
-    matches = match(as_observations(found), surveyed, survey.trajectory, survey.pos)
-    numbers = np.repeat([n for n, _ in found], [len(t.cloud) for _, t in found]).astype(int)
-    cloud = PointCloud.concatenate([NO_POINTS, *(t.cloud for _, t in found)])
-    on_targets = replace(candidates, cloud=cloud, pass_number=numbers)
-    return Finding(matches, on_targets, {(n, t.gps_time): t for n, t in found})
+    candidates = collect(survey, near.beams.watched(read), progress, finished)
+    targets = [(candidates.passes[file, segment], target) for file, segment, target in fitted]
+    return sorted(targets, key=lambda pair: (pair[0], pair[1].gps_time)), candidates, near
 
 
-def find_control(survey, rng=None, progress=None):
-    """Find the targets and tell them apart by role: (control, check, Finding).
+def match_targets(targets: list[PassTarget], candidates: Candidates, survey: Survey) -> Finding:
+    """Match fitted targets with the surveyed points.
 
-    control and check are TargetObservations. Raises ValueError as find_targets does, and when no
-    control point was surveyed or found.
+    Parameters
+    ----------
+    targets : list of (pass number, FittedTarget)
+    candidates : Candidates
+        Their passes and the points without a pose are kept.
+    survey : Survey
     """
-    if len(survey.control) + len(survey.check) == 0:
+    observations = as_observations(targets)
+    matches = match(
+        observations, survey.surveyed, survey.trajectory, survey.pos, survey.search_radius
+    )
+    numbers = np.repeat([n for n, _ in targets], [len(t.cloud) for _, t in targets]).astype(int)
+    cloud = PointCloud.concatenate([NO_POINTS, *(t.cloud for _, t in targets)])
+    on_targets = replace(candidates, cloud=cloud, pass_number=numbers)
+    return Finding(matches, on_targets, by_pass_and_time(targets))
+
+
+def by_pass_and_time(targets: list[PassTarget]) -> dict[tuple[int, float], FittedTarget]:
+    """Fitted targets by (pass number, gps_time).
+
+    Parameters
+    ----------
+    targets : list of (pass number, FittedTarget)
+    """
+    return {(number, target.gps_time): target for number, target in targets}
+
+
+def find_control(
+    survey: Survey,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    read: Callable = read_chunks,
+) -> tuple[Matched, Matched, Finding]:
+    """Find the targets and part them by role.
+
+    Parameters
+    ----------
+    survey, rng, progress, read
+        As of ``find_targets``.
+
+    Returns
+    -------
+    control, check : Matched
+    finding : Finding
+
+    Raises
+    ------
+    ValueError
+        As find_targets does, and when no control point was surveyed or found.
+    """
+    if len(survey.surveyed) == 0:
         raise ValueError(
             f"{survey.path} gives no control points: it has no section [control], or the file "
             "named there is empty. A correction needs surveyed points; mlscorr extract lists the "
@@ -110,10 +257,10 @@ def find_control(survey, rng=None, progress=None):
             f"{survey.path} names {len(survey.check)} check points and no control point: check "
             "points never enter an estimate. Give some of them the role control."
         )
-    finding = find_targets(survey, rng, progress)
-    observed = finding.matches.matched
-    is_control = np.array([name in survey.control.name for name in observed.name])
-    control, check = observed[is_control], observed[~is_control]
+    finding = find_targets(survey, rng, progress, read)
+    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
+    is_control = np.isin(matched.name, survey.control.name)
+    control, check = matched[is_control], matched[~is_control]
     if len(control) == 0:
         raise ValueError(
             f"None of the {len(survey.control)} control points was found in the cloud, only "
@@ -122,27 +269,70 @@ def find_control(survey, rng=None, progress=None):
     return control, check, finding
 
 
-def found_or_nothing(survey, progress=None):
-    """The Finding, empty where nothing was surveyed or found, and the sentence that says so."""
-    nothing = "No target was surveyed: only surfaces are compared."
-    if len(survey.control) + len(survey.check):
+def find_check(
+    survey: Survey, progress: Callable | None = None, read: Callable = read_chunks
+) -> tuple[Matched, Matched, Finding]:
+    """Find the check points of a survey without control, where there are any.
+
+    Parameters
+    ----------
+    survey, progress, read
+        As of ``find_targets``; the clouds are read to their ends in any case.
+
+    Returns
+    -------
+    control, check : Matched
+        None of the first.
+    finding : Finding
+    """
+    finding, _ = find_or_compare_surfaces(survey, read, None, progress)
+    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
+    return Matched.none(), matched, finding
+
+
+def find_or_compare_surfaces(
+    survey: Survey,
+    read: Callable = read_chunks,
+    settle: Callable | None = None,
+    progress: Callable | None = None,
+    rng: np.random.Generator | None = None,
+) -> tuple[Finding, tuple[str, ...]]:
+    """Find the targets where there are any: a diagnosis can do without.
+
+    Parameters
+    ----------
+    survey, read, settle
+        As of ``fit_while_reading``; the clouds are read to their ends in any case.
+    progress, rng
+        As of ``find_targets``.
+
+    Returns
+    -------
+    finding : Finding
+        Empty where nothing was surveyed or found.
+    notes : tuple of str
+        The sentence that says so.
+    """
+    fitted = fit_while_reading(survey, read, rng, _bar(survey, progress), settle)
+    note = "No target was surveyed: only surfaces are compared."
+    if len(survey.surveyed):
         try:
-            return find_targets(survey, progress=progress), ()
+            return _checked(survey, *fitted), ()
         except ValueError as error:
-            nothing = f"{error} Only surfaces are compared."
-    none, empty = as_observations([]), Candidates(NO_POINTS, np.empty(0, int), NO_POINTS, {})
-    return Finding(Matches(none, none, (), np.empty(0), ()), empty, {}), (nothing,)
+            note = f"{error} Only surfaces are compared."
+    nothing, empty = as_observations([]), Candidates(NO_POINTS, np.empty(0, int), NO_POINTS, {})
+    return Finding(Matches(nothing, nothing, (), np.empty(0), ()), empty, {}), (note,)
 
 
-def silent(title, total):
-    """A progress that tells nobody."""
-    return lambda points: None
+def silent(_title: str, _total: int) -> Callable:
+    """Progress that is shown nowhere."""
+    return lambda _points: None
 
 
-def nothing_found(survey, candidates, near):
+def _nothing_found(survey, candidates, near):
     """The sentence for a cloud in which no surveyed target was found."""
-    surveyed = survey.control + survey.check
-    radius = search_radius(survey.trajectory, surveyed).max()
+    surveyed = survey.surveyed
+    radius = search_radius(survey, surveyed).max()
     if len(candidates.unplaced) > near.points:
         return (
             f"No target was found: {len(candidates.unplaced)} of the points near surveyed points "

@@ -4,26 +4,36 @@ import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
+from functools import partial
 
 from mlscorr.baselines import (
     RAW,
     Undetermined,
     fit_affine,
+    fit_gaussian_process,
     fit_horizontal_and_height,
+    fit_linear,
     fit_literal,
+    fit_pchip,
     fit_polynomial,
     fit_rigid,
     fit_shift,
 )
-from mlscorr.correction import estimate_correction
+from mlscorr.estimate import estimate_correction
+from mlscorr.pipeline.settings import SETTINGS
 
 
 @dataclass(frozen=True)
 class Method:
     """A way to correct a cloud.
 
-    ``fit(survey, observations, candidates)`` gives what has ``apply(cloud)``, and what is worth
-    knowing of it as a dict; it raises Undetermined where the control points don't suffice.
+    Parameters
+    ----------
+    name, kind, about : str
+        As compare.json has them.
+    fit : function
+        ``fit(survey, matched, candidates)`` gives what has ``apply(cloud)``, and details of it as
+        a dict; it raises Undetermined where the control points don't suffice.
     """
 
     name: str
@@ -32,41 +42,47 @@ class Method:
     fit: Callable = field(repr=False)
 
 
-def _as_one(fit):
+def _of_pairs(fit):
     """A fit that needs no more than pairs of places."""
-    return lambda survey, observations, _: (fit(observations, survey.control), {})
+    return lambda _survey, matched, _: (fit(matched), {})
 
 
-def load_open3d():
+def load_open3d() -> str | None:
     """Why Open3D can't be loaded, or None."""
     try:
         import mlscorr.baselines.registration  # noqa: F401
     except (ImportError, OSError) as error:  # OSError: a system library of Open3D is missing
         return f"Open3D can't be loaded ({error}). Run mlscorr doctor to see what is missing."
+    return None
 
 
-def _icp(survey, observations, candidates):
+def _icp(_survey, matched, candidates):
     problem = load_open3d()
     if problem is not None:
         raise Undetermined(problem)
     from mlscorr.baselines.registration import fit_icp
 
-    found = fit_icp(observations, survey.control, candidates.cloud, candidates.pass_number)
+    registration = fit_icp(matched, candidates.cloud, candidates.pass_number)
     names = ("variant", "fitness", "inlier_rmse", "control_before", "control_after")
-    return found, {name: getattr(found, name) for name in names}
+    return registration, {name: getattr(registration, name) for name in names}
+
+
+def _over_time(fit):
+    """A fit that needs the trajectory and the control points."""
+    return lambda survey, matched, _: (fit(survey.trajectory, matched), {})
 
 
 def _polynomial(order):
-    def fit(survey, observations, _):
-        return fit_polynomial(survey.trajectory, observations, survey.control, order), {}
+    def fit(survey, matched, _):
+        return fit_polynomial(survey.trajectory, matched, order), {}
 
     about = f"Polynomials of time of order {order}, one for each axis, by least squares."
     return Method(f"ls-{order}", "over time", about, fit)
 
 
 def _literal(order):
-    def fit(survey, observations, _):
-        return fit_literal(survey.trajectory, observations, survey.control, survey.pos, order)
+    def fit(survey, matched, _):
+        return fit_literal(survey.trajectory, matched, survey.pos, order)
 
     about = (
         f"Collocation as the paper prints it: order {order}, variances that the POS states, a "
@@ -75,8 +91,8 @@ def _literal(order):
     return Method(f"lsc-{order}", "collocation", about, fit)
 
 
-def _lsc(survey, observations, _):
-    estimate = estimate_correction(survey.trajectory, observations, survey.control, survey.pos)
+def _lsc(survey, matched, _):
+    estimate = estimate_correction(survey.trajectory, matched, survey.pos)
     for sentence in estimate.warnings:
         warnings.warn(sentence, stacklevel=2)
     details = asdict(estimate.parameters) | {
@@ -86,25 +102,38 @@ def _lsc(survey, observations, _):
     return estimate.correction, details
 
 
-ORDERS = (2, 3, 4, 5)  # Table 1 of the paper
 METHODS = (
-    Method("raw", "none", "The cloud as it was recorded.", _as_one(lambda *_: RAW)),
-    Method("shift", "one move", "One shift of the whole cloud.", _as_one(fit_shift)),
+    Method("raw", "none", "The cloud as it was recorded.", _of_pairs(lambda *_: RAW)),
+    Method("shift", "one move", "One shift of the whole cloud.", _of_pairs(fit_shift)),
     Method(
         "transformation",
         "one move",
         "Plan and height solved apart: shift, turn and scale in plan, an inclined plane in height.",
-        _as_one(fit_horizontal_and_height),
+        _of_pairs(fit_horizontal_and_height),
     ),
-    Method("rigid", "one move", "One shift and one turn in space.", _as_one(fit_rigid)),
+    Method("rigid", "one move", "One shift and one turn in space.", _of_pairs(fit_rigid)),
     Method(
-        "affine", "one move", "Shift, turn, scale and shear: 12 parameters.", _as_one(fit_affine)
+        "affine", "one move", "Shift, turn, scale and shear: 12 parameters.", _of_pairs(fit_affine)
     ),
     Method(
         "icp", "one move", "Iterative closest points: targets laid on their surveyed faces.", _icp
     ),
-    *(_polynomial(order) for order in ORDERS),
-    *(_literal(order) for order in ORDERS),
+    *(_polynomial(order) for order in SETTINGS.orders),
+    Method("linear", "over time", "Straight lines between control points.", _over_time(fit_linear)),
+    Method("pchip", "over time", "Monotone cubics between control points.", _over_time(fit_pchip)),
+    Method(
+        "linear-steps",
+        "over time",
+        "Straight lines between control points, apart on both sides of each step of the path.",
+        _over_time(partial(fit_linear, cut=True)),
+    ),
+    Method(
+        "gp",
+        "over time",
+        "A Gaussian process of scikit-learn: Matern 3/2 and white noise, by likelihood.",
+        _over_time(fit_gaussian_process),
+    ),
+    *(_literal(order) for order in SETTINGS.orders),
     Method(
         "lsc",
         "collocation",
@@ -114,8 +143,14 @@ METHODS = (
 )
 
 
-def method_named(name):
-    """The method of a name. Raises ValueError, with the nearest there is, for another one."""
+def method_named(name: str) -> Method:
+    """The method of a name.
+
+    Raises
+    ------
+    ValueError
+        For another one, with the nearest there is.
+    """
     known = {method.name: method for method in METHODS}
     if name not in known:
         near = get_close_matches(name, known, n=1, cutoff=0.0)[0]

@@ -1,48 +1,91 @@
 """``plan``: what a survey will be able to show, before anyone drives."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from mlscorr.effects import EFFECTS
-from mlscorr.gap.background import epochs
-from mlscorr.gap.document import map_document, separability_document
-from mlscorr.gap.plan import NextData, next_data
-from mlscorr.gap.planned import event_sizes, planned_rows
-from mlscorr.gap.rows import Rows, background
-from mlscorr.gap.separability import Separability, separability
+from mlscorr.effects import Effect, known_effects
+from mlscorr.estimate import PlannedAccuracy, predict_accuracy
+from mlscorr.gap import (
+    NextData,
+    Observations,
+    Rows,
+    Separability,
+    background,
+    compare_signatures,
+    event_sizes,
+    map_document,
+    next_data,
+    planned_rows,
+    separability_document,
+)
 from mlscorr.gap.signatures import signatures
-from mlscorr.io.output import check_output, document, output_folder, write_json
-from mlscorr.io.survey_file import input_files
-from mlscorr.survey import Survey
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.survey import Matched, Survey, TargetObservations
 
-KINDS = {kind.name: kind for kind in EFFECTS}
 LARGE = 10.0  # times its usual size: an effect that must be larger to be seen is not seen
 
 
-def plan(survey, library=EFFECTS):
-    """What effects a survey can show and tell apart, from its geometry alone: a PlannedSurvey.
+def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> "PlannedSurvey":
+    """What effects a survey can show and tell apart, from its geometry alone.
 
     Parameters
     ----------
     survey : Survey
         With mounting, trajectory, control, and a reference surface where there is one; its cloud
         is not read.
-    library : iterable of Effect classes
+    library : iterable of Effect classes, optional
+        Effects to consider; all known ones by default.
 
-    Raises ValueError without a mounting, or when nothing will be seen.
+    Raises
+    ------
+    ValueError
+        Without a mounting, or when nothing will be seen.
     """
     rows = planned_rows(survey)
+    library = known_effects() if library is None else library
     signs, left_out = signatures(rows, survey, library)
-    observed = epochs(rows, background(rows, survey))
-    compared, more = separability(observed, signs), []
+    observed = Observations.of(rows, background(rows, survey))
+    compared, data = compare_signatures(observed, signs), []
     for members in compared.classes:
-        more += next_data(rows, survey, library, members, compared)
-    noise = {one.name: _NOISE for one in signs if one.is_noise}
-    best = {one.survey: one for one in sorted(more, key=lambda one: -one.after)}
+        data += next_data(rows, survey, library, members, compared)
+    noise = {sign.name: _NOISE for sign in signs if sign.is_noise}
+    best = {addition.survey: addition for addition in sorted(data, key=lambda a: -(a.after or 0.0))}
+    events = event_sizes(observed, signs)
     return PlannedSurvey(
-        survey, rows, compared, event_sizes(observed, signs), tuple(best.values()), left_out | noise
+        survey,
+        tuple(library),
+        rows,
+        compared,
+        events,
+        tuple(best.values()),
+        left_out | noise,
+        _accuracy(survey, rows),
     )
+
+
+def _accuracy(survey, rows):
+    """PlannedAccuracy by the control that will be seen; None where there is none."""
+    first = np.unique(rows.item[rows.channel == "target"], return_index=True)[1]
+    first = np.flatnonzero(rows.channel == "target")[first]
+    first = first[rows.survey_item[first] < len(survey.control)]  # control comes before check
+    if len(first) == 0:
+        return None
+    points = survey.surveyed[rows.survey_item[first]]
+    observed = TargetObservations(
+        points.name,
+        rows.covariates["pass"][first].astype(int),
+        rows.gps_time[first],
+        points.position,
+        rows.noise[first, None, None] * np.eye(3),
+        points.normal,
+        points.kind,
+        points.size,
+        rows.points[first],
+    )
+    return predict_accuracy(survey.trajectory, Matched(observed, points), survey.pos)
 
 
 _NOISE = "Noise shows in the roughness of surfaces and the spread of residuals, not in a shift."
@@ -53,14 +96,16 @@ class PlannedSurvey:
     """A survey before it is driven: the document of plan.json, and ``write``."""
 
     survey: Survey
+    kinds: tuple[type[Effect], ...]
     rows: Rows
     separability: Separability
     events: dict
     next_data: tuple[NextData, ...]
     left_out: dict[str, str]
+    accuracy: PlannedAccuracy | None = None
 
     @property
-    def document(self):
+    def document(self) -> dict:
         """The document of plan.json."""
         content = separability_document(self.separability)
         for name, (parameters, units, sizes) in self.events.items():
@@ -69,24 +114,40 @@ class PlannedSurvey:
                  "detectable": float(s)}
                 for p, u, s in zip(parameters, units, sizes, strict=True)
             ]  # fmt: skip
-        for name, parts in content["detectable"].items():
-            usual = KINDS[name].quantities()["magnitude"].typical
-            for part in parts:
-                part["typical"] = usual
-        looks = len(np.unique(self.rows.item))
+        for kind in self.kinds:
+            for part in content["detectable"].get(kind.name, ()):
+                part["typical"] = kind.quantities()["magnitude"].typical
+        places = []
+        if self.accuracy is not None:
+            places = [place.document() for place in self.accuracy.next_control]
         return document(
             "plan",
             {
                 "name": self.survey.name,
-                "looks": looks,
+                "looks": len(np.unique(self.rows.item)),
                 **content,
-                "next_data": [vars(one) for one in self.next_data],
-                "map": map_document(self.survey),
+                "next_data": [vars(addition) for addition in self.next_data],
+                "map": map_document(self.survey)
+                | {"next_control": [[p["easting"], p["northing"]] for p in places]},
+                "accuracy": self._accuracy_document(),
+                "next_control": places,
                 "advice": self._advice(content["detectable"]),
                 "left_out": self.left_out,
                 "warnings": list(self.survey.notes),
             },
         )
+
+    def _accuracy_document(self):
+        """Sigma of the corrected position along the drive: 3D, m."""
+        if self.accuracy is None:
+            return None
+        sigma = self.accuracy.sigma
+        return {
+            "gps_time": self.accuracy.gps_time.round(3).tolist(),
+            "sigma": sigma.round(5).tolist(),
+            "rms": float(np.sqrt(np.mean(sigma**2))),
+            "largest": float(sigma.max()),
+        }
 
     def _advice(self, detectable):
         hidden = [
@@ -95,46 +156,75 @@ class PlannedSurvey:
             if parts[0]["typical"]
             and min(part["detectable"] for part in parts) > LARGE * parts[0]["typical"]
         ]
-        told = []
-        for one in self.next_data[:3]:
-            told.append(f"Add {one.survey}: {one.why}")
+        advice = [f"Add {addition.survey}: {addition.why}" for addition in self.next_data[:3]]
+        if self.accuracy is not None and self.accuracy.next_control:
+            place = self.accuracy.next_control[0]
+            advice.append(
+                f"Put one more control point near {place.easting:.0f} {place.northing:.0f}. "
+                f"{place.why}"
+            )
         if hidden:
-            told.append(
+            advice.append(
                 f"Don't expect to see {', '.join(hidden)}: only more than {LARGE:.0f} times the "
                 "usual size would show."
             )
         if not self.separability.classes:
-            told.append("All effects that show can be told apart.")
-        return told
+            advice.append("All effects that show can be told apart.")
+        return advice
 
-    def write(self, out, overwrite=False):
+    def write(self, out: str | Path, overwrite: bool = False) -> dict:
         """Write plan.json and plan.html into a folder, whole or not at all: the document.
 
-        Raises as ``CorrectedSurvey.write`` does.
-        """
-        from mlscorr.report.gap_page import plan_page
+        Parameters
+        ----------
+        out : path
+        overwrite : bool
+            Whether the folder may exist.
 
-        check_output(out, input_files(self.survey.path, planned=True), overwrite)
+        Raises
+        ------
+        FileExistsError, ValueError
+            As ``CorrectedSurvey.write`` does.
+        """
+        from mlscorr.report.gap import plan_page
+
         content = self.document
         page = plan_page(content, self.survey.name)
-        with output_folder(out) as folder:
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
             write_json(folder / "plan.json", content)
-            (folder / "plan.html").write_text(page, encoding="utf-8")
+            page.write(folder / "plan.html")
         return content
 
 
-def too_little(survey, rows, looks, library, notes=()):
-    """The sentence for a survey that shows too little: what is missing, and the plan."""
-    told = (
-        f"{survey.path} shows {looks} things with a residual in m, and the POS's error alone has 6 "
+def too_little(
+    survey: Survey,
+    rows: Rows,
+    items: int,
+    library: Iterable[type[Effect]],
+    notes: tuple[str, ...] = (),
+) -> str:
+    """The sentence for a survey that shows too little: what is missing, and the plan.
+
+    Parameters
+    ----------
+    survey : Survey
+    rows : Rows
+    items : int
+        Things seen with a residual in m.
+    library : iterable of Effect classes
+    notes : tuple of str
+        Sentences that come first.
+    """
+    sentence = (
+        f"{survey.path} shows {items} things with a residual in m, and the POS's error alone has 6 "
         "unknowns: no cause can be told from it. Survey at least 12 targets along the way, better "
         "on two passes, or give a [scene] reference."
     )
-    told = " ".join([*notes, told])
-    if survey.mounting is None or looks == 0:
-        return told
+    sentence = " ".join([*notes, sentence])
+    if survey.mounting is None or items == 0:
+        return sentence
     signs, _ = signatures(rows, survey, library)
-    compared = separability(epochs(rows, background(rows, survey)), signs)
+    compared = compare_signatures(Observations.of(rows, background(rows, survey)), signs)
     sizes = [
         f"{name} {size:.2g} {unit}"
         for name, unit, size in zip(
@@ -142,6 +232,7 @@ def too_little(survey, rows, looks, library, notes=()):
         )
     ]
     return (
-        f"{told} As it is, the smallest effects that could be seen, were nothing else wrong, are: "
-        f"{', '.join(sizes[:6])}. mlscorr plan tells the same of any survey before it is driven."
+        f"{sentence} As it is, the smallest effects that could be seen, were nothing else wrong, "
+        f"are: {', '.join(sizes[:6])}. mlscorr plan tells the same of any survey before "
+        "it is driven."
     )

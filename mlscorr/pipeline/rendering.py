@@ -1,30 +1,33 @@
 """From a survey to pictures of it before and after its correction."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from mlscorr.georeference import Correction
+from mlscorr.correction import Correction
+from mlscorr.evaluate.rows import TargetRow
 from mlscorr.io.output import check_output, document, output_folder
-from mlscorr.io.survey_file import input_files
 from mlscorr.io.trajectory import read_trajectory
 from mlscorr.pipeline.correction import correct
+from mlscorr.survey import Survey
 
-PAGE = (1920, 1080)  # pixels
+PAGE = (1920, 1080)  # pixels, of a common screen
 TIME_DIGITS = 1e-6  # s, to which a corrected trajectory is written
 
 
 def render(
-    survey,
-    out,
-    corrected=None,
-    size=PAGE,
-    overwrite=False,
-    progress=None,
-    **options,
-):
+    survey: Survey,
+    out: str | Path,
+    corrected: str | Path | None = None,
+    size: tuple[int, int] = PAGE,
+    overwrite: bool = False,
+    progress: Callable | None = None,
+    **options: Any,
+) -> dict:
     """Write before/after PNGs of a survey into a folder.
 
     Parameters
@@ -40,26 +43,35 @@ def render(
         Whether files of the same name are replaced.
     progress : function, optional
         As in ``correct``.
-    options
+    **options
         ``views`` and ``engine`` as in mlscorr.report.render.draw; ``colour``, ``azimuth``,
-        ``elevation`` and ``view_angle`` as in its Look.
+        ``elevation`` and ``view_angle`` as in its PictureOptions.
 
-    Returns the document of the JSON output. Raises ValueError for bad input, OSError when
-    reading or writing fails.
+    Returns
+    -------
+    dict
+        The document of the JSON output.
+
+    Raises
+    ------
+    ValueError
+        For bad input.
+    OSError
+        When reading or writing fails.
     """
-    from mlscorr.report.render import Look, draw, panel_size
+    from mlscorr.report.render import PictureOptions, draw, panel_size
 
-    check_output(out, input_files(survey.path), overwrite)
-    how = {k: options.pop(k) for k in ("views", "engine") if k in options}
-    look = Look(panel_size(size), panel_size(size, stacked=True), **options)
+    check_output(out, [file.path for file in survey.inputs], overwrite)
+    drawn = {name: options.pop(name) for name in ("views", "engine") if name in options}
+    asked = PictureOptions(panel_size(size), panel_size(size, stacked=True), **options)
     if corrected is None:
         result = correct(survey, progress=progress)
         correction, targets = result.estimate.correction, result.targets
     else:
         correction, targets = read_correction(survey, corrected)
     pictures = []
-    with output_folder(out) as folder:
-        for picture in draw(survey, correction, targets, look, progress=progress, **how):
+    with output_folder(out, survey.inputs, overwrite) as folder:
+        for picture in draw(survey, correction, targets, asked, progress=progress, **drawn):
             name = f"{picture.name}.png"
             (Path(folder) / name).write_bytes(picture.page(size))
             view = picture.view
@@ -68,10 +80,13 @@ def render(
     return document("render", {"name": survey.name, "pictures": pictures})
 
 
-def read_correction(survey, folder):
+def read_correction(survey: Survey, folder: str | Path) -> tuple[Correction, list[TargetRow]]:
     """The Correction and the targets' rows from a folder that ``correct`` wrote.
 
-    Raises ValueError when it holds no results, or those of another survey.
+    Raises
+    ------
+    ValueError
+        When it holds no results, or those of another survey.
     """
     folder = Path(folder)
     files = folder / "trajectory.csv", folder / "report.json"
@@ -89,8 +104,9 @@ def read_correction(survey, folder):
             f"survey {len(time)} from {time[0]:.3f} s on: it is the correction of another survey."
         )
     rows = json.loads(files[1].read_text(encoding="utf-8"))["targets"]
-    points = survey.control + survey.check
-    if strange := [row["name"] for row in rows if row["name"] not in points.name]:
+    rows = [TargetRow.read(row) for row in rows]
+    points = survey.surveyed
+    if strange := [row.name for row in rows if row.name not in points.name]:
         raise ValueError(
             f"{files[1]} names {len(strange)} targets that {survey.path} does not know (first: "
             f"{strange[0]}): it is the report on another survey."

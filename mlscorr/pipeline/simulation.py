@@ -1,6 +1,5 @@
 """``simulate`` and ``demo``: from a scenario to a survey folder."""
 
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,7 @@ def demo(out, seed=1, overwrite=False, progress=None):
     """
     from mlscorr.simulate import DEMO, simulate
 
-    check_output(out, [], overwrite)
-    with output_folder(out) as folder:
+    with output_folder(out, overwrite=overwrite) as folder:
         simulated = Path(folder) / "survey"
         simulated.mkdir()
         simulate(DEMO, np.random.default_rng(seed)).write(simulated, progress=progress)
@@ -38,7 +36,7 @@ def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
 
     scenario = read_scenario(scenario_path)
     check_output(out, [scenario_path, *scenario_files(scenario)], overwrite)
-    simulate(scenario, np.random.default_rng(seed)).write(out, progress=progress)
+    simulate(scenario, np.random.default_rng(seed)).write(out, progress, overwrite)
     return _simulated(read_survey(out), scenario, seed)
 
 
@@ -55,7 +53,7 @@ def _simulated(survey, scenario, seed):
             "passes": len(survey.trajectory.gaps) + 1,
             "control": len(survey.control),
             "check": len(survey.check),
-            "effects": [{"name": e.name, **asdict(e)} for e in scenario.imperfections],
+            "effects": [effect.document() for effect in scenario.imperfections],
             "files": [{"name": file.path.name, "points": file.points} for file in survey.clouds],
         },
     )

@@ -1,0 +1,158 @@
+"""What is installed, what is missing, and the line that installs it."""
+
+import ctypes
+import platform
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+PACKAGES = (
+    "numpy",
+    "scipy",
+    "laspy",
+    "lazrs",
+    "open3d",
+    "threadpoolctl",
+    "numba",
+    "pyproj",
+    "tomlkit",
+    "typer",
+    "rich",
+    "pydantic",
+    "matplotlib",
+    "pillow",
+    "jinja2",
+)
+# shared library -> Debian package: what importing Open3D and drawing without a screen need
+LIBRARIES = {
+    "libusb-1.0.so.0": "libusb-1.0-0",
+    "libGL.so.1": "libgl1",
+    "libEGL.so.1": "libegl1",
+    "libvulkan.so.1": "libvulkan1",
+}
+DRIVER_FOLDERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
+DRIVER_PACKAGE = "mesa-vulkan-drivers"
+RENDER = """
+import open3d
+renderer = open3d.visualization.rendering.OffscreenRenderer(64, 48)
+renderer.scene.add_geometry("box", open3d.geometry.TriangleMesh.create_box(),
+                            open3d.visualization.rendering.MaterialRecord())
+assert renderer.render_to_image() is not None
+"""
+INSTALLERS = ("apt-get install -y ", "pip install ")  # that take several names in a line
+RENDER_SECONDS = 60  # a software driver takes two
+
+
+@dataclass(frozen=True)
+class InstalledPart:
+    """A package, library or file: whether it is there, what was found, and the way out.
+
+    Parameters
+    ----------
+    name : str
+    ok : bool
+    state : str
+        Version, or what is wrong.
+    remedy : str
+        The line that installs it.
+    needed : bool
+    """
+
+    name: str
+    ok: bool
+    state: str
+    remedy: str = ""
+    needed: bool = True
+
+
+def examine() -> tuple[InstalledPart, ...]:
+    """Look at packages, system libraries, the off-screen driver and geoid grids.
+
+    Returns
+    -------
+    tuple of InstalledPart
+    """
+    findings = [InstalledPart("python", sys.version_info >= (3, 11), platform.python_version())]
+    findings += [_package(name) for name in PACKAGES]
+    findings += [_library(name, package) for name, package in LIBRARIES.items()]
+    findings += [_driver(), _rendering(), _geoids()]
+    return tuple(findings)
+
+
+def remedy(parts: Iterable[InstalledPart]) -> list[str]:
+    """The lines that install all that is missing, one for each installer.
+
+    Parameters
+    ----------
+    parts : iterable of InstalledPart
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> names = ("lazrs", "numba")
+    >>> remedy([InstalledPart(name, False, "missing", f"pip install {name}") for name in names])
+    ['pip install lazrs numba']
+    """
+    lines = list(dict.fromkeys(f.remedy for f in parts if not f.ok and f.remedy))
+    joined = []
+    for installer in INSTALLERS:
+        names = [line.removeprefix(installer) for line in lines if line.startswith(installer)]
+        joined += [installer + " ".join(names)] if names else []
+    return joined + [line for line in lines if not line.startswith(INSTALLERS)]
+
+
+def _package(name):
+    try:
+        return InstalledPart(name, True, version(name))
+    except PackageNotFoundError:
+        return InstalledPart(name, False, "missing", f"pip install {name}")
+
+
+def _library(name, package):
+    try:
+        ctypes.CDLL(name)
+    except OSError:
+        return InstalledPart(name, False, "missing", f"apt-get install -y {package}")
+    return InstalledPart(name, True, "found")
+
+
+def _driver():
+    drivers = [path.stem for folder in DRIVER_FOLDERS for path in Path(folder).glob("*.json")]
+    if drivers:
+        return InstalledPart("Vulkan drivers", True, ", ".join(sorted(drivers)))
+    return InstalledPart("Vulkan drivers", False, "missing", f"apt-get install -y {DRIVER_PACKAGE}")
+
+
+def _rendering():
+    """Draw in a child process: Open3D aborts its process when the driver is missing."""
+    try:
+        child = subprocess.run(
+            [sys.executable, "-c", RENDER],
+            capture_output=True,
+            timeout=RENDER_SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        state = f"no picture within {RENDER_SECONDS} s"
+    else:
+        if child.returncode == 0:
+            return InstalledPart("off-screen picture", True, "drawn")
+        state = f"failed (exit code {child.returncode})"
+    return InstalledPart("off-screen picture", False, state, needed=False)
+
+
+def _geoids():
+    """Geoid grids are needed only for a geographic trajectory with heights above the geoid."""
+    from pyproj.datadir import get_data_dir, get_user_data_dir
+
+    folders = [*get_data_dir().split(":"), get_user_data_dir()]
+    grids = [path for folder in folders for path in Path(folder).glob("*.tif")]
+    state = f"{len(grids)} in {folders[-1]}"
+    line = "pyproj sync --area-of-use YOUR_COUNTRY"
+    return InstalledPart("geoid grids", bool(grids), state, "" if grids else line, needed=False)

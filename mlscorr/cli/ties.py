@@ -1,0 +1,37 @@
+"""The command that finds what two passes both saw."""
+
+import mlscorr
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.work import print_json, work
+
+
+def ties(
+    survey: SurveyArgument,
+    out: Out,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find planes and poles that two passes both saw, and how far they lie apart."""
+    with work(out, overwrite, survey) as progress:
+        recorded = mlscorr.read_survey(survey)
+        content = mlscorr.find_ties(recorded, progress=progress).write(out, overwrite)
+    print_json(content, as_json)
+    _tell(content, out)
+
+
+def _tell(content, out):
+    """How many ties there are, how far apart passes lie, and where the results are."""
+    features = content["features"]
+    say(
+        f"{content['ties']} ties between {features['plane']} planes and {features['pole']} poles; "
+        f"{content['refused']} more contradict their neighbours."
+    )
+    for pair in content["pairs"]:
+        parts = [
+            f"{axis} {1000 * misfit['rms']:.0f} mm"
+            for axis, misfit in pair["misfit"].items()
+            if misfit["n"]
+        ]
+        say(f"Passes {pair['passes'][0]} and {pair['passes'][1]}: rms {', '.join(parts)}.")
+    say(f"Ties: {out / 'ties.csv'} and {out / 'ties.json'}")

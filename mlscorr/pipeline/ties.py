@@ -1,0 +1,203 @@
+"""``ties``: from a survey to what two of its passes both saw."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.evaluate.ties import misfit
+from mlscorr.io.las import read_chunks
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.result_tables import write_ties_csv
+from mlscorr.pipeline.finding import silent
+from mlscorr.survey import Survey, TieFeatures
+from mlscorr.ties import (
+    SETTINGS,
+    TieCollector,
+    TieSearch,
+    group_by_time,
+    information,
+    search_ties,
+    unheld_directions,
+    unheld_sentence,
+)
+
+AXES = ("across", "along", "up")  # of the way of the earlier view
+
+
+def find_ties(survey: Survey, progress: Callable | None = None) -> "TiedSurvey":
+    """Find planes and poles that two passes both saw, without control.
+
+    Parameters
+    ----------
+    survey : Survey
+    progress : function, optional
+        ``progress(title, total)`` returns a function of the number of points just done.
+
+    Returns
+    -------
+    TiedSurvey
+        Warns where passes don't meet, a direction is not held, or most pairs are refused.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> there_and_back = Scenario(
+    ...     drive={"duration": 5.0, "passes": [{}, {"direction": "back"}]},
+    ...     targets={"control": 2, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(there_and_back, np.random.default_rng(1)).write(folder)
+    >>> tied = mlscorr.find_ties(mlscorr.read_survey(folder))
+    >>> tied.pairs[0]["passes"]
+    [1, 2]
+    """
+    done = (progress or silent)("Searching the cloud", survey.points)
+    collector = TieCollector(survey)
+    for file in survey.clouds:
+        for chunk in read_chunks(file):
+            collector.add(file, chunk)
+            done(len(chunk))
+    features = collector.features()
+    tied = TiedSurvey(survey, features, search_ties(survey, features))
+    for sentence in tied.warnings:
+        warnings.warn(sentence, stacklevel=2)
+    return tied
+
+
+@dataclass(frozen=True)
+class TiedSurvey:
+    """What passes of a survey both saw, and ``write``.
+
+    Parameters
+    ----------
+    survey : Survey
+    features : TieFeatures
+    search : TieSearch
+    """
+
+    survey: Survey
+    features: TieFeatures
+    search: TieSearch
+
+    @property
+    def pairs(self) -> list[dict]:
+        """Rows of every pair of passes, as ties.json has them."""
+        ties, rows = self.search.ties, []
+        heading = self.survey.trajectory.at(ties.gps_time[:, 0]).attitude
+        axis = np.abs(heading.inv().apply(ties.direction)).argmax(axis=1)
+        for passes in np.unique(ties.pass_number, axis=0):
+            inside = (ties.pass_number == passes).all(axis=1)
+            by_axis = {
+                name: _misfit(ties.misclosure[inside & (axis == i)]) for i, name in enumerate(AXES)
+            }
+            rows.append(
+                {
+                    "passes": passes.tolist(),
+                    "n": int(inside.sum()),
+                    "planes": int((ties.kind[inside] == "plane").sum()),
+                    "poles": int((ties.kind[inside] == "pole").sum()) // 2,
+                    "misfit": by_axis,
+                    "weakest": _weakest(ties[inside]),
+                }
+            )
+        return rows
+
+    @property
+    def stretches(self) -> list[dict]:
+        """What the ties of each pair of passes hold least, in stretches of the earlier view."""
+        ties = self.search.ties
+        group, rows = group_by_time(ties, 0, SETTINGS.pause), []
+        for number in range(group.max(initial=-1) + 1):
+            part = ties[group == number]
+            time = part.gps_time[:, 0]
+            rows.append(
+                {
+                    "passes": part.pass_number[0].tolist(),
+                    "from": float(time.min()),
+                    "to": float(time.max()),
+                    "n": len(part),
+                    "weakest": _weakest(part),
+                }
+            )
+        return rows
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader of the ties must know."""
+        ties, refused = self.search.ties, self.search.refused
+        passes = np.unique(self.features.pass_number)
+        if len(ties) == 0:
+            return (
+                f"No tie was found: {len(passes)} passes with {len(self.features)} planes and "
+                f"poles saw nothing twice within {self.search.radius:.2f} m. Drive the street "
+                "twice, best in both directions; where that was done, passes lie farther apart "
+                "than the POS states: raise its sigmas, or [matching] search_radius.",
+            )
+        sentences = []
+        if len(refused) > len(ties):
+            sentences.append(
+                f"{len(refused)} of {len(ties) + len(refused)} pairs contradict their neighbours "
+                "in time: most of them are no ties. Passes may lie farther apart than the POS "
+                "states, or the mounting be wrong by degrees: run mlscorr calibrate."
+            )
+        sentences += [unheld_sentence(*unheld) for unheld in unheld_directions(ties)]
+        return tuple(sentences)
+
+    def write(self, out: str | Path, overwrite: bool = False) -> dict:
+        """Write ties.csv and ties.json into a folder, whole or not at all.
+
+        Parameters
+        ----------
+        out : path
+        overwrite : bool
+
+        Returns
+        -------
+        dict
+            The document of ties.json.
+
+        Raises
+        ------
+        ValueError
+            When the folder holds an input, or holds anything without overwrite.
+        OSError
+            When writing fails.
+        """
+        kinds, passes = self.features.kind, self.features.pass_number
+        content = document(
+            "ties",
+            {
+                "name": self.survey.name,
+                "crs": self.survey.crs,
+                "features": {
+                    **{kind: int((kinds == kind).sum()) for kind in ("plane", "pole")},
+                    "passes": {str(p): int((passes == p).sum()) for p in np.unique(passes)},
+                },
+                "search_radius": self.search.radius,
+                "ties": len(self.search.ties),
+                "refused": len(self.search.refused),
+                "pairs": self.pairs,
+                "stretches": self.stretches,
+                "warnings": list(self.warnings),
+            },
+        )
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
+            write_ties_csv(folder / "ties.csv", self.search.ties)
+            write_json(folder / "ties.json", content)
+        return content
+
+
+def _misfit(misclosure):
+    """Number, median and root mean square of misclosures (n,). Units: m."""
+    return {"n": len(misclosure), **misfit(misclosure)}
+
+
+def _weakest(ties):
+    """The direction that ties hold least, and one sigma of a shift along it. Units: m."""
+    held = information(ties, np.zeros(len(ties), int))[0]
+    values, axes = np.linalg.eigh(held)
+    sigma = float(values[0] ** -0.5) if values[0] > 0 else None
+    return {"direction": axes[:, 0].tolist(), "sigma": sigma}

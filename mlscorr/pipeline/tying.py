@@ -1,0 +1,242 @@
+"""Ties for a correction: paired, corrected, and paired again as the passes come together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from mlscorr.correction import Correction, PointSigma
+from mlscorr.estimate import (
+    Estimate,
+    believed_correction,
+    estimate_correction,
+    find_mounting_error,
+    previewed_correction,
+    with_ties,
+)
+from mlscorr.io.las import read_chunks
+from mlscorr.pipeline.finding import Finding, find_check, find_control
+from mlscorr.survey import Matched, Mounting, Scanner, Survey, TieFeatures, Ties
+from mlscorr.ties import (
+    NORMAL_SCATTER,
+    SETTINGS,
+    TieCollector,
+    agreeing_ties,
+    coarse_correction,
+    pair_features,
+    residuals,
+    unheld_directions,
+    unheld_sentence,
+)
+
+TieUse = Literal["auto", "off", "only"]
+
+NOTHING_TIED = (
+    "No two passes of {} saw the same thing, so ties alone correct nothing. Drive the street "
+    "twice, or survey control points."
+)
+LEFT_OUT = (
+    'What two passes both saw was left out, as asked: --no-ties, or use = "off" of [ties] in '
+    "survey.toml."
+)
+
+
+def estimate_survey(
+    survey: Survey,
+    order: int,
+    ties: TieUse | None = None,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+) -> tuple[Survey, Matched, Matched, Finding, Estimate]:
+    """Read a survey's clouds once, and estimate the POS error from all that is in them.
+
+    Parameters
+    ----------
+    survey : Survey
+    order : int
+        Of the trend.
+    ties : str, optional
+        As of ``correct``.
+    rng, progress
+        As of ``find_targets``.
+
+    Returns
+    -------
+    survey : Survey
+        Without control where ties alone are asked for.
+    control, check : Matched
+    finding : Finding
+    estimate : Estimate
+
+    Raises
+    ------
+    ValueError
+        As ``find_control``, and where ties alone are asked for and there is none.
+    """
+    ties = ("auto" if survey.use_ties else "off") if ties is None else ties
+    if ties == "only":
+        survey = without_control(survey)
+    collector = TieCollector(survey)
+
+    def read(file):
+        for chunk in read_chunks(file):
+            if ties != "off":
+                collector.add(file, chunk)
+            yield chunk
+
+    if ties == "only":
+        control, check, finding = find_check(survey, progress, read)
+        estimate = believed_correction(survey.trajectory, survey.pos)
+    else:
+        control, check, finding = find_control(survey, rng, progress, read)
+        estimate = estimate_correction(survey.trajectory, control, survey.pos, order)
+    if ties == "off":
+        estimate = replace(estimate, untied=LEFT_OUT)
+    else:
+        estimate = tie_passes(survey, estimate, collector.features())
+        estimate = _with_mounting_checked(survey, estimate, control)
+    if ties == "only" and estimate.ties is None:
+        raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
+    return survey, control, check, finding, estimate
+
+
+def _with_mounting_checked(survey, estimate, control):
+    """The estimate with a note where its ties tell of a wrong mounting."""
+    if survey.mounting is None:
+        return estimate
+    check = find_mounting_error(estimate, control, survey.mounting)
+    return replace(estimate, notes=(*estimate.notes, *check.warnings)) if check else estimate
+
+
+def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Estimate:
+    """The estimate with the ties of a survey; the same with the reason where nothing is tied.
+
+    Pairs are looked for as far apart as the sigmas of the estimate allow, then half as far with
+    each correction that they make, down to the scatter of what is left of them.
+
+    Parameters
+    ----------
+    survey : Survey
+        Its search radius is the limit.
+    estimate : Estimate
+        By control points alone.
+    features : TieFeatures
+    """
+    correction = estimate.correction
+    sigma = placed_sigma(correction, survey.scanner, survey.mounting, features)
+    radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
+    moved = _moved(correction, features)
+    moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
+    while True:
+        ties = agreeing_ties(pair_features(features, moved, sigma, radius), moved)
+        if len(ties) == 0:
+            return _untied(estimate, features, radius)
+        moved = _moved(previewed_correction(estimate, ties), features)
+        limit = narrowest_gate(ties, moved)
+        if radius <= limit:
+            unheld = _unheld(estimate, features, ties)
+            return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties)
+        radius = max(radius / 2, limit)
+
+
+def placed_sigma(
+    correction: Correction, scanner: Scanner, mounting: Mounting | None, features: TieFeatures
+) -> np.ndarray:
+    """One sigma (n,) of the places of features along any axis, after a correction. Units: m.
+
+    Parameters
+    ----------
+    correction : Correction
+    scanner : Scanner
+    mounting : Mounting or None
+        With the covariance of what is open in it.
+    features : TieFeatures
+    """
+    sigma = PointSigma.of(correction, scanner, mounting)
+    return sigma.at(features.centre, features.gps_time).max(axis=1)
+
+
+def widest_gate(sigma: np.ndarray) -> float:
+    """How far two features may be apart whose places have sigmas (n,). Units: m.
+
+    Parameters
+    ----------
+    sigma : (n,) array
+        Units: m.
+    """
+    return float(np.sqrt(2) * SETTINGS.gate_sigmas * sigma.max(initial=0.0))
+
+
+def narrowest_gate(ties: Ties, moved: np.ndarray) -> float:
+    """How far features may be apart by the scatter of what a correction leaves of ties. Units: m.
+
+    Parameters
+    ----------
+    ties : Ties
+    moved : (m, 3) array
+        What the correction adds to each feature. Units: m.
+    """
+    scatter = NORMAL_SCATTER * float(np.median(np.abs(residuals(ties, moved))))
+    return SETTINGS.gate_sigmas * max(scatter, SETTINGS.best_second)
+
+
+def without_control(survey: Survey) -> Survey:
+    """The survey with all its surveyed points as check points.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    return replace(survey, control=survey.control[[]], check=survey.surveyed)
+
+
+def _untied(estimate, features, radius):
+    """The estimate with the reason why nothing is tied, a warning where something should be."""
+    passes, near = len(np.unique(features.pass_number)), _revisited(features, radius)
+    what = (
+        f"{near} of {len(features)} planes and poles of {passes} pass{'es' * (passes > 1)} lie "
+        f"within about {radius:.1f} m of what was scanned at another time"
+    )
+    if near < SETTINGS.neighbours:
+        reason = (
+            f"Nothing was scanned twice, or hardly: {what}. A second pass, best in the opposite "
+            "direction, carries what control points tell to where there are none."
+        )
+        return replace(estimate, untied=reason)
+    reason = (
+        f"Nothing that two passes both saw agrees: {what}, yet none is parallel and near enough. "
+        "Passes may lie farther apart than the POS states (raise its sigmas, or search_radius of "
+        "[matching]), or the mounting be wrong by degrees (mlscorr calibrate)."
+    )
+    return replace(estimate, untied=reason, notes=(*estimate.notes, reason))
+
+
+def _revisited(features, radius):
+    """Number of features in cells as wide as a radius that were scanned at two visits."""
+    cells = np.floor(features.centre / radius)
+    cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
+    first, last = np.full(len(features), np.inf), np.full(len(features), -np.inf)
+    np.minimum.at(first, cell, features.gps_time)
+    np.maximum.at(last, cell, features.gps_time)
+    return int(np.count_nonzero((last - first)[cell] > SETTINGS.pause))
+
+
+def _unheld(estimate, features, ties):
+    """Sentences on passes between which neither ties nor control of both hold a direction."""
+    control = estimate.equations.observed
+
+    def controlled(number):
+        times = features.gps_time[features.pass_number == number]
+        return ((control >= times.min()) & (control <= times.max())).any()
+
+    for part, axis in unheld_directions(ties):
+        if not all(map(controlled, part.pass_number[0])):
+            yield unheld_sentence(part, axis)
+
+
+def _moved(correction: Correction, features):
+    """What a correction adds (n, 3) to the places of features. Units: m."""
+    return correction.increments(features.centre, features.gps_time)[0]
