@@ -18,9 +18,11 @@ from rich.console import Console
 from rich.table import Table
 from scipy.spatial.transform import Rotation, Slerp
 
-from mlscorr.georeference import Correction
-from mlscorr.io.las import sample_gps_times, write_corrected
-from mlscorr.survey import CloudFile, Trajectory, attitude_from_angles
+from mlscorr.correction import Correction
+from mlscorr.frames import attitude_from_angles
+from mlscorr.io.las import sample_gps_times
+from mlscorr.io.las_copy import write_corrected
+from mlscorr.survey import CloudFile, Trajectory
 
 START = 357_900.0  # s of week
 PULSES = 400_000  # a second

@@ -14,7 +14,7 @@ from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation import Noise, Signal, collocate, collocate_dense
-from mlscorr.covariance import FAMILIES, Covariance
+from mlscorr.collocation.covariance import FAMILIES, Covariance
 
 try:
     import celerite2

@@ -14,13 +14,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from mlscorr.io.las import CHUNK_SIZE
+from mlscorr.frames import attitude_from_angles as attitude
+from mlscorr.io.settings import SETTINGS
 from mlscorr.report.render.camera import Camera
 from mlscorr.report.render.drawing import draw
 from mlscorr.report.render.sheet import Sheet
-from mlscorr.report.render.views import Look, View
+from mlscorr.report.render.views import PictureOptions, View
 from mlscorr.survey import ControlPoints, PointCloud, Survey, Trajectory
-from mlscorr.survey import attitude_from_angles as attitude
 
 CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # UTM
 START = 357_900.0  # s of week
@@ -40,8 +40,8 @@ class Moved:
 def street(points, seed=1):
     """Chunks of a street with two walls, in no order."""
     rng = np.random.default_rng(seed)
-    for first in range(0, points, CHUNK_SIZE):
-        n = min(CHUNK_SIZE, points - first)
+    for first in range(0, points, SETTINGS.chunk_points):
+        n = min(SETTINGS.chunk_points, points - first)
         across, along = rng.uniform(-14, 14, n), rng.uniform(0, LENGTH, n)
         up = np.maximum(np.abs(across) - 8, 0) * 2
         xyz = CORNER + np.column_stack([np.clip(across, -8, 8), along, up])
@@ -86,7 +86,7 @@ def peak_memory():
 
 def pictures(points):
     """Draw the overview and a cross-section of streamed points."""
-    list(draw(survey(), Moved(), [], Look(PANEL), chunks=lambda: street(points)))
+    list(draw(survey(), Moved(), [], PictureOptions(PANEL), chunks=lambda: street(points)))
 
 
 def memory(millions):

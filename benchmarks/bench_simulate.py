@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from mlscorr.simulate import DEMO, simulate
-from mlscorr.simulate.echoes import Surfaces
+from mlscorr.simulate.scan import Surfaces
 from mlscorr.simulate.scenario import (
     DriveScenario,
     EffectScenario,
@@ -86,7 +86,7 @@ def speed_rows(repeats=5):
         for _ in range(repeats + 1):
             start = perf_counter()
             for block in recorder.rays:
-                made.surfaces._caster.cast_rays(block)
+                made.scene.mesh.caster.cast_rays(block)
             middle = perf_counter()
             for _ in made.blocks():
                 pass

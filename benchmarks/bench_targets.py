@@ -25,7 +25,7 @@ import mlscorr
 from mlscorr.io.control import NO_POINTS
 from mlscorr.io.las import read_chunks
 from mlscorr.simulate import Scenario, simulate
-from mlscorr.targets.candidates import collect
+from mlscorr.targets import collect
 from mlscorr.targets.clusters import connected
 
 CHUNK = 1_000_000  # points
@@ -56,7 +56,7 @@ def decode(folder):
 def extract(folder, with_control):
     """Extraction without writing: number of surveyed points found, and of other objects."""
     survey = mlscorr.read_survey(folder)
-    surveyed = survey.control + survey.check
+    surveyed = survey.surveyed
     if not with_control:
         survey = replace(survey, control=NO_POINTS, check=NO_POINTS)
     rows = mlscorr.extract(survey).targets
@@ -129,7 +129,7 @@ def cluster_table(folder):
     import open3d
 
     survey = mlscorr.read_survey(folder)
-    near = collect(survey.clouds, survey.trajectory, survey.control, read_chunks).cloud
+    near = collect(survey, read_chunks).cloud
     bright = near.xyz[near.intensity >= np.percentile(near.intensity, 90)]
     bright -= bright.mean(axis=0)
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(bright))

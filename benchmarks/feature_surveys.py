@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.georeference import georeference, to_scanner
+from mlscorr.evaluate.scores import misclosures
+from mlscorr.frames import georeference, to_scanner
 from mlscorr.simulate import DEMO, read_scenario, simulate
 from mlscorr.simulate.recording import join_passes
 from mlscorr.simulate.scenario import DriveScenario, PosScenario
-from mlscorr.survey import ControlPoints, PointCloud, TargetObservations, Trajectory
+from mlscorr.survey import ControlPoints, Matched, TargetObservations, Trajectory
 
 EXTRACTION = 0.004  # m, one sigma of a target's centre, as extraction reaches it
 REACH = 40.0  # m, beyond which no target is extracted
@@ -35,11 +36,17 @@ class FeatureSurvey:
 
     def check_rmse(self, correction):
         """RMSE (3,) of the check points after a correction. Units: m."""
-        observed = self.checked
-        cloud = PointCloud(observed.position, observed.gps_time, np.zeros(len(observed)))
-        rows = [self.check.name.index(name) for name in observed.name]
-        left = self.check.position[rows] - correction.apply(cloud).xyz
-        return np.sqrt(np.mean(left**2, axis=0))
+        return np.sqrt(np.mean(misclosures(self.matched_check, correction) ** 2, axis=0))
+
+    @property
+    def matched(self):
+        """The observed control points."""
+        return Matched.by_name(self.observations, self.control)
+
+    @property
+    def matched_check(self):
+        """The observed check points."""
+        return Matched.by_name(self.checked, self.check)
 
     def position_left(self, correction):
         """True - corrected position (n, 3) at every epoch. Units: m."""
@@ -66,7 +73,7 @@ class FeatureSurvey:
         vector = rng.normal(size=(len(size), 3))
         vector *= size / np.linalg.norm(vector, axis=1, keepdims=True)
         position = self.control.position.copy()
-        position[[self.control.name.index(name) for name in names]] += vector
+        position[self.control.rows(names)] += vector
         return replace(self, control=replace(self.control, position=position)), set(names)
 
 

@@ -11,18 +11,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.gap.assemble import assemble, sample_pulses
-from mlscorr.gap.rows import Pulses, Rows, background
-from mlscorr.georeference import to_scanner
-from mlscorr.survey import (
-    ControlPoints,
-    Mounting,
-    Pos,
-    Scanner,
-    Survey,
-    Trajectory,
-    attitude_from_angles,
-)
+from mlscorr.frames import attitude_from_angles, to_scanner
+from mlscorr.gap.observe.assemble import assemble, sample_pulses
+from mlscorr.gap.observe.rows import Rows, SamplePulses, background
+from mlscorr.survey import ControlPoints, Mounting, Pos, Scanner, Survey, Trajectory
 
 START, ORIGIN = 413200.0, np.array([523000.0, 3378000.0, 20.0])
 STEP = 0.1  # s between epochs
@@ -185,7 +177,7 @@ def _patch_parts(survey, place, normal, counts, which, time, pass_number, rough,
             assemble(
                 survey, "shared", item, time[p][one], place[which[p][one]], normal[which[p][one]],
                 np.zeros(len(one)), np.full(len(one), 2 * variance), np.full(len(one), 80),
-                Pulses.concatenate(both), pass_number[p][one], gps_time_2=time[p][two],
+                SamplePulses.concatenate(both), pass_number[p][one], gps_time_2=time[p][two],
             )
         )  # fmt: skip
     common = (np.arange(len(p)), time[p], place[which[p]])

@@ -6,9 +6,10 @@ from typing import ClassVar
 import numpy as np
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.background import Setting, epochs
-from mlscorr.gap.changes import Bench
-from mlscorr.gap.whitening import whitener
+from mlscorr.gap.infer.error_models import ErrorModel
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.signatures.changes import Bench
 
 
 class Outside:
@@ -98,16 +99,17 @@ STUDIED = (  # deterministic effects, named where the geometry shows them at all
 NOISES = {"range_noise": 0.004, "angle_noise": 0.02, "time_jitter": 1e-3, "position_noise": 0.04}
 
 
-ACTUAL = Setting(1.0, "matern32", 0.3, 2.0)  # nearest to the drift that is made here
+ACTUAL = ErrorModel(1.0, "matern32", 0.3, 2.0)  # nearest to the drift that is made here
 
 
 def metric(g):
     """Function that gives the size of a shift (m,) in units of the minimal detectable bias."""
-    observed = epochs(g.rows, g.background)
-    factor = whitener(observed, ACTUAL)
+    observed = Observations.of(g.rows, g.background)
+    whitener = observed.whitener(ACTUAL)
 
     def size(shift):
-        return float(np.sqrt(factor.whiten(observed.columns(shift[:, None])).squares[0])) / 4.13
+        square = whitener.whiten(observed.columns(shift[:, None])).squares[0]
+        return float(np.sqrt(square)) / SETTINGS.detectable
 
     return size
 

@@ -16,11 +16,12 @@ import numpy as np
 from gap_features import Geometry, errors, geometry
 from gap_mechanisms import ACTUAL, NOISES, STUDIED, Outside, metric, noisy, sized
 
-from mlscorr.gap.background import epochs
-from mlscorr.gap.causes import cause_of
-from mlscorr.gap.separability import separability
-from mlscorr.gap.signatures import signatures
-from mlscorr.gap.verdict import best_lead, compare, pairs, verdict
+from mlscorr.gap.infer.causes import cause_of
+from mlscorr.gap.infer.labels import weigh_labels
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.separability import compare_signatures
+from mlscorr.gap.infer.verdict import decide, weigh_pairs
+from mlscorr.gap.signatures.signatures import signatures
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ class Bed:
     def of(cls, seed):
         g = geometry(seed, shared=bool(seed % 2))
         signs, _ = signatures(g.rows, g.survey)
-        return cls(g, signs, metric(g), separability(epochs(g.rows, g.background), signs, ACTUAL))
+        observed = Observations.of(g.rows, g.background)
+        return cls(g, signs, metric(g), compare_signatures(observed, signs, ACTUAL))
 
 
 def _rho(bed, told, label):
@@ -48,9 +50,9 @@ def _rho(bed, told, label):
     return compared.share(name, way, label) if name in compared.effects else 0.0
 
 
-def _off(bed, rows, signs, found, told, name, m):
+def _off(bed, rows, signs, evidence, told, name, m):
     """Error of a named cause: share of its signal, and of each parameter in sigmas."""
-    cause = cause_of(rows, signs, found, name, 1.0)
+    cause = cause_of(rows, signs, evidence, name, 1.0)
     way, fixed = told
     part, estimate = cause.parts[0]
     if "target" in fixed and part.fixed != fixed:
@@ -78,18 +80,18 @@ def case(bed, rng, kind, effects=(), m=3.0, withheld=None, outside=None, noise=N
         rows = replace(rows, noise=rows.noise + variance)
     rows = replace(rows, residual=residual)
     signs = tuple(s for s in bed.signs if s.name != withheld)
-    found = compare(rows, g.background, g.survey, signs, rng, replicas)
-    probability = pairs(rows, signs, found)
-    answer = verdict(found, probability)
+    evidence = weigh_labels(rows, g.background, g.survey, signs, rng, replicas)
+    probability = weigh_pairs(rows, signs, evidence)
+    answer = decide(evidence, probability)
     truth = "+".join(effects) or outside or noise or "none"
     off = None
     if len(effects) == 1 and answer.label == truth:
-        off = _off(bed, rows, signs, found, told[truth], truth, m)
+        off = _off(bed, rows, signs, evidence, told[truth], truth, m)
     return {
         "truth": truth, "m": m, "kind": kind, "withheld": withheld, "told": told,
         "label": answer.label, "probability": probability, "set": answer.set,
-        "p": answer.p_value, "lead": best_lead(found)[0],
-        "score": {k: float(v[0]) for k, v in found.score.items()},
+        "p": answer.p_value, "lead": evidence.lead()[0],
+        "score": {k: float(v[0]) for k, v in evidence.score.items()},
         "off": off, "rho": _rho(bed, told, answer.label),
         "same": {n: bed.separable.same(n, w if n in bed.separable.effects else None)
                  for n, (w, _) in told.items()},

@@ -24,9 +24,9 @@ import numpy as np
 from feature_surveys import feature_survey, scenarios
 from real_windows import interval, windows
 
-from mlscorr.correction import estimate_correction
-from mlscorr.correction.estimate import _predict_at
-from mlscorr.covariance import FAMILIES
+from mlscorr.collocation.covariance import FAMILIES
+from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.prediction import predict_under
 
 FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 COUNTS = (3, 4, 6, 8, 12, 16, 24, 40, 60)
@@ -35,9 +35,7 @@ COUNTS = (3, 4, 6, 8, 12, 16, 24, 40, 60)
 def estimate(survey, **arguments):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return estimate_correction(
-            survey.recorded, survey.observations, survey.control, **arguments
-        )
+        return estimate_correction(survey.recorded, survey.matched, **arguments)
 
 
 def rms(values):
@@ -139,7 +137,7 @@ def tuned(seeds):
                 drift_time=time * chosen.drift_time,
                 bias_time=time * chosen.bias_time,
             )
-            pose, _ = _predict_at(found.model, tried, found.order, epochs)
+            pose, _ = predict_under(found.equations, tried, epochs)
             left.append(rms(error[epochs] - pose[:, :3]))
         alone = rms(survey.position_left(found.correction)[epochs])
         rows.append((name, alone, min(left), *left))
@@ -163,8 +161,7 @@ def count(seeds, figure=None):
             rows = np.linspace(0, len(names) - 1, min(n, len(names))).round().astype(int)
             part = survey.keep({names[i] for i in rows})
             curve = _polynomial(part, min(3, n - 2))
-            raw = part.check.position[[part.check.name.index(i) for i in part.checked.name]]
-            raw = raw - part.checked.position
+            raw = part.matched_check.misclosure
             consistent = part.check_rmse(estimate(part).correction)
             left[n].append((rms(raw), rms(raw - curve(part.checked.gps_time)), rms(consistent)))
     print("control   raw                     LS, order 3             consistent LSC")
@@ -176,9 +173,7 @@ def count(seeds, figure=None):
 
 def _polynomial(survey, degree):
     """Least squares trend of the misclosures: a function of gps_time."""
-    rows = [survey.control.name.index(name) for name in survey.observations.name]
-    misclosure = survey.control.position[rows] - survey.observations.position
-    time = survey.observations.gps_time
+    time, misclosure = survey.matched.gps_time, survey.matched.misclosure
     curves = [np.polynomial.Legendre.fit(time, column, degree) for column in misclosure.T]
     return lambda at: np.column_stack([curve(at) for curve in curves])
 

@@ -1,6 +1,8 @@
 """How many targets are matched right, refused and matched wrong, over many random surveys.
 
     python benchmarks/matching_study.py [surveys]
+    python benchmarks/matching_study.py canyons [surveys]
+    python benchmarks/matching_study.py many [observations]
 
 Each survey has 20 to 60 targets of two kinds and two sizes along one to three passes, 30 % of them
 in look-alike pairs 1.5 m apart. The POS drifts up to 3 m, by one of four causes in turn: velocity
@@ -9,26 +11,35 @@ of a MEMS GNSS/INS where it is at hand (MLSCORR_SHARED). Its stated sigmas are 0
 drift's size. Of the control 10 % are mis-numbered (exchanged in pairs), 10 % moved by 0.3 to 3 m,
 10 % stand hidden; of the observations 20 % are look-alikes without control, half of them near
 a target. Nothing is drawn from the covariance functions of the estimate.
+
+In canyons the POS has a bias and a trend, 1 to 3 m at most, that its constant sigma of 0.5 m does
+not state (also 10 times smaller and larger, and no sigma); look-alikes stand 1.5 to 4 m from
+targets, surveyed or not, and all control is right. The last study is of speed: as many surveyed
+points as observations.
 """
 
 import os
 import sys
 import time
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from mlscorr.frames import attitude_from_angles
 from mlscorr.io.pos_error_series import read_pos_error_series
 from mlscorr.matching import match
-from mlscorr.simulate.pos_error import given_error, pos_error
+from mlscorr.simulate.pos import given_error, pos_error
 from mlscorr.simulate.scenario import PosScenario
-from mlscorr.survey import ControlPoints, TargetObservations, Trajectory, attitude_from_angles
+from mlscorr.survey import ControlPoints, TargetObservations, Trajectory
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 START = 357_700.0  # s of the GPS week
 SPEED = 8.0  # m/s
-PAIR = 1.5  # m between look-alikes
+PAIR = 1.5, 1.5  # m between look-alikes, at least and at most
+CANYON_PAIR = 1.5, 4.0
+CANYON_SIGMAS = 0.5, 0.05, 5.0, None  # m; stated in canyons
 WEAK = 3.0  # sigmas of the POS's relative motion below which a moved point can't be seen
 SERIES = Path(os.environ.get("MLSCORR_SHARED", "../shared")) / "data/real_pos_error/OB_GINS_TXT.err"
 CAUSES = ("outages", "sinusoids", "mems", "real")
@@ -54,69 +65,144 @@ class Made:
 
 
 def main():
-    surveys = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    arguments = [int(argument) for argument in sys.argv[1:] if argument.isdigit()]
+    if "canyons" in sys.argv:
+        print_canyons(*arguments)
+    elif "many" in sys.argv:
+        print("{:.1f} s for {} observations, {} right, {} wrong".format(*many(*arguments)))
+    else:
+        print_causes(*arguments)
+
+
+def print_causes(surveys=100):
+    """Counts of surveys with blunders by cause of the drift."""
     counts = {}
     started = time.perf_counter()
     for seed in range(surveys):
         made = make(seed, CAUSES[seed % len(CAUSES)])
-        one = score(made)
-        counts.setdefault(made.cause, []).append(one)
+        counts.setdefault(made.cause, []).append(score(made))
         if "-v" in sys.argv:
-            print(seed, made.cause, one)
+            print(seed, made.cause, counts[made.cause][-1])
     seconds = time.perf_counter() - started
     print(f"{'cause':10s}" + "".join(f"{title:>10s}" for title in TITLES) + f"{'share':>9s}")
-    everything = [one for several in counts.values() for one in several]
-    for cause, several in (*counts.items(), ("all", everything)):
-        total = np.sum(several, axis=0)
+    everything = [row for rows in counts.values() for row in rows]
+    for cause, rows in (*counts.items(), ("all", everything)):
+        total = np.sum(rows, axis=0)
         share = total[0] / max(total[:3].sum(), 1)
         print(f"{cause:10s}" + "".join(f"{n:10d}" for n in total) + f"{share:9.2%}")
     print(f"{seconds / surveys:.2f} s a survey")
 
 
+def print_canyons(surveys=100):
+    """Counts of canyons by stated sigma."""
+    print(f"{'sigma':10s}" + "".join(f"{title:>10s}" for title in TITLES) + f"{'share':>9s}")
+    for sigma in CANYON_SIGMAS:
+        rows = [score(make_canyon(seed, sigma)) for seed in range(surveys)]
+        if "-v" in sys.argv:
+            for seed, row in enumerate(rows):
+                print(seed, row) if row[1] + row[2] + row[5] else None
+        total = np.sum(rows, axis=0)
+        share = total[0] / total[:3].sum()
+        print(f"{sigma!s:10s}" + "".join(f"{n:10d}" for n in total) + f"{share:9.2%}", flush=True)
+
+
+def many(count=100_000):
+    """Seconds, observations, right and wrong of a drive past so many surveyed points."""
+    observations, control, drive = long_drive(count)
+    started = time.perf_counter()
+    found = match(observations, control, drive).matched
+    seconds = time.perf_counter() - started
+    rows = np.searchsorted(observations.gps_time, found.gps_time)
+    right = sum(control.name[row] == name for row, name in zip(rows, found.name, strict=True))
+    return seconds, count, right, len(found) - right
+
+
+def long_drive(count):
+    """TargetObservations, ControlPoints and Trajectory of a drive past so many surveyed points.
+
+    The i-th observation is the i-th point, 4 m on from the one before.
+    """
+    rng = np.random.default_rng(0)
+    gps_time = START + 0.5 * np.arange(count + 40)
+    path = ORIGIN + np.outer(gps_time - START, [0.0, 8.0, 0.0])
+    level = attitude_from_angles(0.0, 0.0, np.zeros(len(path)))
+    drift = 0.5 * np.sin((gps_time[:count, None] - START) / [40.0, 60.0, 90.0])
+    drive = Trajectory(gps_time, path, level, np.full(path.shape, 0.3), np.full(path.shape, 2e-4))
+    across = np.column_stack([rng.choice([-6.0, 6.0], count), np.zeros(count), np.ones(count)])
+    place, nowhere = path[:count] + across, np.full((count, 3), np.nan)
+    names = tuple(f"T{i}" for i in range(count))
+    kinds, sizes = ("circle",) * count, np.full(count, 0.6)
+    control = ControlPoints(names, place, np.full((count, 3), 0.003), kinds, sizes, nowhere)
+    noise = rng.normal(0, 0.005, (count, 3))
+    variance = np.tile(np.eye(3) * 0.005**2, (count, 1, 1))
+    observations = TargetObservations(
+        (None,) * count, np.ones(count, int), gps_time[:count], place + drift + noise, variance,
+        nowhere, kinds, sizes, np.full(count, 100),
+    )  # fmt: skip
+    return observations, control, drive
+
+
 TITLES = ("right", "refused", "wrong", "moved used", "moved", "else used", "else", "no reason")
+
+
+@cache
+def small_set():
+    """Two dozen made surveys, of each cause in turn."""
+    return [make(seed, CAUSES[seed % len(CAUSES)]) for seed in range(24)]
+
+
+def figures():
+    """Counts as in TITLES over a small set of surveys."""
+    return dict(zip(TITLES, np.sum([score(made) for made in small_set()], axis=0), strict=True))
 
 
 def score(made):
     """Counts (8,) as in TITLES: matchable observations right, refused and matched wrong; those of
     moved or mis-numbered points used and all; look-alikes used and all; without a reason."""
-    found = match(made.observations, made.control, made.trajectory)
+    result = match(made.observations, made.control, made.trajectory)
     rows = {t: i for i, t in enumerate(made.observations.gps_time)}
     column = np.full(len(made.truth), -1)
-    for name, t in zip(found.matched.name, found.matched.gps_time, strict=True):
-        column[rows[t]] = made.control.name.index(name)
-    seen = made.truth >= 0
-    good = seen & made.whole[made.truth]
-    bad = seen & ~good
+    matched = [rows[t] for t in result.matched.gps_time]
+    column[matched] = made.control.rows(result.matched.name)
+    on_target = made.truth >= 0
+    good = on_target & made.whole[made.truth]
+    bad = on_target & ~good
     used = column >= 0
-    told = {refusal.name for refusal in found.refusals} | set(found.matched.name)
-    silent = sum(name not in told for name in made.control.name)
-    silent += sum(not reason for reason in found.reasons)
+    named = {refusal.name for refusal in result.refusals} | set(result.matched.name)
+    silent = sum(name not in named for name in made.control.name)
+    silent += sum(not reason for reason in result.reasons)
     return np.array([
         np.sum(good & (column == made.truth)),
         np.sum(good & ~used),
         np.sum(good & used & (column != made.truth)),
         np.sum(bad & used),
         np.sum(bad),
-        np.sum(~seen & used),
-        np.sum(~seen),
+        np.sum(~on_target & used),
+        np.sum(~on_target),
         silent,
     ])  # fmt: skip
 
 
-def make(seed, cause):
+def make_canyon(seed, sigma):
+    """A Made survey in a canyon whose POS states this sigma (m), or None."""
+    return make(seed, "canyon", sigma)
+
+
+def make(seed, cause, stated=None):
     """A Made survey."""
     rng = np.random.default_rng(seed)
+    is_canyon = cause == "canyon"
     if cause == "real" and not SERIES.exists():
         cause = "outages"
-    local = _places(rng)
+    local = _places(rng, CANYON_PAIR if is_canyon else PAIR)
     n = len(local)
     kinds, sizes = _appearances(rng, local)
     length = local[:, 0].max() + 40.0
     drives = [_drive(length, number, rng) for number in range(rng.integers(1, 4))]
-    recorded, errors = zip(*(_record(drive, cause, rng) for drive in drives), strict=True)
+    recorded, errors = zip(*(_record(drive, cause, rng, stated) for drive in drives), strict=True)
     seen = [_see(local, drive, rng) for drive in drives]
     hidden = rng.random(n) < 0.1
-    control, whole, moved = _survey(local, kinds, sizes, rng)
+    control, whole, moved = _survey(local, kinds, sizes, rng, 0.0 if is_canyon else 1.0)
     parts = [
         _observe(number, local, kinds, sizes, hidden, drive, one, error, rng)
         for number, (drive, one, error) in enumerate(zip(drives, seen, errors, strict=True), 1)
@@ -135,7 +221,7 @@ def make(seed, cause):
     )
 
 
-def _places(rng):
+def _places(rng, pair):
     """Targets (n, 3) along a way: metres ahead, to the right, up; 30 % of them in pairs."""
     n = int(rng.integers(20, 61))
     ahead = 40.0 + np.cumsum(rng.uniform(5.0, 60.0, n))
@@ -143,8 +229,12 @@ def _places(rng):
     places = np.column_stack([places, rng.uniform(0.0, 4.0, n)])
     for i in range(0, n - 1, 7):
         along = rng.normal(size=3) * [1, 1, 0.3]
-        places[i + 1] = places[i] + PAIR * along / np.linalg.norm(along)
+        places[i + 1] = places[i] + _between(*pair, rng) * along / np.linalg.norm(along)
     return places
+
+
+def _between(least, most, rng):
+    return least if least == most else rng.uniform(least, most)
 
 
 def _appearances(rng, local):
@@ -195,9 +285,14 @@ def _see(local, drive, rng):
     return np.clip(time, drive.gps_time[0], drive.gps_time[-1])
 
 
-def _record(drive, cause, rng):
+def _record(drive, cause, rng, stated=None):
     """What the POS records: the trajectory with sigmas, and its position error (n, 3)."""
     n = len(drive)
+    if cause == "canyon":
+        error = _canyon(drive.gps_time, rng)
+        sigma = None if stated is None else np.full((n, 3), stated)
+        position = drive.position + error
+        return Trajectory(drive.gps_time, position, drive.attitude, sigma), error
     if cause in ("mems", "real"):
         if cause == "real":
             made = given_error(drive, read_pos_error_series(SERIES), rng)
@@ -218,6 +313,17 @@ def _record(drive, cause, rng):
     error = error + rng.normal(0.0, 0.1, 3)
     recorded = Trajectory(drive.gps_time, drive.position + error, drive.attitude, sigma, angles)
     return recorded, error
+
+
+def _canyon(gps_time, rng):
+    """A bias and a trend, 1 to 3 m at most, in a canyon that begins and ends within 10 s."""
+    first, last = np.quantile(gps_time, [rng.uniform(0.0, 0.3), rng.uniform(0.7, 1.0)])
+    inside = np.clip((gps_time - first) / 10.0, 0, 1) * np.clip((last - gps_time) / 10.0, 0, 1)
+    direction = rng.normal(size=(2, 3)) * [1.0, 1.0, 0.5]
+    share = np.clip((gps_time - first) / (last - first), 0.0, 1.0)
+    error = inside[:, None] * (direction[0] + np.outer(share, direction[1]))
+    error *= rng.uniform(1.0, 3.0) / np.linalg.norm(error, axis=1).max()
+    return error + 0.02 * np.sin(gps_time / 7)[:, None]
 
 
 def _outages(gps_time, rng):
@@ -246,13 +352,13 @@ def _sinusoids(gps_time, rng):
     return error, np.full(error.shape, np.sqrt(np.mean(error**2)))
 
 
-def _survey(local, kinds, sizes, rng):
+def _survey(local, kinds, sizes, rng, blunders=1.0):
     """ControlPoints, which of them are whole, and how far the others were moved."""
     n = len(local)
     position = _to_map(local)
     order = rng.permutation(n)
-    pairs = order[: 2 * round(0.05 * n)].reshape(-1, 2)
-    moved_rows = order[2 * len(pairs) :][: round(0.1 * n)]
+    pairs = order[: 2 * round(blunders * 0.05 * n)].reshape(-1, 2)
+    moved_rows = order[2 * len(pairs) :][: round(blunders * 0.1 * n)]
     whole, moved = np.ones(n, bool), np.zeros(n)
     surveyed = position + rng.normal(0, 0.003, (n, 3))
     # The two points' names are exchanged, with the appearance that belongs to the name: where
@@ -320,6 +426,7 @@ def _stack(parts):
 def _join(drives):
     rotation = drives[0].attitude.concatenate([drive.attitude for drive in drives])
     columns = ("gps_time", "position", "position_sigma", "attitude_sigma")
+    columns = [name for name in columns if getattr(drives[0], name) is not None]
     joined = {name: np.concatenate([getattr(drive, name) for drive in drives]) for name in columns}
     return Trajectory(attitude=rotation, **joined)
 

@@ -6,11 +6,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
-from mlscorr.correction import estimate_correction
-from mlscorr.correction.estimate import _predict_at
-from mlscorr.correction.model import Model, Parameters
+from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.assembly import position_equations
+from mlscorr.estimate.prediction import predict_under
+from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate.signals import SignalParameters
+from mlscorr.frames import attitude_from_angles
 from mlscorr.io.pos_error_series import read_pos_error_series
-from mlscorr.survey import ControlPoints, Pos, TargetObservations, Trajectory, attitude_from_angles
+from mlscorr.survey import ControlPoints, Matched, Pos, TargetObservations, Trajectory
 
 WINDOW, USED = 248.0, 357_881.0  # s: the windows' length; where a shared survey took its own
 FROM, EVERY, LOST = 357_900.0, 150.0, 60.0  # s: GNSS was withheld 60 s in every 150 s
@@ -24,46 +27,62 @@ def interval(values, statistic=np.median):
     return f"{statistic(values):.3f} [{low:.3f}, {high:.3f}]"
 
 
-def windows(path):
-    """Real drift; the windows that share more than half with the shared survey's are left out."""
-    series, rows, within = read_pos_error_series(path), [], []
+def cases(path):
+    """Name, recorded trajectory, matched control and error (n, 3) of each window of a real series.
+
+    The windows that share more than half with the shared survey's are left out.
+    """
+    series = read_pos_error_series(path)
     lost = (series.gps_time - FROM) % EVERY
     lost = np.where((series.gps_time >= FROM) & (lost < LOST), lost, 0.0)
     sigma = np.outer(lost**2, [3.33e-4, 3.33e-4, 1.92e-4]) + np.array([0.015, 0.015, 0.03])
     starts = np.arange(series.gps_time[0], series.gps_time[-1] - WINDOW, WINDOW / 4)
     for seed, first in enumerate(starts):
-        part = (series.gps_time >= first) & (series.gps_time <= first + WINDOW)
-        if abs(first - USED) < WINDOW / 2:
-            continue
-        case = _window(series.gps_time[part], -series.position[part], sigma[part], seed)
-        trajectory, observations, control, error = case
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            found = estimate_correction(trajectory, observations, control)
-        corrected = found.correction.corrected
-        remaining = error - (corrected.position - trajectory.position)
-        within.append(
-            [np.mean(np.abs(remaining / corrected.position_sigma) < k) for k in (1, 1.96)]
-        )
-        misclosure = control.position - observations.position
-        fits = [np.polynomial.Legendre.fit(observations.gps_time, m, 5) for m in misclosure.T]
-        fitted = error - np.column_stack([fit(trajectory.gps_time) for fit in fits])
-        stationary = error - _stationary(trajectory, observations, control)
-        rows.append(
-            [np.sqrt(np.mean(v**2, axis=0)) for v in (error, fitted, stationary, remaining)]
-        )
-    rows = np.array(rows)
+        if abs(first - USED) >= WINDOW / 2:
+            part = (series.gps_time >= first) & (series.gps_time <= first + WINDOW)
+            made = _window(series.gps_time[part], -series.position[part], sigma[part], seed)
+            yield f"{first:.0f} s", *made
+
+
+def windows(path):
+    """Print what is left of real drift, with its sigma(t) stated and with none."""
+    for title, hidden in (("sigma(t) stated", False), ("no sigma stated", True)):
+        rows, within = [], []
+        for _, stated, matched, error in cases(path):
+            trajectory = replace(stated, position_sigma=None) if hidden else stated
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                pos = Pos(position_sigma=0.5) if hidden else None
+                estimate = estimate_correction(trajectory, matched, pos)
+            corrected = estimate.correction.corrected
+            remaining = error - (corrected.position - trajectory.position)
+            shares = np.abs(remaining / corrected.position_sigma)
+            within.append([np.mean(shares < k) for k in (1, 1.96)])
+            fits = [
+                np.polynomial.Legendre.fit(matched.gps_time, m, 5) for m in matched.misclosure.T
+            ]
+            fitted = error - np.column_stack([fit(trajectory.gps_time) for fit in fits])
+            stationary = error - _stationary(trajectory, matched)
+            left = (error, fitted, stationary, remaining)
+            rows.append([np.sqrt(np.mean(v**2, axis=0)) for v in left])
+        _print_windows(title, np.array(rows), np.mean(within, axis=0))
+
+
+def _print_windows(title, rows, shares):
     total = np.linalg.norm(rows, axis=2)
-    print(f"{len(rows)} windows of {WINDOW:.0f} s. Medians   E      N      H      3-D")
+    print(
+        f"{title}: {len(rows)} windows of {WINDOW:.0f} s. Medians   E      N      H      3-D  worst"
+    )
     for i, name in enumerate(("raw", "LS, order 5", "stationary exponential", "mlscorr")):
-        medians = [*np.median(rows[:, i], axis=0), np.median(total[:, i])]
-        print(f"{name:24s}", *(f"{value:6.3f}" for value in medians))
+        medians = [*np.median(rows[:, i], axis=0), np.median(total[:, i]), total[:, i].max()]
+        print(f"{name:42s}", *(f"{value:6.3f}" for value in medians))
     for i, name in ((1, "LS, order 5"), (2, "stationary exponential")):
         medians = np.median(total[:, i]) / np.median(total[:, 3])
         print(f"{name}: {medians:.2f} times by medians, window by window "
               f"{interval(total[:, i] / total[:, 3])} times mlscorr's error")  # fmt: skip
-    shares = np.mean(within, axis=0)
-    print(f"truth within 1 sigma {shares[0]:.1%}, within 1.96 sigma {shares[1]:.1%}")
+    mean = np.exp(np.log(total[:, 3]).mean())
+    print(f"geometric mean {mean:.3f} m; truth within 1 sigma {shares[0]:.1%}, within 1.96 sigma "
+          f"{shares[1]:.1%}")  # fmt: skip
 
 
 def _window(gps_time, error, sigma, seed):
@@ -86,25 +105,22 @@ def _window(gps_time, error, sigma, seed):
     noise = np.tile(0.005**2 * np.eye(3), (n, 1, 1))
     seen = seen + 0.005 * rng.normal(size=(n, 3))
     passes, points = np.ones(n, int), np.full(n, 300)
-    return (
-        recorded,
-        TargetObservations(name, passes, times, seen, noise, up, kind, size, points),
-        control,
-        error,
-    )
+    observations = TargetObservations(name, passes, times, seen, noise, up, kind, size, points)
+    return recorded, Matched(observations, control), error
 
 
-def _stationary(trajectory, observations, control):
+def _stationary(trajectory, matched):
     """Position error (n, 3) by one exponential covariance of constant sigma, as in the paper, with
     scale and correlation time by restricted likelihood."""
     constant = replace(trajectory, position_sigma=np.full((len(trajectory), 3), 0.3))
-    model = Model.build(constant, observations, control, Pos())
+    equations = position_equations(constant, matched, Pos(), 1, position_prior)
 
     def parameters(x):
-        return Parameters("exponential", *np.exp(x), 1.0, 1.0, 1.0, 1.0, 1.0)
+        scale, time = np.exp(x)
+        return SignalParameters("exponential", scale, time, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, time)
 
     def negative(x):
-        return -model.solve(parameters(x), 1).log_likelihood
+        return -equations.solve(parameters(x)).log_likelihood
 
     best = minimize(negative, [0.0, np.log(60.0)], method="Nelder-Mead").x
-    return _predict_at(model, parameters(best), 1, np.arange(len(trajectory)))[0][:, :3]
+    return predict_under(equations, parameters(best))[0][:, :3]

@@ -44,7 +44,7 @@ def drive(seed):
         *np.sqrt(np.mean(error**2, axis=0)),
     ]
     print(f"seed {seed:3d}", *(f"{value:8.3f}" for value in numbers), flush=True)
-    seen = len(result.control_observations) + len(result.check_observations)
+    seen = len(result.matched_control) + len(result.matched_check)
     rejected = len(result.estimate.outliers)
     return [*numbers, np.mean(ratio < 1), np.mean(ratio < 2), seen, rejected]
 

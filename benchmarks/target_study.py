@@ -4,16 +4,19 @@ python benchmarks/target_study.py [views per row [looks, with commas [first seed
 """
 
 import sys
+import tempfile
 import time
-from itertools import pairwise
-from pathlib import Path
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise, product
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from target_rays import SCANNER, TARGETS, view
 
-from mlscorr.targets.fit import fit_targets
+import mlscorr
+from mlscorr.io.control import NO_POINTS
+from mlscorr.simulate import Scenario, simulate
+from mlscorr.targets import fit_targets
 
 CONDITIONS = {  # incidence (deg), share hidden
     "easy": (30.0, 0.0),
@@ -37,6 +40,62 @@ def look_at(look, size, condition, seed, known=True):
     best = found[int(np.argmin(off))]
     error = best.position - seen.centre
     return seen.on_target, error, error @ np.linalg.solve(best.covariance, error), false, best.score
+
+
+def figures():
+    """Figures of a small study: a view of each row, with the size known and unknown, and a street.
+
+    Recall counts targets of 25 points and more; of the street, objects that the search finds
+    without control, and the targets that are found near control.
+    """
+    known = product(TARGETS, (0.6, 0.3), CONDITIONS, (50,), (True,))
+    unknown = product(
+        ("disc", "plate", "hole", "checkerboard"), (0.6,), CONDITIONS, (50,), (False,)
+    )
+    content = {}
+    for label, rows in (("", known), ("unknown size, ", unknown)):
+        results = [look_at(*row) for row in rows]
+        results = [result for result in results if result[0] >= COUNTS[0]]
+        best = [result for result in results if result[1] is not None]
+        error = 1e3 * np.array([np.linalg.norm(result[1]) for result in best])
+        content |= {
+            f"{label}recall": len(best) / len(results),
+            f"{label}median mm": np.median(error),
+            f"{label}95 % mm": np.percentile(error, 95),
+            f"{label}chi2/3": np.mean([result[2] for result in best]) / 3,
+            f"{label}false": sum(result[3] for result in results),
+            f"{label}score": np.mean([result[4] for result in best]),
+        }
+    survey = street()
+    content |= street_figures("street, ", survey, survey)
+    blind = replace(survey, control=NO_POINTS, check=NO_POINTS)
+    return content | street_figures("street without control, ", survey, blind)
+
+
+@cache
+def street():
+    """A simulated survey of 12 s with 8 targets."""
+    scenario = Scenario(
+        drive={"duration": 12.0},
+        targets={"control": 6, "check": 2},
+        scanner=[{"lines_per_second": 75, "points_per_line": 800}],
+    )
+    folder = tempfile.mkdtemp()
+    simulate(scenario, np.random.default_rng(2)).write(folder)
+    return mlscorr.read_survey(folder)
+
+
+def street_figures(label, survey, searched):
+    """How many of a street's targets are found, and how many other objects."""
+    rows = mlscorr.extract(searched).targets
+    place = np.array([row["observed"] for row in rows]).reshape(-1, 3)
+    near = np.linalg.norm(place[None] - survey.surveyed.position[:, None], axis=2) < 0.3  # m
+    others = ~near.any(axis=0)
+    return {
+        f"{label}targets": near.any(axis=1).sum(),
+        f"{label}others": others.sum(),
+        f"{label}score": np.mean([row["score"] for row in rows if row["score"] > 0]),
+    }
 
 
 def row(label, results):

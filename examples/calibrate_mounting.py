@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mlscorr
-from mlscorr.calibration import COMPONENTS
-from mlscorr.evaluation import misclosures
+from mlscorr.estimate.calibration import MOUNTING_COMPONENTS as COMPONENTS
+from mlscorr.evaluate.scores import misclosures
 
 ASSETS = Path(__file__).parents[1] / "assets"
 WRONG = (
@@ -118,14 +118,13 @@ def draw_components(axes, calibration, rows, scale, truth):
 
 def draw_misclosures(axes, survey, result):
     """Check points in body axes: there a wrong mounting shows as one shift."""
-    observations, check = result.check_observations, survey.check
-    role = "Check points"
-    if len(observations) == 0:
-        observations, check, role = result.control_observations, survey.control, "Control points"
-    to_body = survey.trajectory.at(observations.gps_time).attitude.inv()
-    before = to_body.apply(misclosures(observations, check))
-    after = to_body.apply(misclosures(observations, check, result.calibration.correction()))
-    time = observations.gps_time - survey.trajectory.gps_time[0]
+    matched, role = result.matched_check, "Check points"
+    if len(matched) == 0:
+        matched, role = result.matched_control, "Control points"
+    to_body = survey.trajectory.at(matched.gps_time).attitude.inv()
+    before = to_body.apply(matched.misclosure)
+    after = to_body.apply(misclosures(matched, result.calibration.correction()))
+    time = matched.gps_time - survey.trajectory.gps_time[0]
     for axis, name in enumerate(("right", "forward", "up")):
         axes[axis].axhline(0.0, color=BLACK, lw=0.8)
         axes[axis].plot(time, 1e3 * before[:, axis], "o", color=ORANGE, ms=4, label="before")

@@ -15,8 +15,8 @@ import numpy as np
 from matplotlib import rc_context
 
 import mlscorr
-from mlscorr.report.comparison import comparison_figure
-from mlscorr.report.look import STYLE
+from mlscorr.report.comparison_page import comparison_figure
+from mlscorr.report.style import STYLE
 
 ROOT = Path(__file__).parents[1]
 SHARED = Path(os.environ.get("MLSCORR_SHARED") or ROOT.parent / "shared")

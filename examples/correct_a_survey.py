@@ -71,42 +71,42 @@ def draw(survey, result, picture):
 
 def farthest(survey, result):
     """The row of the target that lay farthest off; a check point and a circle if there is one."""
-    surveyed = survey.control + survey.check
+    surveyed = survey.surveyed
     kind = dict(zip(surveyed.name, surveyed.kind, strict=True))
-    rows = [row for row in result.targets if row["observed"] is not None]
+    rows = [row for row in result.targets if row.is_observed]
     return max(
         rows,
         key=lambda row: (
-            row["role"] == "check",
-            kind[row["name"]] == "circle",
-            np.linalg.norm(row["before"]),
+            row.role == "check",
+            kind[row.name] == "circle",
+            np.linalg.norm(row.before),
         ),
     )
 
 
 def points_near(survey, row):
     """Points of the recorded cloud about a target, at the time when it was seen."""
-    reach = REACH + np.linalg.norm(row["before"])
+    reach = REACH + np.linalg.norm(row.before)
     for file in survey.clouds:
         for chunk in read_chunks(file):
-            near = np.linalg.norm(chunk.xyz - row["surveyed"], axis=1) < reach
-            near &= np.abs(chunk.gps_time - row["gps_time"]) < 2.0
+            near = np.linalg.norm(chunk.xyz - row.surveyed, axis=1) < reach
+            near &= np.abs(chunk.gps_time - row.gps_time) < 2.0
             if near.any():
                 return chunk[near]
-    raise ValueError(f"No point lies near {row['name']}.")
+    raise ValueError(f"No point lies near {row.name}.")
 
 
 def draw_target(axes, survey, points, row, when):
     """Points about a target, and the outline where it was surveyed, in the target's plane."""
-    surveyed = survey.check if row["role"] == "check" else survey.control
-    index = surveyed.name.index(row["name"])
+    surveyed = survey.check if row.role == "check" else survey.control
+    index = surveyed.name.index(row.name)
     normal = surveyed.normal[index]
     if not np.isfinite(normal).all():
         bright = points.xyz[points.intensity > np.percentile(points.intensity, 90)]
         normal = np.linalg.svd(bright - bright.mean(axis=0), full_matrices=False)[2][2]
     across = np.cross([0.0, 0.0, 1.0] if abs(normal[2]) < 0.9 else [0.0, 1.0, 0.0], normal)
     across /= np.linalg.norm(across)
-    local = (points.xyz - row["surveyed"]) @ np.column_stack([across, np.cross(normal, across)])
+    local = (points.xyz - row.surveyed) @ np.column_stack([across, np.cross(normal, across)])
     order = np.argsort(points.intensity)
     axes.scatter(*local[order].T, c=points.intensity[order], s=9, cmap="cividis", linewidths=0)
     half = surveyed.size[index] / 2
@@ -118,10 +118,8 @@ def draw_target(axes, survey, points, row, when):
     )
     axes.plot(radius * np.cos(turn), radius * np.sin(turn), color="#d55e00", lw=2, label="surveyed")
     axes.set(xlim=(-REACH, REACH), ylim=(-REACH, REACH), aspect="equal", xlabel="in the plane (m)")
-    misclosure = np.linalg.norm(row[when])
-    axes.set_title(
-        f"{when.capitalize()}: {row['role']} point {row['name']} is {misclosure:.3f} m off"
-    )
+    misclosure = np.linalg.norm(getattr(row, when))
+    axes.set_title(f"{when.capitalize()}: {row.role} point {row.name} is {misclosure:.3f} m off")
     axes.legend(loc="lower left")
 
 
@@ -134,7 +132,7 @@ def draw_correction(axes, result):
         sigma = corrected.position_sigma[:, axis]
         axes.fill_between(time, change - sigma, change + sigma, color=color, alpha=0.25, lw=0)
         axes.plot(time, change, color=color, label=("east", "north", "height")[axis])
-    epochs = result.control_observations.gps_time[result.estimate.used] - recorded.gps_time[0]
+    epochs = result.matched_control.gps_time[result.estimate.used] - recorded.gps_time[0]
     axes.plot(epochs, np.zeros(len(epochs)), "k|", ms=14, label="control point seen")
     axes.set(xlabel="time since the start (s)", ylabel="m", xlim=(time[0], time[-1]))
     axes.set_title("Correction of the POS position over time, with 1 sigma")

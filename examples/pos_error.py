@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from mlscorr.frames import attitude_from_angles
 from mlscorr.io.pos_error_series import read_pos_error_series
-from mlscorr.simulate.pos_error import pos_error
+from mlscorr.simulate.pos import pos_error
 from mlscorr.simulate.scenario import PosScenario
-from mlscorr.survey import Trajectory, attitude_from_angles
+from mlscorr.survey import Trajectory
 
 ROOT = Path(__file__).parents[1]
 SERIES = Path("data", "real_pos_error", "OB_GINS_TXT.err")

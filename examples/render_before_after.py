@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import mlscorr
-from mlscorr.report.render import Look, draw, panel_size
+from mlscorr.report.render import PictureOptions, draw, panel_size
 
 ROOT = Path(__file__).parents[1]
 SHARED = Path(os.environ.get("MLSCORR_SHARED") or ROOT.parent / "shared")
@@ -31,8 +31,8 @@ def main():
         survey = mlscorr.read_survey(path)
         result = mlscorr.correct(survey)
         targets = result.targets
-        look = Look(panel_size(PAGE), panel_size(PAGE, stacked=True))
-        pictures = list(draw(survey, result.estimate.correction, targets, look))
+        options = PictureOptions(panel_size(PAGE), panel_size(PAGE, stacked=True))
+        pictures = list(draw(survey, result.estimate.correction, targets, options))
     if arguments.out:
         arguments.out.mkdir(parents=True, exist_ok=True)
         for picture in pictures:
@@ -68,9 +68,9 @@ def simulated(folder):
 
 def farthest(targets):
     """Name of the picture of the check point that lay farthest off."""
-    seen = [row for row in targets if row["observed"] is not None]
-    worst = max(seen, key=lambda r: (r["role"] == "check", np.linalg.norm(r["before"])))
-    return f"target-{worst['name']}"
+    observed = [row for row in targets if row.is_observed]
+    worst = max(observed, key=lambda row: (row.role == "check", np.linalg.norm(row.before)))
+    return f"target-{worst.name}"
 
 
 def together(pictures, path):

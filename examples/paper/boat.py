@@ -28,9 +28,9 @@ from tables import (
 )
 
 from mlscorr.baselines import fit_horizontal_and_height, fit_polynomial
-from mlscorr.correction import estimate_correction
-from mlscorr.evaluation import misclosures
-from mlscorr.report.look import BLUE, GREEN, GREY, STYLE, VERMILLION
+from mlscorr.estimate import estimate_correction
+from mlscorr.evaluate.scores import misclosures
+from mlscorr.report.style import BLUE, GREEN, GREY, STYLE, VERMILLION
 
 ORDER = 4
 METHODS = {  # title: the paper's row
@@ -57,17 +57,16 @@ def main(arguments=None):
 
 def residuals(survey):
     """Surveyed - observed (15, 3) at the check points, by method."""
-    seen, control = survey.observations, survey.control
-    given = survey.recorded, seen, control
-    raw = misclosures(survey.checked, survey.check)
+    given = survey.recorded, survey.matched
+    raw = survey.matched_check.misclosure
     corrections = {
-        "Coordinate transformation": fit_horizontal_and_height(seen, control),
+        "Coordinate transformation": fit_horizontal_and_height(survey.matched),
         "LS-4": fit_polynomial(*given, ORDER),
         "Consistent LSC": quietly(estimate_correction, *given).correction,
         "Consistent LSC, order 4": quietly(estimate_correction, *given, order=ORDER).correction,
     }
     found = {
-        title: misclosures(survey.checked, survey.check, correction)
+        title: misclosures(survey.matched_check, correction)
         for title, correction in corrections.items()
     }
     literal, at = Literal.of(survey, ORDER), survey.checked.gps_time

@@ -25,10 +25,12 @@ from tables import (
     told_axes,
 )
 
-from mlscorr.calibration import COMPONENTS, estimate_mounting
-from mlscorr.evaluation import misclosures
-from mlscorr.report.look import BLUE, GREEN, GREY, STYLE, VERMILLION
+from mlscorr.estimate import estimate_mounting
+from mlscorr.estimate.calibration import MOUNTING_COMPONENTS as COMPONENTS
+from mlscorr.evaluate.scores import misclosures
+from mlscorr.report.style import BLUE, GREEN, GREY, STYLE, VERMILLION
 from mlscorr.simulate import read_scenario, simulate
+from mlscorr.survey import Matched
 
 METHODS = {"raw": "Raw", "ls": "LS", "lsc": "LSC", "lsc with drift": "LSC with drift"}
 LIMITS = np.array([0.014, 0.011, 0.023])  # m, what the paper's LSC reaches
@@ -48,26 +50,24 @@ def main(arguments=None):
 
 def study(scenario, seed):
     """Errors and sigmas of one survey's calibration, and residuals at its check points."""
-    from calibration_study import observe, score, select  # of the benchmarks, as tables tells
+    from calibration_study import observe, score  # of the benchmarks, as tables tells
 
     simulated = simulate(scenario, np.random.default_rng(seed))
     observations, is_check = observe(simulated, np.random.default_rng([seed, 1]))
-    control, check = (
-        select(simulated.targets, of) for of in (~simulated.is_check, simulated.is_check)
-    )
+    control, check = (simulated.targets[of] for of in (~simulated.is_check, simulated.is_check))
     calibration = estimate_mounting(
-        simulated.trajectory, simulated.mounting, observations[~is_check], control
+        simulated.trajectory, simulated.mounting, Matched.by_name(observations[~is_check], control)
     )
-    found = score(calibration, simulated, observations[is_check], check)
+    checked = Matched.by_name(observations[is_check], check)
+    found = score(calibration, simulated, checked)
     corrections = {
         "raw": None,
         "ls": calibration.correction("ls"),
         "lsc": calibration.correction(),
-        "lsc with drift": calibration.correction_with_drift(),
+        "lsc with drift": calibration.correction_with_drift,
     }
     found["residuals"] = {
-        name: misclosures(observations[is_check], check, correction)
-        for name, correction in corrections.items()
+        name: misclosures(checked, correction) for name, correction in corrections.items()
     }
     return found
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from published import DURATION, TABLE_1_C0, TABLE_3, TABLE_4, TIMES
 from tables import middle
 
-from mlscorr.report.look import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, STYLE, VERMILLION
+from mlscorr.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, STYLE, VERMILLION
 
 COLOURS = {21: BLUE, 15: ORANGE, 9: GREEN}
 PAPER = {"linestyle": "none", "marker": "x", "markersize": 5, "markeredgewidth": 1.3}

@@ -8,7 +8,7 @@ from published import TIMES
 from tables import quietly, rms, survey_of
 
 from mlscorr.baselines import fit_polynomial
-from mlscorr.correction import estimate_correction
+from mlscorr.estimate import estimate_correction
 
 NORTH = 1  # Tables 3 and 4 are of this axis
 
@@ -38,14 +38,13 @@ class Drive:
     def consistent(self, order=None):
         """What is left (q, 3) with all parameters from the control points."""
         survey, chosen = self.survey, {} if order is None else {"order": order}
-        given = survey.recorded, survey.observations, survey.control
-        found = quietly(estimate_correction, *given, **chosen)
+        found = quietly(estimate_correction, survey.recorded, survey.matched, **chosen)
         return survey.position_left(found.correction)[::10]
 
     def least_squares(self, order):
         """What is left (q, 3) by LS-n, by other code than the literal mode's."""
         survey = self.survey
-        found = fit_polynomial(survey.recorded, survey.observations, survey.control, order)
+        found = fit_polynomial(survey.recorded, survey.matched, order)
         return survey.position_left(found)[::10]
 
 

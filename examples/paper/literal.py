@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.collocation import LiteralSignal, Noise, collocate_literal
+from mlscorr.collocation.trend import polynomial_design
 
 
 @dataclass(frozen=True)
@@ -31,13 +32,13 @@ class Literal:
     @classmethod
     def of(cls, survey, order):
         """From a survey's control points."""
-        seen, control = survey.observations, survey.control
-        rows = [control.name.index(name) for name in seen.name]
-        stated = survey.recorded.at(seen.gps_time).position_sigma
+        matched = survey.matched
+        stated = survey.recorded.at(matched.gps_time).position_sigma
+        surveyed = matched.surveyed.sigma[:, :, None] ** 2 * np.eye(3)
         return cls(
-            gps_time=seen.gps_time,
-            misclosure=control.position[rows] - seen.position,
-            noise=seen.covariance + control.sigma[rows][:, :, None] ** 2 * np.eye(3),
+            gps_time=matched.gps_time,
+            misclosure=matched.misclosure,
+            noise=matched.observations.covariance + surveyed,
             variance=np.mean(stated**2, axis=0),
             order=order,
         )
@@ -74,7 +75,5 @@ class Literal:
 
     def _design(self, gps_time):
         """Polynomials of each axis (q, 3, 3 (order + 1)), Legendre's on the control span."""
-        first, last = self.gps_time.min(), self.gps_time.max()
-        argument = (gps_time - (first + last) / 2) / ((last - first) / 2)
-        basis = np.polynomial.legendre.legvander(argument, self.order)
-        return np.einsum("qk,ij->qikj", basis, np.eye(3)).reshape(len(gps_time), 3, -1)
+        span = self.gps_time.min(), self.gps_time.max()
+        return polynomial_design(gps_time, span, self.order, extrapolate=True)

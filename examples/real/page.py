@@ -7,9 +7,9 @@ from pathlib import Path
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from mlscorr.report.effect_words import lowered, titles
-from mlscorr.report.look import STYLE
-from mlscorr.report.skeleton import data_uri, environment, now, versions
+from mlscorr.report.gap.labels import lowered, titles
+from mlscorr.report.pages import data_uri, environment, now, versions
+from mlscorr.report.style import STYLE
 
 ROOT = Path(__file__).parents[2]
 SHARED = Path(os.environ.get("MLSCORR_SHARED") or ROOT.parent / "shared") / "data"

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 from page import SHARED
 
-from mlscorr.gap.pairing import target_rows
-from mlscorr.georeference import georeference
+from mlscorr.frames import georeference
+from mlscorr.gap.observe.pairing import target_rows
 from mlscorr.io.pos_error_series import read_pos_error_series
 from mlscorr.io.poses import read_poses
 from mlscorr.simulate import Scenario
 from mlscorr.simulate.drive import drive
-from mlscorr.simulate.pos_error import PosError, pos_error, record
+from mlscorr.simulate.pos import PosError, pos_error, record
 from mlscorr.simulate.recording import true_mounting
 from mlscorr.simulate.scenario import PosScenario, ScannerScenario
 from mlscorr.survey import (
@@ -23,7 +23,7 @@ from mlscorr.survey import (
     TargetObservations,
     Trajectory,
 )
-from mlscorr.targets.candidates import Candidates
+from mlscorr.targets import Candidates
 
 DATA = SHARED / "real_pos_error"
 FILES = ("GNSS_RTK.pos", "OB_GINS_TXT.err")

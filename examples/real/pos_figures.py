@@ -3,8 +3,8 @@
 import numpy as np
 from pos_drive import FIRST, LEAD, OUTAGE, PERIOD
 
-from mlscorr.gap.measure import signed_root
-from mlscorr.report.look import AFTER, BEFORE, GREY
+from mlscorr.gap.infer.measure import signed_root
+from mlscorr.report.style import AFTER, BEFORE, GREY
 
 UPPER = "Error of a real MEMS GNSS/INS; grey: without GNSS"
 LOWER = "Gap between simulated and real; bars: 95 % of it if that simulator is right"

@@ -13,14 +13,13 @@ from pos_drive import (
 )
 from scipy.stats import binomtest
 
-from mlscorr.gap.background import BELIEVED, epochs
-from mlscorr.gap.causes import infer
-from mlscorr.gap.evidence import log_likelihood
-from mlscorr.gap.measure import BAND, signed_root
-from mlscorr.gap.rows import background
+from mlscorr.gap.infer.causes import infer_causes
+from mlscorr.gap.infer.measure import signed_root
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.observe import background
 from mlscorr.gap.signatures import signatures
-from mlscorr.gap.whitening import whitener
-from mlscorr.simulate.pos_error import record
+from mlscorr.simulate.pos import record
 
 REPLICAS = 200  # for null bands
 RESAMPLED = 2000  # for bootstrap intervals
@@ -29,23 +28,24 @@ RESAMPLED = 2000  # for bootstrap intervals
 def diagnosed(rows, survey, rng, replicas=REPLICAS):
     """Inference of a window: nothing here knows of the outages."""
     signs, _ = signatures(rows, survey)
-    return infer(rows, background(rows, survey), survey, signs, rng, replicas)
+    return infer_causes(rows, background(rows, survey), survey, signs, rng, replicas)
 
 
 def terms(rows, survey, rng=None, replicas=REPLICAS):
     """What a survey's beliefs don't predict of its n residuals: time, sigma^2 (u^2 - 1) of the
     innovations, square of the residual less its variance, log likelihood, and with rng the means
     of the second of replicas in which the beliefs are right. Units: m^2."""
-    observed = epochs(rows, background(rows, survey))
-    factor = whitener(observed, BELIEVED)
+    observed = Observations.of(rows, background(rows, survey))
+    whitener = observed.whitener()
     residual = observed.columns(rows.residual[:, None])
-    columns = residual if rng is None else np.hstack([residual, factor.draw(rng, replicas)])
-    u, sigma = factor.innovations(columns)
+    columns = residual if rng is None else np.hstack([residual, whitener.draw(rng, replicas)])
+    u, sigma = whitener.innovations(columns)
     square = sigma[:, None] ** 2 * (u**2 - 1)
-    signal = (observed.drift**2 + observed.jitter**2 + observed.attitude**2).sum(axis=1)
-    plain = residual[:, 0] ** 2 - signal - observed.own
-    likelihood = float(log_likelihood(factor.whiten(residual), factor)[0])
-    return observed.gps_time, square[:, 0], plain, likelihood, square[:, 1:].mean(axis=0)
+    errors = observed.errors
+    signal = (errors.drift**2 + errors.jitter**2 + errors.attitude**2).sum(axis=1)
+    plain = residual[:, 0] ** 2 - signal - errors.own
+    likelihood = float(whitener.log_likelihood(residual)[0])
+    return errors.gps_time, square[:, 0], plain, likelihood, square[:, 1:].mean(axis=0)
 
 
 def measure(cycles, rows, one, models, rng, replicas=REPLICAS):
@@ -68,8 +68,8 @@ def measure(cycles, rows, one, models, rng, replicas=REPLICAS):
             {
                 "time": time, "before": before, "after": after, "plain": plain, "left": left,
                 "chosen": chosen, "lost": one.lost(time), "gain": new - old,
-                "band": signed_root(np.percentile(band, BAND)),
-                "later": signed_root(np.percentile(later, BAND)),
+                "band": signed_root(np.percentile(band, SETTINGS.band)),
+                "later": signed_root(np.percentile(later, SETTINGS.band)),
             }
         )  # fmt: skip
     return found
@@ -89,7 +89,7 @@ def simulated_gaps(one, cycles, believed, seed):
 def verdict_of(one, span, inference):
     """What one window's diagnosis says, plain."""
     cause, told = inference.causes[0], inference.verdict
-    bursts = [[b[0], b[0] + b[1], b[2]] for b in cause.setting.bursts]
+    bursts = [[b[0], b[0] + b[1], b[2]] for b in cause.model.windows]
     time = np.arange(*span, 0.5)
     found = np.any([(time >= a) & (time < b) for a, b, _ in bursts], axis=0)
     found, lost = np.broadcast_to(found, time.shape), one.lost(time)
@@ -148,7 +148,7 @@ def summary(cycles, told, measured, rng):
             for k in ("before", "after", "shrink", "plain_in_outage", "innovations_in_outage")
         },
         "shrink_all": shrunk(total["before"].mean(), total["after"].mean()),
-        "shrink_interval": np.percentile(drawn, BAND).tolist(),
+        "shrink_interval": np.percentile(drawn, SETTINGS.band).tolist(),
         "plain_in_outages": float(total["plain"][total["lost"]].sum() / total["plain"].sum()),
         "rows_in_outages": float(total["lost"].mean()),
     }
@@ -185,7 +185,9 @@ def median_with_interval(values, rng):
     """Median of values (n,) and its 95 % bootstrap interval."""
     values = np.asarray(values, dtype=float)
     rows = rng.integers(len(values), size=(RESAMPLED, len(values)))
-    return float(np.median(values)), *np.percentile(np.median(values[rows], axis=1), BAND).tolist()
+    return float(np.median(values)), *np.percentile(
+        np.median(values[rows], axis=1), SETTINGS.band
+    ).tolist()
 
 
 def shrunk(before, after):

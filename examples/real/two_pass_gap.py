@@ -21,16 +21,16 @@ from scipy.spatial.transform import Rotation, Slerp
 from two_pass_page import draw_slice, parameter_told, write
 
 from mlscorr.effects import in_order, make_effect
-from mlscorr.gap.background import BELIEVED, epochs
-from mlscorr.gap.causes import infer
-from mlscorr.gap.changes import Bench
-from mlscorr.gap.measure import BAND
-from mlscorr.gap.patches import find_patches
-from mlscorr.gap.rows import background, reference_of
-from mlscorr.gap.shared_planes import shared_rows
+from mlscorr.frames import georeference, to_scanner
+from mlscorr.gap.infer.causes import infer_causes
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.observe import background
+from mlscorr.gap.observe.patch_search import find_patches
+from mlscorr.gap.observe.rows import reference_of
+from mlscorr.gap.observe.shared_planes import shared_rows
 from mlscorr.gap.signatures import signatures
-from mlscorr.gap.whitening import whitener
-from mlscorr.georeference import georeference, to_scanner
+from mlscorr.gap.signatures.changes import Bench
 from mlscorr.survey import (
     CloudFile,
     ControlPoints,
@@ -44,7 +44,7 @@ from mlscorr.survey import (
 
 DATA = SHARED / "routescene_uav"
 FILES = "{}_points_time_derived.npz"  # of the name of a scene
-ROLL_SIGN = {"Car": 1.0, "Tent": -1.0}  # of the data; yaw + 180 deg and - pitch in both
+SCENES = ("Car", "Tent")  # of the data; yaw + 180 deg, - pitch and + roll in both
 AXES = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # right, forward, up in its
 BEAM = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])  # turns about forward
 STEP = 0.005  # s between epochs: the attitude is given with each point
@@ -69,10 +69,10 @@ class Scene:
 
 def main():
     arguments = parse()
-    files = [FILES.format(name) for name in ROLL_SIGN]
+    files = [FILES.format(name) for name in SCENES]
     needed(DATA, files, "Car.adc.laz and Tent.adc.laz of coin-or/Gravity, with a time per point")
     result, scenes = {}, {}
-    for name in ROLL_SIGN:
+    for name in SCENES:
         rng = np.random.default_rng(arguments.seed)
         scenes[name] = scene(name)
         result[name] = study(scenes[name], rng)
@@ -103,7 +103,7 @@ def scene(name):
         data[k][order] for k in ("time", "xyz", "sensor_xyz", "rpy", "pass_", "intensity")
     )
     roll, pitch, yaw = rpy.T
-    angles = np.column_stack([yaw + np.pi, -pitch, ROLL_SIGN[name] * roll])
+    angles = np.column_stack([yaw + np.pi, -pitch, roll])
     attitude = Rotation.from_euler("ZYX", angles) * Rotation.from_matrix(AXES)
     parts = [_epochs(time[p], place[p], attitude[p]) for p in (passes == 0, passes == 1)]
     trajectory = Trajectory(
@@ -147,7 +147,7 @@ def study(one, rng, folds=FOLDS, chance=CHANCE):
         "points": len(one.cloud), "planes": len(rows),
         "pose_check": float(np.percentile(one.away, 95) * 1e3),
         "before": before, "after": rms(residual), "shrink": shrink, "shrink_interval": interval,
-        "null_band": np.percentile(drawn, BAND).tolist(), "effects": effects,
+        "null_band": np.percentile(drawn, SETTINGS.band).tolist(), "effects": effects,
         "rows": {"position": rows.position.tolist(), "before": (1e3 * rows.residual).tolist(),
                  "after": (1e3 * residual).tolist(), "normal": rows.direction.tolist(),
                  "pass": rows.covariates["pass"].tolist()},
@@ -189,13 +189,13 @@ def shrunk(rows, after, folds):
 def diagnosed(rows, survey, rng, chance=CHANCE):
     """Inference on planes that both passes saw."""
     signs, _ = signatures(rows, survey)
-    return infer(rows, background(rows, survey), survey, signs, rng, chance)
+    return infer_causes(rows, background(rows, survey), survey, signs, rng, chance)
 
 
 def replicas(rows, survey, rng):
     """Simulated misfits (m, k) of the same planes if all sensors were as believed. Units: m."""
-    observed = epochs(rows, background(rows, survey))
-    looks = whitener(observed, BELIEVED).draw(rng, REPLICAS)  # both looks share the plane's height
+    observed = Observations.of(rows, background(rows, survey))
+    looks = observed.whitener().draw(rng, REPLICAS)  # both looks share the plane's height
     drawn = np.zeros((len(rows), REPLICAS))
     np.add.at(drawn, observed.row, looks)
     return drawn[np.isin(np.arange(len(rows)), observed.row)]

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 from page import counted, picture, words, write_page
 
-from mlscorr.report.look import AFTER, BEFORE, BLUE, GREY, ORANGE
+from mlscorr.report.style import AFTER, BEFORE, BLUE, GREY, ORANGE
 
 REAL = [
     (

@@ -1,0 +1,153 @@
+"""Write the tables of README.md anew by the commands that measure them.
+
+    python benchmarks/readme_tables.py [NAME ...] [--readme README.md] [--check FOLDER]
+
+A table stands between <!-- table: NAME --> and <!-- end of table -->. Without names all are
+measured (an hour or two); one whose data are not at hand stays as it is, with a word on stderr.
+"""
+
+import argparse
+import json
+import os
+import re
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+TABLE = r"(<!-- table: {} -->\n).*?(<!-- end of table -->)"
+SCENARIOS = {
+    "car": "the paper's car: 186 s in a simulated canyon, 21 control points",
+    "boat": "the paper's boat: 151 s along a river bank, multipath",
+    "calibration": "10 + 54 points in good GNSS, with a wrong mounting",
+    "canyon": "two opposite passes in an urban canyon",
+    "motorway": "a fast drive under open sky",
+}
+CORRECTED = {
+    "wuhan_drive": "a real drive with its real POS error (two GNSS outages of 60 s, up to 2.9 m) "
+    "over a simulated street, 16 control + 8 check points",
+    "practice_none": "a good survey with a quiet POS, made by another simulator",
+    "practice_lever_arm": "a survey with a wrong lever arm, made by another simulator: corrected",
+}
+
+
+def markdown(header, rows):
+    """A table of cells as lines of markdown."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "".join("| " + " | ".join(map(str, line)) + " |\n" for line in lines)
+
+
+def place(text, name, table):
+    """The text with a table put between its marks. Raises ValueError where it has no such mark."""
+    text, count = re.subn(
+        TABLE.format(re.escape(name)), lambda match: match[1] + table + match[2], text, flags=re.S
+    )
+    if count != 1:
+        raise ValueError(f"README has {count} tables named '{name}', where one belongs.")
+    return text
+
+
+def names_in(text):
+    """Names of the tables of a text, in their order."""
+    return re.findall(r"<!-- table: (\S+) -->", text)
+
+
+def axes(values, digits=2):
+    """East, north and height in m, or nothing."""
+    return "" if values is None else " / ".join(f"{value:.{digits}f}" for value in values)
+
+
+def scenarios(_):
+    """Each scenario simulated with seed 1 and corrected."""
+    from mlscorr import correct, read_survey
+    from mlscorr.pipeline import simulate_survey
+
+    rows = []
+    for name, what in SCENARIOS.items():
+        with tempfile.TemporaryDirectory() as folder:
+            scenario = ROOT / "examples" / "scenarios" / f"{name}.toml"
+            made = simulate_survey(scenario, Path(folder) / name, 1, False)
+            check = correct(read_survey(Path(folder) / name)).check
+        points = sum(file["points"] for file in made["files"]) / 1e6
+        before, after = (f"{axes(check[state]['rmse'])} m" for state in ("before", "after"))
+        rows.append([f"`{name}.toml`", what, f"{points:.1f} M", before, after])
+    return markdown(["scenario", "what it is", "points", "check points before", "after"], rows)
+
+
+def results(_):
+    """Surveys that lie beside the project, corrected, compared and calibrated; simulated drives."""
+    from seeds import drive
+
+    from mlscorr import calibrate, compare, correct, read_survey
+
+    surveys = Path(os.environ["MLSCORR_SHARED"]) / "surveys"
+    rows = []
+    for name, what in CORRECTED.items():
+        check = correct(read_survey(surveys / name)).check
+        digits = 2 if max(check["before"]["rmse"]) > 0.1 else 3
+        before, after = (axes(check[state]["rmse"], digits) for state in ("before", "after"))
+        rows.append([what, before, after, f"`mlscorr correct {name} -o OUT`"])
+    compared = compare(read_survey(surveys / "wuhan_drive")).document
+    after = {row["name"]: row["check"]["rmse"] for row in compared["methods"]}
+    command = "`mlscorr compare wuhan_drive -o OUT`"
+    best = "the same by the best move of the whole cloud as one (affine)"
+    rows.insert(1, [best, "", axes(after["affine"]), command])
+    rows.insert(2, ["the same by polynomials of order 4", "", axes(after["ls-4"]), ""])
+    with tempfile.TemporaryDirectory() as folder:
+        calibrated = calibrate(read_survey(surveys / "practice_lever_arm"))
+        check = calibrated.write(Path(folder) / "calibrated")["lsc"]["check"]
+    command = "`mlscorr calibrate practice_lever_arm -o OUT`"
+    rows.append(["the same: calibrated", "", axes(check["after"]["rmse"], 3), command])
+    drives = np.array([drive(seed)[:6] for seed in range(20)])
+    for title, function, command in (
+        ("20 simulated drives, outage of 25 s, median", np.median, "`python benchmarks/seeds.py`"),
+        ("the same, worst drive of each axis", np.max, ""),
+    ):
+        numbers = function(drives, axis=0)
+        rows.append([title, axes(numbers[:3]), axes(numbers[3:], 3), command])
+    return markdown(["survey", "before", "after", "command"], rows)
+
+
+def blind(check):
+    """Rates of the blind check that `mlscorr blind score` has written."""
+    if check is None:
+        raise FileNotFoundError("--check names no folder of mlscorr blind")
+    score = json.loads((Path(check) / "score.json").read_text())
+    rows = []
+    for row in score["rows"]:
+        value, (low, high), (least, largest) = row["value"], row["interval"], row["goal"]
+        is_share = high <= 1 and "error of the stated" not in row["name"]
+        form = (lambda v: f"{100 * v:.0f}") if is_share else (lambda v: f"{v:.2f}")
+        unit = " %" if is_share else ""
+        goals = [f"{sign} {form(v)}{unit}" for sign, v in ((">=", least), ("<=", largest)) if v]
+        reached = f"{form(value)}{unit} [{form(low)}, {form(high)}]"
+        rows.append([row["name"], row["cases"], reached, " and ".join(goals)])
+    return markdown(["", "cases", "reached, with 95 % interval", "goal"], rows)
+
+
+TABLES = {"blind": blind, "scenarios": scenarios, "results": results}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", choices=[[], *TABLES])
+    parser.add_argument("--readme", type=Path, default=ROOT / "README.md")
+    parser.add_argument("--check", type=Path, help="folder of mlscorr blind")
+    arguments = parser.parse_args()
+    for name in arguments.names or names_in(arguments.readme.read_text()):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                table = TABLES[name](arguments.check)
+        except (FileNotFoundError, KeyError) as error:
+            print(f"{name} stays as it is: {error} is not at hand.", file=sys.stderr)
+            continue
+        arguments.readme.write_text(place(arguments.readme.read_text(), name, table))
+        print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""What ties between passes add through files: clouds there and back, targets and ties found.
+
+python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--outage 8 32]
+
+RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
+far apart the trajectories of both passes are left in a place. Without control only the latter is
+claimed. Drives are the simulator's canyon by a MEMS unit without GNSS for a while in each pass:
+drift of decimetres to metres.
+"""
+
+import argparse
+import tempfile
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from feature_surveys import FOLDER
+
+import mlscorr
+from mlscorr.simulate import read_scenario, simulate
+from mlscorr.simulate.recording import join_passes
+
+POINTS_PER_LINE = 400  # of 700, and 50 s of 90: a survey takes a minute
+DURATION = 50.0  # s of each pass
+NEAREST = 5.0  # m between two passes that are compared in a place
+
+
+def scenario(outage, processing):
+    """The canyon as a MEMS unit records it, without GNSS from outage[0] for outage[1] s."""
+    canyon = read_scenario(FOLDER / "canyon.toml")
+    pos = {"grade": "mems", "processing": processing, "sky_view": False, "outages": (outage,)}
+    scanner = canyon.scanner[0].model_copy(update={"points_per_line": POINTS_PER_LINE})
+    return canyon.model_copy(
+        update={
+            "pos": canyon.pos.model_copy(update=pos),
+            "drive": canyon.drive.model_copy(update={"duration": DURATION, "stops": ()}),
+            "scanner": (scanner,),
+            "targets": canyon.targets.model_copy(update={"control": 16, "check": 4}),
+        }
+    )
+
+
+def with_control(survey, number):
+    """The survey with control points evenly taken along the street; the others are forgotten."""
+    centred = survey.control.position - survey.control.position.mean(axis=0)
+    along = np.linalg.svd(centred)[2][0]  # their longest direction
+    order = np.argsort(centred @ along)
+    kept = np.unique(np.linspace(0, len(order) - 1, number).round().astype(int))
+    return replace(survey, control=survey.control[np.sort(order[kept])])
+
+
+def measure(survey, true, ties):
+    """RMS (m) of what is left, the share within 2 sigma, RMS (m) of a pass from the other."""
+    with warnings.catch_warnings(action="ignore"):
+        result = mlscorr.correct(survey, ties=ties)
+    corrected = result.trajectory
+    left = true.at(corrected.gps_time).position - corrected.position
+    within = np.mean(np.abs(left) < 2 * corrected.position_sigma)
+    return _rms(left), float(within), _apart(true, corrected.gps_time, left)
+
+
+def _apart(true, gps_time, left):
+    """RMS (m) of the difference between what is left in two passes of one place."""
+    (first, last), (begin, end) = true.passes[:2]
+    place = true.at(gps_time).position
+    there, back = (
+        np.flatnonzero((gps_time >= a) & (gps_time <= b))[::20]
+        for a, b in ((first, last), (begin, end))
+    )
+    away = np.linalg.norm(place[there][:, None] - place[back], axis=2)
+    near = away.min(axis=1) < NEAREST
+    return _rms((left[there] - left[back][away.argmin(axis=1)])[near])
+
+
+def _rms(left):
+    return float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--control", type=int, nargs="+", default=[0, 3, 6, 12])
+    parser.add_argument("--outage", type=float, nargs=2, default=(8.0, 32.0), help="start, length")
+    parser.add_argument("--processing", default="filtered", choices=("filtered", "smoothed"))
+    arguments = parser.parse_args()
+    drive = scenario(tuple(arguments.outage), arguments.processing)
+    print("control  seed     raw   alone  within    ties  within   apart   ratio")
+    ratios = {number: [] for number in arguments.control}
+    for seed in range(arguments.first, arguments.first + arguments.seeds):
+        with tempfile.TemporaryDirectory() as folder:
+            simulated = simulate(drive, np.random.default_rng(seed))
+            simulated.write(Path(folder) / "survey")
+            true = join_passes(simulated.true_passes)
+            recorded = mlscorr.read_survey(Path(folder) / "survey")
+            times = recorded.trajectory.gps_time
+            raw = _rms(true.at(times).position - recorded.trajectory.position)
+            for number in arguments.control:
+                survey = with_control(recorded, number) if number else recorded
+                alone = measure(survey, true, "off") if number else (np.nan, np.nan)
+                tied = measure(survey, true, "auto" if number else "only")
+                ratios[number].append(tied[0] / alone[0])
+                print(
+                    f"{number:7d}{seed:6d}{raw:8.3f}{alone[0]:8.3f}{alone[1]:8.0%}"
+                    f"{tied[0]:8.3f}{tied[1]:8.0%}{tied[2]:8.4f}{ratios[number][-1]:8.2f}",
+                    flush=True,
+                )
+    for number, values in ratios.items():
+        if number:
+            print(f"{number:7d} median {np.median(values):.2f}, largest {max(values):.2f}")
+
+
+if __name__ == "__main__":
+    main()
