@@ -13,6 +13,12 @@ from mlscorr.simulate import Scenario, simulate
 MLSCORR = Path(sys.executable).with_name("mlscorr")
 
 
+def pytest_configure(config):
+    "Files run in their order: with those of many tests first, a slow example would end alone"
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
 @pytest.fixture(scope="session")
 def street(tmp_path_factory):
     "Folder of a simulated survey of 8 s: 4 control points and 1 check point; copy it to change it"
@@ -44,5 +50,5 @@ def in_part(street, tmp_path_factory):
     kept = [header, *epochs[51:296], *epochs[360:]]
     (folder / "trajectory.csv").write_text("\n".join(kept) + "\n")
     out = folder.parent / "out"
-    command = [MLSCORR, "correct", folder, "-o", out]
+    command = [MLSCORR, "correct", folder, "-o", out, "--no-report"]
     return subprocess.run(command, capture_output=True, text=True), out

@@ -3,17 +3,16 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+from tests.beds.places import EXAMPLES
 
 
-def test_correct_a_survey_makes_its_picture(tmp_path):
-    "The first example corrects a simulated survey, prints its RMSE and draws a picture"
+def test_correct_a_survey_makes_its_picture(street, tmp_path):
+    "The first example corrects a survey that it is given, prints its RMSE and draws a picture"
     picture = tmp_path / "picture.png"
-    script = [sys.executable, EXAMPLES / "correct_a_survey.py", "--picture", picture]
+    script = [sys.executable, EXAMPLES / "correct_a_survey.py", street, "--picture", picture]
     printed = subprocess.check_output(script, text=True)
-    assert "check: n = 8" in printed
+    assert "control: n = 4" in printed and "check: n = 1" in printed
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

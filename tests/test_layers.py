@@ -11,24 +11,43 @@ import mlscorr
 
 PACKAGE = Path(mlscorr.__file__).parent
 FLOORS = (  # from the ground up; rooms on one floor do not know each other
-    ("survey", "covariance", "accuracy"),
-    ("georeference", "collocation"),
-    ("effects", "matching", "io", "uncertainty"),
-    ("targets", "correction", "calibration", "baselines"),
-    ("simulate", "evaluation", "quality"),
-    ("gap", "report"),
-    ("pipeline", "doctor"),
+    ("survey",),
+    ("frames",),
+    ("correction", "collocation", "pos"),
+    ("effects", "io", "matching"),
+    ("simulate", "baselines", "targets", "ties", "estimate"),
+    ("gap", "evaluate"),
+    ("blind", "report"),
+    ("pipeline",),
     ("cli",),
 )
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+GAP_FLOORS = (  # of the rooms within gap, likewise
+    ("observe",),
+    ("signatures",),
+    ("infer",),
+    ("close", "plan"),
+    ("document",),  # and the door, __init__, which opens on all of them
+)
+GAP_FLOOR = {room: number for number, rooms in enumerate(GAP_FLOORS) for room in rooms}
 ROOMS_OF = {
     "laspy": {"io"},
     "open3d": {"baselines", "simulate", "report"},
-    "sklearn": {"targets"},
+    "sklearn": {"baselines", "gap"},
 }
+SIMULATOR = (  # floors inside simulate; its rooms on one floor do not know each other
+    ("settings", "vehicle", "scenario", "columns"),
+    ("scene",),
+    ("drive", "pos", "scan"),
+    ("recording", "scenario_file", "simulator_file"),
+    ("survey",),
+    ("write", "displacement", "random_survey"),
+)
+SIMULATOR_FLOOR = {room: number for number, rooms in enumerate(SIMULATOR) for room in rooms}
 MODULES = sorted(
     path for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.stem[0] != "_"
 )
+GAP_MODULES = sorted((PACKAGE / "gap").rglob("*.py"))
 
 
 def room_of(path):
@@ -57,9 +76,63 @@ def test_imports_point_downward(path):
         assert FLOOR[parts[1]] < FLOOR[room], f"{room} imports {name}"
 
 
+@pytest.mark.parametrize("path", GAP_MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_within_the_gap_point_downward(path):
+    "Observe, signatures, infer, close and plan, document: each knows what comes before it alone"
+    room = path.relative_to(PACKAGE / "gap").parts[0].removesuffix(".py")
+    for name in imports_of(path):
+        parts = name.split(".")
+        if parts[:2] == ["mlscorr", "gap"] and len(parts) > 2 and parts[2] in GAP_FLOOR:
+            below = GAP_FLOOR[parts[2]] < GAP_FLOOR.get(room, len(GAP_FLOORS))
+            assert below or parts[2] == room, f"{room} imports {name}"
+
+
+def test_the_gap_is_a_story_of_few_rooms():
+    "At most eight rooms on five floors"
+    assert len(GAP_FLOOR) + 1 <= 8
+    assert len(GAP_FLOORS) <= 5
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "pipeline").glob("*.py")), ids=lambda p: p.stem)
+def test_the_pipeline_enters_the_gap_by_its_doors(path):
+    "Commands import from mlscorr.gap and from its rooms, not from modules within these"
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("mlscorr.gap"):
+            assert len(node.module.split(".")) <= 3, node.module
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted((PACKAGE / "simulate").rglob("*/*.py")),
+    ids=lambda path: str(path.relative_to(PACKAGE)),
+)
+def test_rooms_of_the_simulator_know_those_below(path):
+    "A scene knows no drive, and scanners no POS; other rooms enter by the door of each"
+    room = path.parent.name
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.ImportFrom) or not node.module.startswith("mlscorr.simulate."):
+            continue
+        other, *inner = node.module.split(".")[2:]
+        if other != room:
+            assert SIMULATOR_FLOOR[other] < SIMULATOR_FLOOR[room], node.module
+            assert not inner, f"{node.module} is behind the door of {other}"
+
+
+@pytest.mark.parametrize(
+    "path", sorted((PACKAGE / "simulate").glob("[a-z]*.py")), ids=lambda path: path.stem
+)
+def test_modules_of_the_simulator_know_those_below(path):
+    "Scenario and settings know nothing of what is made of them; only write opens a module later"
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("mlscorr.simulate."):
+            other, *inner = node.module.split(".")[2:]
+            assert SIMULATOR_FLOOR[other] < SIMULATOR_FLOOR[path.stem], node.module
+            assert not inner, f"{node.module} is behind the door of {other}"
+
+
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_heavy_libraries_stay_in_their_rooms(path):
-    "laspy is known to io alone, open3d to baselines, simulate and report, sklearn to targets"
+    "laspy is known to io alone, open3d and sklearn to the rooms that ROOMS_OF names"
     for name in imports_of(path):
         library = name.split(".")[0]
         assert library not in ROOMS_OF or room_of(path) in ROOMS_OF[library], name
@@ -80,7 +153,7 @@ def test_the_package_loads_nothing_until_it_is_used():
 def test_the_simulator_does_not_know_the_estimator():
     "The simulator cannot draw its drift from the estimator's model: it never loads it"
     loaded = loaded_by("import mlscorr.simulate")
-    assert loaded.isdisjoint({"mlscorr.covariance", "mlscorr.collocation", "mlscorr.correction"})
+    assert loaded.isdisjoint({"mlscorr.pos", "mlscorr.collocation", "mlscorr.estimate"})
 
 
 def test_open3d_is_loaded_only_to_cast_rays():

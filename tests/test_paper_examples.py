@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-PAPER = Path(__file__).parents[1] / "examples" / "paper"
+from tests.beds.places import EXAMPLES
+
+PAPER = EXAMPLES / "paper"
 
 
 @pytest.fixture(scope="module")

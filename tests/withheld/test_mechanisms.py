@@ -7,10 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mlscorr
-from mlscorr.gap.mix import SYSTEMATIC
-from mlscorr.pipeline.blind_cases import load_mechanisms
-from mlscorr.simulate.moved import Seen
-from mlscorr.survey import Mounting, Trajectory, attitude_from_angles
+from mlscorr.blind.cases import load_mechanisms
+from mlscorr.blind.mix import SYSTEMATIC
+from mlscorr.frames import attitude_from_angles
+from mlscorr.simulate.displacement import RecordedPoints
+from mlscorr.survey import Mounting, Trajectory
 
 FILE = Path(__file__).with_name("mechanisms.py")
 MECHANISMS, LEADS, UNITS = (
@@ -36,7 +37,9 @@ def seen(heading, along, duration=20.0, n=400):
     level = np.column_stack([away * np.cos(angle), away * np.sin(angle), 0.0 * away])
     pose = trajectory.at(time)
     body = MOUNTING.boresight.apply(level) + MOUNTING.lever_arm
-    return Seen(time, pose.position + pose.attitude.apply(body), level, trajectory, MOUNTING)
+    return RecordedPoints(
+        time, pose.position + pose.attitude.apply(body), level, trajectory, MOUNTING
+    )
 
 
 def straight(duration=20.0, heading=0.0):

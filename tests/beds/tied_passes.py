@@ -1,0 +1,97 @@
+"""A street driven there and back whose recorded path drifts, control points, and ties."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.frames import attitude_from_angles
+from mlscorr.survey import ControlPoints, Matched, TargetObservations, Ties, Trajectory
+
+ORIGIN = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM
+START, LENGTH, PAUSE = 413_200.0, 60.0, 100.0  # s
+SPEED = 6.0  # m/s
+NOISE = 0.004  # m, of targets and of ties
+
+
+@dataclass(frozen=True)
+class TiedPasses:
+    "Recorded Trajectory, true - recorded position (n, 3), Matched control, and Ties"
+
+    trajectory: Trajectory
+    error: np.ndarray
+    matched: Matched
+    ties: Ties
+
+    def left(self, correction):
+        "True - corrected position (n, 3). Units: m"
+        return self.error - (correction.corrected.position - self.trajectory.position)
+
+
+def drift(time, seed):
+    "True - recorded position (n, 3) of half a metre, by sines that no covariance family knows. m"
+    rng = np.random.default_rng([seed, 7])
+    period, phase = rng.uniform(80.0, 200.0, (3, 3)), rng.uniform(0, 2 * np.pi, (3, 3))
+    size = 0.3 * np.array([1.0, 1.0, 0.5])
+    turns = 2 * np.pi * time[:, None, None] / period + phase
+    return size * np.sin(turns).sum(axis=2)
+
+
+def tied_passes(seed, control=(3.0, 16.0, 30.0, 44.0, 57.0), number=300, wrong=0.0, apart=0.5):
+    """TiedPasses: control points at times of the first pass, ties of facades, road and cross
+    walls, a share of which is wrong by up to a distance apart.
+    """
+    rng = np.random.default_rng(seed)
+    elapsed = np.arange(0.0, LENGTH, 0.1)
+    time = np.concatenate([elapsed, elapsed + LENGTH + PAUSE])
+    along = SPEED * np.concatenate([elapsed, LENGTH - elapsed])
+    heading = np.repeat([np.pi / 2, -np.pi / 2], len(elapsed))
+    across = np.repeat([-1.0, 1.0], len(elapsed))
+    true = np.column_stack([along, across, np.full(len(along), 2.0)])
+    error = drift(time, seed)
+    sigma = np.full((len(time), 3), 0.5)
+    trajectory = Trajectory(
+        START + time, ORIGIN + true - error, attitude_from_angles(0.0, 0.0, heading), sigma
+    )
+    times = np.array(control)
+    matched = _matched(times, trajectory, seed, rng)
+    return TiedPasses(trajectory, error, matched, _ties(number, wrong, apart, seed, rng))
+
+
+def _matched(times, trajectory, seed, rng):
+    n = len(times)
+    place = ORIGIN + np.column_stack([SPEED * times, np.full(n, 8.0), np.full(n, 3.0)])
+    seen = place - drift(times, seed) + NOISE * rng.standard_normal((n, 3))
+    names, kinds, size = tuple(f"T{i}" for i in range(n)), ("circle",) * n, np.full(n, 0.6)
+    normal, one = np.tile([0.0, -1.0, 0.0], (n, 1)), np.ones(n, int)
+    points = ControlPoints(names, place, np.full((n, 3), 0.003), kinds, size, normal)
+    covariance = np.tile(NOISE**2 * np.eye(3), (n, 1, 1))
+    observed = TargetObservations(
+        names, one, START + times, seen, covariance, normal, kinds, size, 300 * one
+    )
+    return Matched(observed, points)
+
+
+def _ties(number, wrong, apart, seed, rng):
+    first = rng.uniform(1.0, LENGTH - 1.0, number)
+    second = 2 * LENGTH + PAUSE - first  # when the same place is passed on the way back
+    normal = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])[
+        rng.integers(3, size=number)
+    ]
+    place = np.column_stack([SPEED * first, rng.uniform(-9, 9, number), rng.uniform(0, 5, number)])
+    views = np.stack([place - drift(t, seed) for t in (first, second)], axis=1)
+    noise = NOISE * rng.standard_normal(number)
+    is_wrong = rng.random(number) < wrong
+    noise[is_wrong] += rng.choice([-1.0, 1.0], is_wrong.sum()) * rng.uniform(
+        apart / 5, apart, is_wrong.sum()
+    )
+    views[:, 1] += noise[:, None] * normal
+    return Ties(
+        gps_time=START + np.column_stack([first, second]),
+        place=ORIGIN + views,
+        direction=normal,
+        misclosure=np.einsum("ni,ni->n", normal, views[:, 1] - views[:, 0]),
+        variance=np.full(number, NOISE**2),
+        kind=np.full(number, "plane"),
+        pass_number=np.tile([1, 2], (number, 1)),
+        feature=np.arange(2 * number).reshape(number, 2),
+    )

@@ -1,0 +1,135 @@
+"""A calibration site driven there and back with a wrong mounting: targets, and planes as ties."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.frames import attitude_from_angles, georeference, to_scanner
+from mlscorr.survey import (
+    ControlPoints,
+    Matched,
+    Mounting,
+    TargetObservations,
+    Ties,
+    Trajectory,
+)
+
+START = 413_200.0  # s of week
+ORIGIN = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM
+LENGTH, BACK = 40.0, 100.0  # s of a pass, and when the way back begins
+SPEED = 5.0  # m/s
+NOISE, SURVEYED = 0.003, 0.003  # m, one sigma
+TIE_NOISE = 0.002  # m; a hundred such planes stand for the six hundred of 5 mm that a site gives
+POSITION, ATTITUDE = 0.005, np.radians([0.001, 0.001, 0.002])  # what the POS states
+LACKS = np.append([0.03, -0.02, 0.0], np.radians([0.3, -0.3, 0.4]))  # m, rad: half a degree
+RECORDED = Mounting(
+    np.array([0.1, -0.6, 0.4]), Rotation.from_euler("xyz", [90, 0, 35], degrees=True)
+)
+
+
+@dataclass(frozen=True)
+class TiedSite:
+    "Recorded Trajectory, Matched control, Ties, what the mounting lacks (6,), wrong ties (n,)"
+
+    trajectory: Trajectory
+    matched: Matched
+    ties: Ties
+    lacks: np.ndarray
+    wrong: np.ndarray
+
+
+def tied_site(seed, targets=6, number=100, wrong=0.0):
+    """TiedSite: control points passed twice, planes at all azimuths and slopes seen from
+    both directions, a share of which is wrong by decimetres. The position drifts by millimetres.
+    """
+    rng = np.random.default_rng(seed)
+    true = _drive()
+    phase = rng.uniform(0, 2 * np.pi, 3)
+    turns = 2 * np.pi * (true.gps_time - START)[:, None] / [60.0, 85.0, 110.0] + phase
+    recorded = Trajectory(
+        true.gps_time,
+        true.position + POSITION * np.sin(turns),
+        true.attitude,
+        np.full((len(true), 3), POSITION),
+        np.tile(ATTITUDE, (len(true), 1)),
+    )
+    turn = Rotation.from_rotvec(LACKS[3:])
+    mounting = Mounting(RECORDED.lever_arm + LACKS[:3], turn * RECORDED.boresight)
+
+    def look(when, place, noise):
+        seen = to_scanner(true, mounting, place, when) + noise
+        return georeference(recorded, RECORDED, seen, when)
+
+    matched = _matched(true, targets, look, rng)
+    is_wrong = rng.random(number) < wrong
+    ties = _ties(true, is_wrong, look, rng)
+    return TiedSite(recorded, matched, ties, LACKS, is_wrong)
+
+
+def _drive():
+    "Along a gentle bend, and after a pause the same way back"
+    time = np.arange(0.0, LENGTH + 0.05, 0.1)
+    heading = 0.7 + 0.1 * np.sin(time / 9.0)
+    way = np.cumsum(
+        0.1 * SPEED * np.column_stack([np.sin(heading), np.cos(heading), 0 * time]), axis=0
+    )
+    return Trajectory(
+        START + np.append(time, time + BACK),
+        ORIGIN + np.vstack([way, way[::-1]]),
+        attitude_from_angles(0.0, 0.0, np.append(heading, heading[::-1] + np.pi)),
+    )
+
+
+def _places(true, first, rng):
+    "Places (n, 3) to both sides of the way, ahead or behind at times (n,), and when seen again"
+    n = len(first)
+    side = rng.choice([-1.0, 1.0], n) * rng.uniform(4.0, 25.0, n)
+    body = np.column_stack([side, rng.uniform(-10, 10, n), rng.uniform(-2, 8, n)])
+    pose = true.at(START + first)
+    return pose.position + pose.attitude.apply(body), BACK + LENGTH - first + rng.uniform(
+        -4.0, 4.0, n
+    )
+
+
+def _matched(true, targets, look, rng):
+    first = np.linspace(4.0, LENGTH - 4.0, targets)
+    place, second = _places(true, first, rng)
+    n, times = 2 * targets, START + np.append(first, second)
+    seen = look(times, np.vstack([place, place]), NOISE * rng.standard_normal((n, 3)))
+    names, normal = tuple(f"T{i}" for i in range(targets)), np.tile([0.0, 0.0, 1.0], (n, 1))
+    surveyed = place + SURVEYED * rng.standard_normal(place.shape)
+    kind, size = ("circle",) * n, np.full(n, 0.6)
+    sigma = np.full((targets, 3), SURVEYED)
+    control = ControlPoints(
+        names, surveyed, sigma, kind[:targets], size[:targets], normal[:targets]
+    )
+    observed = TargetObservations(
+        names * 2, np.repeat([1, 2], targets), times, seen,
+        np.tile(NOISE**2 * np.eye(3), (n, 1, 1)), normal, kind, size, np.full(n, 300),
+    )  # fmt: skip
+    return Matched.by_name(observed, control)
+
+
+def _ties(true, is_wrong, look, rng):
+    number = len(is_wrong)
+    first = rng.uniform(4.0, LENGTH - 4.0, number)
+    place, second = _places(true, first, rng)
+    azimuth = rng.uniform(0, 2 * np.pi, number)
+    normal = np.column_stack([np.sin(azimuth), np.cos(azimuth), 0 * azimuth])
+    normal[::4] = [0.0, 0.0, 1.0]  # road and pavement
+    noise = TIE_NOISE / np.sqrt(2) * rng.standard_normal((2, number, 1)) * normal
+    place_then = place + (is_wrong * rng.uniform(0.1, 0.5, number))[:, None] * normal
+    none = np.zeros((number, 3))
+    views = look(START + first, place, none), look(START + second, place_then, none)
+    place = np.stack(views + noise, axis=1)
+    return Ties(
+        gps_time=START + np.column_stack([first, second]),
+        place=place,
+        direction=normal,
+        misclosure=np.einsum("ni,ni->n", normal, place[:, 1] - place[:, 0]),
+        variance=np.full(number, TIE_NOISE**2),
+        kind=np.full(number, "plane"),
+        pass_number=np.tile([1, 2], (number, 1)),
+        feature=np.arange(2 * number).reshape(number, 2),
+    )

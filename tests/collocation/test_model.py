@@ -1,0 +1,234 @@
+"""Noise that passes share, and the least squares that all solvers share."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import lstsq
+
+from mlscorr.collocation import Noise, Signal, collocate, collocate_dense
+from mlscorr.collocation.covariance import Covariance
+from mlscorr.collocation.model import signal_clocks, solve_trend
+
+START = 413_200.0  # s of week
+
+
+def noise_of(seed, n=8, r=3, groups=4):
+    "Noise of n epochs of which some see one target"
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, r, r))
+    own = 1e-4 * (root @ root.swapaxes(1, 2) + np.eye(r))
+    return Noise(own, rng.integers(0, groups, n), rng.uniform(0.0, 0.02, (groups, r)))
+
+
+def written_out(noise):
+    "The covariance element by element: own on the diagonal, the survey wherever a target is one"
+    n, r = noise.own.shape[:2]
+    total = np.zeros((n, r, n, r))
+    for i in range(n):
+        total[i, :, i] += noise.own[i]
+        for j in range(n):
+            if noise.group[i] == noise.group[j]:
+                total[i, :, j] += np.diag(noise.shared[noise.group[i]] ** 2)
+    return total.reshape(n * r, n * r)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 9), groups=st.integers(1, 9))
+def test_passes_share_the_survey_error(seed, n, groups):
+    "All of the noise is the formula written out, whichever targets are seen once or more"
+    noise = noise_of(seed, n, groups=groups)
+    np.testing.assert_allclose(noise.matrix, written_out(noise), atol=1e-18)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000), size=st.integers(0, 12))
+def test_a_block_is_one_of_the_matrix(seed, size):
+    "Any rows in any order, with their own and shared part"
+    noise = noise_of(seed)
+    rows = np.random.default_rng(seed).permutation(24)[:size]
+    np.testing.assert_allclose(noise.block(rows), noise.matrix[np.ix_(rows, rows)], atol=1e-18)
+
+
+def test_separate_and_common_parts_are_all_of_it():
+    "What epochs have alone, and U U^T of what they share, sum to the whole"
+    noise = noise_of(3)
+    separate = np.zeros((8, 3, 8, 3))
+    separate[np.arange(8), :, np.arange(8)] = noise.separate
+    total = separate.reshape(24, 24) + noise.common @ noise.common.T
+    np.testing.assert_allclose(total, written_out(noise), atol=1e-18)
+
+
+def test_a_target_seen_once_costs_no_column():
+    "Three columns for each target of several passes, none for one that is known perfectly"
+    own, group = np.tile(np.eye(3), (5, 1, 1)), np.array([0, 1, 1, 2, 2])
+    shared = np.array([[0.01] * 3, [0.02] * 3, [0.0] * 3])
+    noise = Noise(own, group, shared)
+    assert noise.common.shape == (15, 3)
+    np.testing.assert_allclose(noise.separate[0], np.eye(3) * (1.0 + 0.01**2))
+    np.testing.assert_allclose(noise.separate[1:], own[1:])
+    assert Noise(own).common.shape == (15, 0)
+
+
+def test_noise_of_some_epochs_is_that_part_of_all():
+    "Chosen by number or by mask, a target that is left with one pass shares nothing more"
+    noise, kept = noise_of(5), np.array([True, False] * 4)
+    rows = np.flatnonzero(np.repeat(kept, 3))
+    for choice in (kept, np.flatnonzero(kept)):
+        part = noise.select(choice)
+        np.testing.assert_allclose(part.matrix, noise.matrix[np.ix_(rows, rows)], atol=1e-18)
+    alone = Noise(noise.own).select(kept)
+    np.testing.assert_array_equal(alone.own, noise.own[kept])
+
+
+def test_clocks_are_gps_time_where_a_signal_has_none():
+    "One column for each signal; none without signals"
+    gps_time = START + np.arange(4.0)
+    mixing, covariance = np.ones((4, 1, 1)), Covariance("exponential", 5.0)
+    signals = [Signal(mixing, covariance), Signal(mixing, covariance, np.arange(4.0) ** 2)]
+    clocks = signal_clocks(signals, gps_time)
+    np.testing.assert_array_equal(clocks, np.column_stack([gps_time, [0.0, 1.0, 4.0, 9.0]]))
+    assert signal_clocks([], gps_time).shape == (4, 0)
+
+
+def solved_without_signals(order, n=9, sigma=0.01):
+    "A polynomial through misclosures of equal weight, and numpy's"
+    time = np.linspace(-1.0, 1.0, n)
+    misclosure = np.random.default_rng(order).normal(0.0, sigma, (n, 1))
+    design = np.polynomial.legendre.legvander(time, order)
+    noise = Noise(np.full((n, 1, 1), sigma**2))
+    solved = collocate(START + time, misclosure, noise, design[:, None], [])
+    return solved, misclosure[:, 0], design
+
+
+@pytest.mark.parametrize("order", range(5))
+def test_without_signals_it_is_least_squares(order):
+    "x, its covariance and sigma0 are those of ordinary least squares with weights 1 / sigma^2"
+    solved, misclosure, design = solved_without_signals(order)
+    expected, squares, *_ = lstsq(design, misclosure)
+    np.testing.assert_allclose(solved.trend, expected, atol=1e-12)
+    cofactor = 0.01**2 * np.linalg.inv(design.T @ design)
+    np.testing.assert_allclose(solved.trend_covariance, cofactor, rtol=1e-9, atol=1e-15)
+    assert solved.sigma0 == pytest.approx(np.sqrt(squares / 0.01**2 / (9 - order - 1)))
+
+
+def test_weighted_residuals_are_free_of_the_trend():
+    "A^T V^-1 (l - A x) = 0: the normal equations"
+    solved, _, design = solved_without_signals(3)
+    np.testing.assert_allclose(design.T @ solved.weights, 0.0, atol=1e-9)
+
+
+def test_a_trend_in_the_data_changes_neither_likelihood_nor_residuals():
+    "Adding any polynomial of the trend's order to the misclosures moves x alone"
+    case = Passes(4)
+    before = case.solve()
+    moved = np.array([0.7, -1.1])
+    case.misclosure = case.misclosure + case.design @ moved
+    after = case.solve()
+    np.testing.assert_allclose(after.trend - before.trend, moved, atol=1e-10)
+    assert after.log_likelihood == pytest.approx(before.log_likelihood, abs=1e-8)
+    np.testing.assert_allclose(after.weights, before.weights, atol=1e-7)
+
+
+def test_sigma0_follows_the_scale_of_the_misclosures():
+    "Twice the misclosures are twice sigma0; of as many misclosures as parameters there is none"
+    case = Passes(5)
+    once = case.solve().sigma0
+    case.misclosure = 2.0 * case.misclosure
+    assert case.solve().sigma0 == pytest.approx(2.0 * once)
+    time = START + np.arange(2.0)
+    design = np.stack([np.ones((2, 1)), np.arange(2.0)[:, None]], axis=2)
+    exact = collocate(time, np.ones((2, 1)), Noise(np.ones((2, 1, 1))), design, [])
+    assert np.isnan(exact.sigma0)
+
+
+class Passes:
+    "Three axes of a drive with a signal, targets of several passes, a trend of two columns"
+
+    def __init__(self, seed, n=10):
+        rng = np.random.default_rng(seed)
+        self.gps_time = START + np.sort(rng.uniform(0.0, 100.0, n))
+        self.misclosure = rng.normal(0.0, 0.1, (n, 3))
+        self.noise = noise_of(seed, n)
+        self.design = rng.normal(size=(n, 3, 2))
+        self.signal = Signal(0.05 * rng.normal(size=(n, 3, 3)), Covariance("matern32", 20.0))
+
+    def solve(self, by=collocate):
+        return by(self.gps_time, self.misclosure, self.noise, self.design, [self.signal])
+
+
+@pytest.mark.parametrize("rows", [[0], [3, 4, 5], [0, 29], [6, 7, 8, 21, 22, 23]])
+@pytest.mark.parametrize("by", [collocate, collocate_dense])
+def test_what_is_left_out_is_judged_by_the_others(by, rows):
+    "Residuals and covariance are those of universal kriging from all other rows"
+    case = Passes(6)
+    mixing, design = case.signal.mixing.reshape(30, 3), case.design.reshape(30, 2)
+    time = np.repeat(case.gps_time, 3)
+    total = (mixing @ mixing.T) * case.signal.covariance(time[:, None] - time)
+    total += written_out(case.noise)
+    others = np.setdiff1d(np.arange(30), rows)
+    a = design[others]
+    system = np.block([[total[np.ix_(others, others)], a], [a.T, np.zeros((2, 2))]])
+    wanted = np.vstack([total[np.ix_(others, rows)], design[rows].T])
+    weights, flat = np.linalg.solve(system, wanted), case.misclosure.ravel()
+    residual, covariance = case.solve(by).leave_out(np.array(rows))
+    np.testing.assert_allclose(residual, flat[rows] - weights[:-2].T @ flat[others], atol=1e-9)
+    expected = total[np.ix_(rows, rows)] - weights.T @ wanted
+    np.testing.assert_allclose(covariance, expected, atol=1e-10)
+
+
+def test_rows_that_alone_carry_a_column_determine_it():
+    "A parameter of one row is not determined without it, but every other row may go"
+    design = np.zeros((6, 1, 2))
+    design[:, 0, 0], design[4, 0, 1] = 1.0, 1.0
+    noise = Noise(np.full((6, 1, 1), 1e-4))
+    solved = collocate(START + np.arange(6.0), np.zeros((6, 1)), noise, design, [])
+    assert [solved.determined_without([i]) for i in range(6)] == [True] * 4 + [False, True]
+    assert not solved.determined_without([0, 1, 2, 3, 5])
+    with pytest.raises(ValueError, match=r"Without the 1 observations .* other 5 do not determine"):
+        solved.leave_out(np.array([4]))
+
+
+def test_without_a_trend_any_row_can_go():
+    "Where there is no column nothing has to be determined"
+    case = Passes(7)
+    case.design = case.design[:, :, :0]
+    solved = case.solve()
+    assert solved.determined_without(np.arange(29))
+    assert solved.trend.shape == (0,) and solved.trend_covariance.shape == (0, 0)
+
+
+@pytest.mark.parametrize("columns", [3, 1])
+def test_parameters_that_misclosures_do_not_determine_are_refused(columns):
+    "More parameters than misclosures, or two of the same effect: named with both numbers"
+    design = np.ones((2, 1, columns)) if columns == 3 else np.zeros((2, 1, 1))
+    noise = Noise(np.ones((2, 1, 1)))
+    with pytest.raises(ValueError, match=f"{columns} trend parameters are not determined by 2 "):
+        collocate(START + np.arange(2.0), np.zeros((2, 1)), noise, design, [])
+
+
+class Plain:
+    "A solver of V = diag: what a solver has to give, in the least words"
+
+    def __init__(self, variance):
+        self.variance = variance
+        self.log_determinant = float(np.log(variance).sum())
+
+    def whiten(self, columns):
+        return columns / np.sqrt(self.variance)[:, None]
+
+    def solve(self, columns):
+        return columns / self.variance[:, None]
+
+
+def test_any_solver_serves():
+    "Weighted means of misclosures of different sigmas, and the density of what the mean leaves"
+    variance = np.array([1.0, 4.0, 9.0, 0.25])
+    misclosure = np.array([0.3, -1.0, 2.0, 0.4])
+    solved = solve_trend(Plain(variance), misclosure, np.ones((4, 1)))
+    mean = np.average(misclosure, weights=1.0 / variance)
+    assert solved.trend == pytest.approx([mean])
+    assert solved.trend_covariance[0, 0] == pytest.approx(1.0 / np.sum(1.0 / variance))
+    squares = np.sum((misclosure - mean) ** 2 / variance)
+    density = squares + np.log(variance).sum() + np.log(np.sum(1.0 / variance))
+    assert solved.log_likelihood == pytest.approx(-0.5 * (density + 3 * np.log(2 * np.pi)))

@@ -1,0 +1,148 @@
+"""The observation equations are the derivatives of misclosures, and their noise is all of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.assembly import mounting_equations, position_equations, with_fallbacks
+from mlscorr.estimate.prior import mounting_prior, position_prior
+from mlscorr.frames import georeference, to_scanner
+from mlscorr.pos import SETTINGS as POS_SETTINGS
+from mlscorr.pos import Steps
+from mlscorr.survey import Matched, Mounting, Pos
+from tests.beds.pos_errors import CONSTANT, EPOCHS, NOISE, START, SURVEYED, Case, smooth_case
+
+MOUNTING = Mounting(np.array([0.1, -0.6, 0.4]), Rotation.from_euler("xyz", [90, 0, 35], True))
+WEAK = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])  # m, rad
+
+
+def test_passes_of_one_target_share_its_survey_error():
+    "Many passes average the extraction, not the survey: sigma never falls below the survey's"
+    rng, passes = np.random.default_rng(1), 25
+    case = Case(EPOCHS, CONSTANT, [100.0], rng)
+    sure = replace(case.control, sigma=np.full((1, 3), 0.02))
+    observations = case.observations[np.zeros(passes, int)]
+    drifts_little = Pos(position_sigma=1e-4, attitude_sigma=np.full(3, 1e-7))
+    estimate = estimate_correction(
+        case.recorded, Matched.by_name(observations, sure), drifts_little
+    )
+    sigma = estimate.correction.corrected.position_sigma[1000]
+    assert sigma == pytest.approx(np.hypot(0.02, NOISE / np.sqrt(passes)), rel=0.01)  # m
+
+
+def test_partials_are_what_a_pose_moves():
+    "Moved by 1 mm and turned by 1e-6 rad, the targets move as B says, to 1e-9 m"
+    case = smooth_case(3, n=6)
+    equations, times = case.equations(), case.observations.gps_time
+    pose = case.recorded.at(times)
+    body = pose.attitude.inv().apply(case.observations.position - pose.position)
+    for axis in range(3):
+        unit = np.eye(3)[axis]
+        assert equations.partials[:, :, axis] == pytest.approx(np.tile(unit, (6, 1)))
+        turned = (Rotation.from_rotvec(1e-6 * unit) * pose.attitude).apply(body)
+        moved = (turned - pose.attitude.apply(body)) / 1e-6
+        np.testing.assert_allclose(equations.partials[:, :, 3 + axis], moved, atol=1e-4)
+
+
+def test_misclosures_are_surveyed_less_observed():
+    "With names and times of the matches, in their order, whatever that is"
+    case = smooth_case(4, n=9)
+    shuffled = np.random.default_rng(1).permutation(9)
+    case.observations = case.observations[shuffled]
+    equations = case.equations()
+    expected = (case.control.position - case.observations.position[np.argsort(shuffled)])[shuffled]
+    np.testing.assert_allclose(equations.misclosure, expected, atol=1e-9)
+    assert equations.names.tolist() == [case.control.name[i] for i in shuffled]
+    np.testing.assert_array_equal(equations.gps_time, case.observations.gps_time)
+
+
+def test_two_passes_share_the_survey_alone():
+    "Covariance between passes of a target is the survey's; its own is that and the extraction's"
+    case = Case(EPOCHS, CONSTANT, [50.0, 90.0], np.random.default_rng(2))
+    observations = case.observations[np.array([0, 1, 0])]
+    matched = Matched.by_name(observations, case.control)
+    noise = position_equations(case.recorded, matched, Pos(), 0, position_prior).noise.matrix
+    between = SURVEYED**2 * np.eye(3)
+    np.testing.assert_allclose(noise[0:3, 6:9], between, atol=1e-15)
+    np.testing.assert_allclose(noise[0:3, 0:3], between + NOISE**2 * np.eye(3), atol=1e-15)
+    assert not noise[3:6, :3].any() and not noise[3:6, 6:].any()
+
+
+def steps_at(*times, size=0.5):
+    "Fall-backs of the POS at times (s after the start)"
+    at = START + np.array(times)
+    n = len(times)
+    return Steps(at, at + 0.1, np.tile([size, 0.0, 0.0], (n, 1)), np.full(n, 0.01))
+
+
+def test_a_fall_back_is_an_epoch_of_drift_alone():
+    "Three rows each: its step as misclosure, the position as partials, a noise of jitter twice"
+    equations = smooth_case(5, n=8).equations(order=1)
+    steps = steps_at(60.0, 120.0)
+    complete = with_fallbacks(equations, steps)
+    assert complete.fallbacks == 2 and len(complete.names) == 8 and len(complete.gps_time) == 10
+    np.testing.assert_array_equal(complete.gps_time[-2:], steps.before)
+    np.testing.assert_array_equal(complete.misclosure[-2:], steps.size)
+    np.testing.assert_array_equal(complete.partials[-1], np.eye(3, 6))
+    expected = 0.01**2 + 2 * complete.stated.gnss[-2:].ravel() ** 2
+    np.testing.assert_allclose(complete.noise.matrix[-6:, -6:], np.diag(expected), rtol=1e-9)
+    assert not complete.noise.matrix[:-6, -6:].any()
+    assert not complete.design[-2:].any() and complete.design[:-2].any()
+
+
+def test_no_step_no_row():
+    "Without fall-backs the equations are the same object; a jump of kilometres is none"
+    equations = smooth_case(6, n=5).equations()
+    assert with_fallbacks(equations, steps_at()) is equations
+    assert with_fallbacks(equations, steps_at(50.0, size=2000.0)) is equations
+    gate = POS_SETTINGS.largest_gate
+    assert with_fallbacks(equations, steps_at(50.0, size=0.99 * gate)).fallbacks == 1
+
+
+def mounting_case():
+    "A case, and its equations of a mounting that is corrected by nothing so far"
+    case = smooth_case(7, n=6)
+    position = position_equations(case.recorded, case.matched, Pos(), 0, mounting_prior)
+    return case, position
+
+
+def test_a_mounting_moves_targets_as_its_columns_say():
+    "Lever arm by 1 mm and boresight by 1e-6 rad about body axes, to 1e-5 of the effect"
+    case, position = mounting_case()
+    equations = mounting_equations(position, case.matched, MOUNTING, np.zeros(6), WEAK)
+    times = case.observations.gps_time
+    scanned = to_scanner(case.recorded, MOUNTING, case.observations.position, times)
+    before = georeference(case.recorded, MOUNTING, scanned, times)
+    for k in range(6):
+        small = 1e-6 * np.eye(6)[k]
+        turn = Rotation.from_rotvec(small[3:]) * MOUNTING.boresight
+        other = Mounting(MOUNTING.lever_arm + small[:3], turn)
+        moved = (georeference(case.recorded, other, scanned, times) - before) / 1e-6
+        np.testing.assert_allclose(equations.mounting[:6, :, k], moved, atol=2e-3)
+
+
+def test_two_epochs_hold_the_mounting_weakly():
+    "What was corrected already comes back as a misclosure with the sigmas of no measurement"
+    case, position = mounting_case()
+    corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
+    equations = mounting_equations(position, case.matched, MOUNTING, corrected, WEAK)
+    assert len(equations.gps_time) == 8 and equations.fallbacks == 0
+    np.testing.assert_array_equal(equations.misclosure[-2:].ravel(), -corrected)
+    np.testing.assert_allclose(np.diag(equations.noise.matrix)[-6:], WEAK**2)
+    np.testing.assert_array_equal(equations.mounting[-2:].reshape(6, 6), np.eye(6))
+    assert not equations.partials[-2:].any()
+    assert not equations.pose_design(case.recorded.gps_time[:4]).any()
+
+
+def test_a_site_without_targets_leaves_the_mounting_as_it_was():
+    "Where targets say next to nothing the estimate is minus what was corrected, with weak sigmas"
+    case, position = mounting_case()
+    vague = np.tile(1e6 * np.eye(3), (6, 1, 1))
+    matched = replace(case.matched, observations=replace(case.observations, covariance=vague))
+    corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
+    solved = mounting_equations(position, matched, MOUNTING, corrected, WEAK).solve(None)
+    np.testing.assert_allclose(solved.trend, -corrected, atol=1e-3)
+    np.testing.assert_allclose(np.sqrt(np.diag(solved.trend_covariance)), WEAK, rtol=1e-2)

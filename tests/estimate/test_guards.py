@@ -1,0 +1,191 @@
+"""What control points can't tell is said, with times and numbers."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.guards import (
+    GlobalTest,
+    Guards,
+    find_guards,
+    global_test_warnings,
+    guard_warnings,
+    sparse_warnings,
+)
+from mlscorr.estimate.posterior import Objective
+from mlscorr.survey import Trajectory
+from tests.beds.pos_errors import CONSTANT, EPOCHS, START, Case, even, smooth_case, waves
+
+
+def test_signals_extrapolated_in_time_are_told():
+    "Both ends beyond the control span are named in seconds and correlation times"
+    rng = np.random.default_rng(2)
+    case = Case(EPOCHS, waves(rng), np.linspace(80.0, 110.0, 12), rng)
+    estimate = case.estimate()
+    first, last = estimate.warnings
+    assert first.startswith("Signal extrapolated 80 s before the first control point (")
+    assert last.startswith("Signal extrapolated 90 s past the last control point (")
+    times = 90.0 / estimate.parameters.drift_time
+    assert f"({times:.1f} correlation times)" in last
+    assert last.endswith("only the trend applies there." if times >= 3 else "to the trend there.")
+    assert smooth_case(1).estimate().warnings == ()
+
+
+def test_components_that_targets_cannot_tell_are_told():
+    "Targets level beside the car tell roll and heading; pitch, about their line, isn't told"
+    rng = np.random.default_rng(6)
+    sigma = np.radians(np.full((len(EPOCHS), 3), 0.2))
+    stated = np.full((len(EPOCHS), 3), 0.005)
+    guards = Case(EPOCHS, CONSTANT, even(16), rng, stated, None, sigma).estimate().guards
+    assert guards.determined[3:].tolist() == [True, False, True]
+    assert guards.variance_ratio[4] > 0.7
+
+
+def two_passes(case):
+    "The same drive with 60 s less in the middle: a gap of the trajectory"
+    keep = (EPOCHS < 70.0) | (EPOCHS > 130.0)
+    old = case.recorded
+    sigma = None if old.position_sigma is None else old.position_sigma[keep]
+    return Trajectory(old.gps_time[keep], old.position[keep], old.attitude[keep], sigma)
+
+
+def test_a_pass_without_control_is_named():
+    "All control in the first of two passes: corrected, and the second is named with its times"
+    case = Case(EPOCHS, CONSTANT, np.linspace(3.0, 65.0, 8), np.random.default_rng(7))
+    estimate = estimate_correction(two_passes(case), case.matched)
+    text = f"The pass from {START + 130.1:.1f} to {START + 200:.1f} s has no control point"
+    assert any(sentence.startswith(text) for sentence in estimate.warnings)
+    assert estimate.guards.passes_without_control == ((START + 130.1, START + 200.0),)
+
+
+def test_a_long_gap_between_control_points_is_told():
+    "120 s without a target in the middle of a drive are named"
+    times = np.append(np.linspace(3, 35, 8), np.linspace(165, 197, 8))
+    case = Case(EPOCHS, waves(np.random.default_rng(8)), times, np.random.default_rng(8))
+    guards = case.estimate().guards
+    assert np.diff(guards.gap) == pytest.approx(130.0)
+
+
+@pytest.mark.parametrize(("times", "text"), [
+    ([100.0, 150.0], "Only 2 control points take part"),
+    (np.full(8, 100.0), "All 8 control points were seen within 0.0 s"),
+])  # fmt: skip
+def test_too_little_control_is_told(times, text):
+    "A correction is given, and a sentence on what it can't know"
+    case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(9))
+    estimate = case.estimate()
+    assert any(text in sentence for sentence in estimate.warnings)
+    assert np.isfinite(estimate.correction.corrected.position).all()
+
+
+def guards_with(test=None, gap=(0.0, 0.0)):
+    return Guards(gap, (), np.ones(6), test)
+
+
+@pytest.mark.parametrize(
+    "statistic, side", [(25.0, None), (100.0, "more"), (2.0, "less"), (46.9, None), (47.1, "more")]
+)
+def test_the_global_test_is_chi_squared(statistic, side):
+    "Of 30 degrees of freedom 16.8 to 47.0 pass; below and above a sentence says which"
+    limits = chi2.ppf([0.025, 0.975], 30)
+    test = GlobalTest(statistic, 30, *limits)
+    sentences = list(global_test_warnings(guards_with(test)))
+    assert test.passed == (side is None)
+    if side is None:
+        assert not sentences
+    else:
+        assert f"vary {side} than" in sentences[0] and "outside [17, 47] of 30" in sentences[0]
+
+
+def test_without_redundancy_there_is_no_global_test():
+    "As many misclosures as parameters leave nothing to test, and nothing to warn of"
+    assert not list(global_test_warnings(guards_with()))
+    case = Case(EPOCHS, CONSTANT, [100.0], np.random.default_rng(1))
+    assert case.estimate().guards.global_test is None
+
+
+def test_the_global_test_is_the_weighted_sum_of_squares():
+    "sigma0 squared times the redundancy, 3 n misclosures less 3 (order + 1) parameters"
+    estimate = smooth_case(13, n=7).estimate()
+    test = estimate.guards.global_test
+    assert test.redundancy == 3 * 7 - 3 * 2
+    assert test.statistic == pytest.approx(estimate.sigma0**2 * test.redundancy)
+    assert [test.lower, test.upper] == pytest.approx(chi2.ppf([0.025, 0.975], test.redundancy))
+
+
+def test_components_are_determined_below_half_of_their_variance():
+    "A posterior of 0.49 of the prior variance is told by control points, one of 0.51 is not"
+    ratio = np.array([0.0, 0.49, 0.51, 1.0, 0.2, 0.9])
+    guards = Guards((0.0, 0.0), (), ratio, None)
+    assert guards.determined.tolist() == [True, True, False, False, True, False]
+
+
+def found(times, trajectory=None):
+    "Guards of equations under the parameters that are believed before the misclosures"
+    case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(3))
+    case.recorded = case.recorded if trajectory is None else trajectory(case)
+    equations = case.equations()
+    objective = Objective.of(equations)
+    parameters = objective.parameters("matern32", objective.initial)
+    unknown = np.full((len(case.recorded), 3), 1.0)
+    corrected = SimpleNamespace(
+        gps_time=case.recorded.gps_time, position_sigma=unknown, attitude_sigma=unknown
+    )
+    solved = equations.solve(parameters)
+    return find_guards(equations, solved, parameters, corrected), equations, parameters
+
+
+@pytest.mark.parametrize(
+    "times, gap",
+    [
+        ([5.0, 50.0, 120.0, 190.0], (50.0, 120.0)),
+        ([100.0, 150.0], (0.0, 100.0)),
+        ([10.0, 40.0, 60.0], (60.0, 200.0)),
+    ],
+    ids=["inside", "before", "after"],
+)
+def test_the_longest_gap_is_between_control_or_to_an_end(times, gap):
+    "Ends of passes count as edges; times in s of the week"
+    assert found(times)[0].gap == pytest.approx(tuple(START + np.array(gap)), abs=0.1)
+
+
+def test_a_gap_does_not_reach_over_a_pause_of_the_recording():
+    "60 s without a trajectory are no stretch without control: each pass has its own edges"
+    guards, _, _ = found([20.0, 60.0, 140.0, 180.0], two_passes)
+    assert guards.gap[1] - guards.gap[0] == pytest.approx(40.0, abs=0.2)
+    assert guards.passes_without_control == ()
+
+
+def test_what_was_not_improved_has_a_ratio_of_one():
+    "Sigmas after the correction that are larger than those before count as no better: at most 1"
+    guards, _, _ = found([20.0, 100.0, 180.0])
+    np.testing.assert_array_equal(guards.variance_ratio, np.ones(6))
+    assert not guards.determined.any()
+
+
+def test_a_signal_that_fades_in_a_gap_is_told():
+    "Three correlation times and more without control: where, how long, and what applies"
+    guards, equations, parameters = found([5.0, 30.0, 170.0, 195.0])
+    short = type(parameters)(**{**vars(parameters), "drift_time": 20.0, "bias_time": 20.0})
+    long = type(parameters)(**{**vars(parameters), "drift_time": 90.0, "bias_time": 90.0})
+    text = f"No control point for 140 s from {START + 30:.1f} s (7.0 correlation times)"
+    assert any(line.startswith(text) for line in guard_warnings(guards, equations, short))
+    assert not any("No control" in line for line in guard_warnings(guards, equations, long))
+
+
+@pytest.mark.parametrize("n, asked, fitted, expected", [
+    (2, 1, 0, ["2 control points at 2 epochs are too few for a trend of order 1, which needs 3",
+               "Only 2 control points take part"]),
+    (1, 0, 0, ["Only 1 control point takes part"]),
+    (6, 2, 2, []),
+])  # fmt: skip
+def test_sparse_control_is_told_in_numbers(n, asked, fitted, expected):
+    "A lowered order, and fewer points than show a fault; enough points say nothing"
+    equations = Case(EPOCHS, CONSTANT, even(n), np.random.default_rng(4)).equations()
+    sentences = list(sparse_warnings(equations, asked, fitted))
+    assert len(sentences) == len(expected)
+    for sentence, start in zip(sentences, expected, strict=True):
+        assert sentence.startswith(start)

@@ -1,0 +1,56 @@
+"""A wrong boresight beside drift: told from what opposite passes disagree by."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mlscorr.estimate import estimate_correction, find_mounting_error, with_ties
+from mlscorr.survey import Mounting
+from tests.beds.tied_passes import tied_passes
+
+RECORDED = Mounting(np.zeros(3), Rotation.identity())
+
+
+def checked(seed, degrees, number=120):
+    "MountingCheck of two opposite passes that drift, georeferenced without so much boresight"
+    street = tied_passes(seed, number=number)
+    lacking = Rotation.from_rotvec(np.radians(degrees)).inv()
+
+    def turned(place, gps_time):
+        pose = street.trajectory.at(gps_time)
+        body = pose.attitude.inv().apply(place - pose.position)
+        return pose.position + pose.attitude.apply(lacking.apply(body))
+
+    ties, matched = street.ties, street.matched
+    place = turned(ties.place.reshape(-1, 3), ties.gps_time.ravel()).reshape(-1, 2, 3)
+    misclosure = np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
+    ties = replace(ties, place=place, misclosure=misclosure)
+    position = turned(matched.observations.position, matched.gps_time)
+    matched = replace(matched, observations=replace(matched.observations, position=position))
+    estimate = with_ties(estimate_correction(street.trajectory, matched), ties)
+    return find_mounting_error(estimate, matched, RECORDED)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_drift_alone_is_no_boresight(seed):
+    "Half a metre of drift and a right mounting: no sentence"
+    assert checked(seed, [0.0, 0.0, 0.0]).warnings == ()
+
+
+def test_a_boresight_of_a_degree_is_named():
+    "The sentence says by how much, and which command finds it"
+    check = checked(1, [0.0, 1.0, 0.0])
+    (sentence,) = check.warnings
+    assert "mlscorr calibrate" in sentence
+    error = np.degrees(check.correction[3:]) - [0.0, 1.0, 0.0]
+    assert (np.abs(error) < 3 * np.degrees(check.sigma[3:])).all()
+    assert abs(error[1]) < 0.2  # deg
+
+
+def test_without_ties_nothing_is_tested():
+    "Control points alone: None"
+    street = tied_passes(1)
+    estimate = estimate_correction(street.trajectory, street.matched)
+    assert find_mounting_error(estimate, street.matched, RECORDED) is None

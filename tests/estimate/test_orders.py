@@ -1,0 +1,157 @@
+"""Orders of the trend are compared by what they explain and what they cost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from mlscorr.collocation.trend import polynomial_design
+from mlscorr.estimate.orders import affordable_order, compare_orders, leave_targets_out
+from mlscorr.estimate.posterior import Objective, most_probable
+from mlscorr.estimate.signals import pose_signals
+from mlscorr.evaluate.model import model_section
+from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, smooth_case
+
+
+@pytest.mark.parametrize(("n", "order"), [(1, 0), (2, 0), (3, 1), (4, 2), (5, 3), (6, 3)])
+def test_the_order_falls_with_too_few_control_points(n, order):
+    "A trend needs one control point more than parameters per axis; a lowered order is told"
+    rng = np.random.default_rng(n)
+    estimate = Case(EPOCHS, CONSTANT, even(n), rng).estimate(order=3)
+    lowered = [text for text in estimate.warnings if "too few for a trend of order 3" in text]
+    assert estimate.order == order
+    assert len(lowered) == (order < 3)
+
+
+@pytest.mark.parametrize("number", [1, 7, 14])
+def test_left_out_misclosures_are_those_of_an_estimate_without_the_target(number):
+    "left_out of a target is what the others' trend and signals leave there, to 1e-9 m"
+    case = smooth_case(3)
+    estimate = case.estimate()
+    equations = estimate.equations
+    alone = np.arange(16) == number
+    one, others = equations.select(alone), equations.select(~alone)
+    signals = pose_signals(one.stated, estimate.parameters, one.partials)
+    mixings = [signal.mixing for signal in signals]
+    design = others.pose_design(one.gps_time)[:, :3]
+    solved = others.solve(estimate.parameters)
+    clocks = [signal.clock for signal in signals]
+    mean, _ = solved.predict(one.gps_time, design, mixings, clocks)
+    assert estimate.left_out[number] == pytest.approx((one.misclosure - mean)[0], abs=1e-9)
+
+
+def test_orders_and_families_are_set_side_by_side():
+    "Orders 0 to 3 in four families, probabilities sum to one, and the report has them all"
+    estimate = smooth_case(2).estimate()
+    pairs = {(one.order, one.parameters.family) for one in estimate.alternatives}
+    assert len(pairs) == len(estimate.alternatives) == 16
+    assert sum(one.probability for one in estimate.alternatives) == pytest.approx(1.0)
+    section = model_section(estimate)
+    assert {row["order"] for row in section["orders"]} == {0, 1, 2, 3}
+    assert len(section["tests"]) == 16
+    assert section["global_test"]["passed"]
+
+
+def test_a_shift_needs_no_slope():
+    "Where only a constant is wrong, order 0 is more probable than order 3"
+    rng = np.random.default_rng(5)
+    stated = np.full((len(EPOCHS), 3), 0.01)
+    estimate = Case(EPOCHS, CONSTANT, even(12), rng, stated).estimate()
+    share = [sum(a.probability for a in estimate.alternatives if a.order == n) for n in (0, 3)]
+    assert share[0] > share[1]
+
+
+@pytest.mark.parametrize("times, asked, order", [
+    (even(8), 3, 3),
+    (even(4), 3, 2),
+    (even(2), 1, 0),
+    (np.repeat(even(3), 3), 3, 1),
+    (even(8), 0, 0),
+], ids=["plenty", "four targets", "two targets", "three epochs", "a shift"])  # fmt: skip
+def test_an_order_leaves_one_epoch_and_one_target_over(times, asked, order):
+    "k targets at e epochs carry an order of min(k, e) - 2 at most, and never less than a shift"
+    equations = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1)).equations()
+    assert affordable_order(asked, equations) == order
+
+
+def test_passes_of_a_target_are_no_targets():
+    "Three targets seen twice carry what three carry"
+    case = Case(EPOCHS, CONSTANT, even(6), np.random.default_rng(1))
+    case.observations = replace(case.observations, name=("T01", "T02", "T03") * 2)
+    assert affordable_order(3, case.equations()) == 1
+
+
+@pytest.fixture(scope="module")
+def alternatives(equations):
+    return compare_orders(equations, most_probable(equations))
+
+
+def test_probabilities_follow_likelihood_and_prior(equations, alternatives):
+    "Their ratios are those of the posterior with a proper prior of the trend, and sum to one"
+    size = np.sqrt(np.mean(equations.misclosure**2))
+    values = []
+    for row in alternatives:
+        objective = Objective.of(equations.with_order(row.order))
+        value = objective(row.parameters.family, objective.logarithms(row.parameters))
+        values.append(value - 1.5 * (row.order + 1) * np.log(2 * np.pi * size**2))
+    share = np.exp(np.array(values) - max(values))
+    np.testing.assert_allclose([row.probability for row in alternatives], share / share.sum())
+
+
+def test_the_likelihood_is_that_of_a_trend_with_a_prior(equations, alternatives):
+    "Where the trend is well known it is the density of misclosures with coefficients of the RMS"
+    row = next(row for row in alternatives if row.order == 0)
+    size = np.sqrt(np.mean(equations.misclosure**2))
+    signals = pose_signals(equations.stated, row.parameters, equations.partials)
+    n = 3 * len(equations.names)
+    total = equations.noise.matrix.copy()
+    for signal in signals:
+        clock = equations.gps_time if signal.clock is None else signal.clock
+        time, mixing = np.repeat(clock, 3), signal.mixing.reshape(n, -1)
+        total += (mixing @ mixing.T) * signal.covariance(time[:, None] - time)
+    design = polynomial_design(equations.gps_time, equations.span, 0).reshape(n, -1)
+    wide = total + size**2 * design @ design.T
+    density = multivariate_normal(np.zeros(n), wide).logpdf(equations.misclosure.ravel())
+    assert row.log_likelihood == pytest.approx(density, abs=2.0)
+
+
+def test_a_slope_is_worth_an_order():
+    "A drift of 1 m over the drive that no signal is believed to make needs order 1, no higher"
+    slope = np.outer(EPOCHS / EPOCHS[-1], [1.0, -0.7, 0.5])
+    sigma = np.full((len(EPOCHS), 3), 0.005)
+    case = Case(EPOCHS, slope, even(7), np.random.default_rng(3), sigma)
+    equations = case.equations(order=1)
+    rows = compare_orders(equations, most_probable(equations))
+    share = [sum(row.probability for row in rows if row.order == n) for n in range(4)]
+    assert int(np.argmax(share)) == 1 and share[1] > 10 * share[0]
+
+
+def test_left_out_targets_take_all_their_passes_along(small_case):
+    "Seen twice, a target isn't predicted by its other pass: both left-out values are the same"
+    case = smooth_case(11, n=7)
+    twice = np.append(np.arange(7), 2)
+    case.observations = case.observations[twice]
+    equations = case.equations(order=1)
+    objective = Objective.of(equations)
+    solved = equations.solve(objective.parameters("matern32", objective.initial))
+    left = leave_targets_out(equations, solved)
+    np.testing.assert_allclose(left[7], left[2], atol=1e-9)
+    once = small_case.equations(order=1)
+    objective = Objective.of(once)
+    alone = leave_targets_out(once, once.solve(equations_parameters(objective)))
+    np.testing.assert_allclose(left[2], alone[2], atol=1e-6)
+
+
+def equations_parameters(objective):
+    return objective.parameters("matern32", objective.initial)
+
+
+def test_a_target_that_the_trend_needs_has_no_left_out_misclosure():
+    "Of two targets neither can go from a trend of order 1; of a shift either can"
+    case = Case(EPOCHS, CONSTANT, even(2), np.random.default_rng(5))
+    equations = case.equations(order=1)
+    assert np.isnan(leave_targets_out(equations, equations.solve(None))).all()
+    shift = case.equations(order=0)
+    left = leave_targets_out(shift, shift.solve(None))
+    np.testing.assert_allclose(left[0], shift.misclosure[0] - shift.misclosure[1], atol=1e-9)

@@ -1,0 +1,133 @@
+"""A POS that doesn't say when it drifts: its fall-backs and the control points do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.assembly import position_equations, with_fallbacks
+from mlscorr.estimate.outages import with_drift_history
+from mlscorr.estimate.prior import position_prior
+from mlscorr.pos import Steps
+from mlscorr.survey import Matched, Pos, Trajectory
+from tests.beds.lying_pos import START, TIME, survey, walk
+
+BELIEVED = Pos(position_sigma=0.5)  # m, without any sigma column
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+EVEN = np.linspace(3.0, 237.0, 16)
+
+
+@pytest.fixture(scope="module")
+def outages():
+    "Four drives with an outage from 80 to 140 s that no sigma states: (error, matched, estimate)"
+    cases = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        error = walk(rng, 80.0, 140.0)
+        trajectory, matched = survey(rng, error, EVEN)
+        cases.append((error, matched, estimate_correction(trajectory, matched, BELIEVED)))
+    return cases
+
+
+def test_drift_that_no_sigma_states_is_corrected(outages):
+    "A tenth of the raw error or less is left in the median, and no control point is an outlier"
+    shares = []
+    for error, _, estimate in outages:
+        corrected = estimate.correction.corrected.position
+        shares.append(rms(error - (corrected - estimate.correction.recorded.position)) / rms(error))
+        assert not estimate.outliers
+    assert np.median(shares) < 0.1
+
+
+def test_its_sigma_is_honest(outages):
+    "Over the drives 88 % or more of the true errors lie within 1.96 sigmas"
+    within = []
+    for error, _, estimate in outages:
+        corrected = estimate.correction.corrected
+        left = error - (corrected.position - estimate.correction.recorded.position)
+        within.append(np.mean(np.abs(left) < 1.96 * corrected.position_sigma))
+    assert np.mean(within) > 0.88
+
+
+def test_the_start_of_an_outage_is_found_between_control_points(outages):
+    "Drift begins to grow within 25 s of the truth, and the path tells its end"
+    for _, _, estimate in outages:
+        stated = estimate.equations.stated
+        assert stated.history.restarts == pytest.approx([START + 139.95], abs=0.3)
+        assert stated.starts[0] == pytest.approx(START + 80.0, abs=25.0)
+
+
+def test_a_fall_back_tells_the_end_of_an_outage_without_control():
+    "No control point in the last 40 s of an outage: its end is known to 10 cm all the same"
+    rng = np.random.default_rng(7)
+    error = walk(rng, 80.0, 140.0, 0.01)
+    trajectory, matched = survey(rng, error, EVEN[(EVEN < 100.0) | (EVEN > 142.0)])
+    corrected = estimate_correction(trajectory, matched, BELIEVED).correction.corrected
+    last = np.searchsorted(TIME, 139.8)
+    assert np.linalg.norm(error[last]) > 0.5  # m
+    left = error[last] - (corrected.position - trajectory.position)[last]
+    assert np.linalg.norm(left) < 0.1  # m
+
+
+def test_a_step_into_an_error_does_no_harm():
+    "A position that jumps away by 1 m and stays there is corrected to 2 cm on both sides"
+    rng = np.random.default_rng(3)
+    error = np.where(TIME[:, None] > 120.0, [0.8, -0.5, 0.3], 0.0) + walk(rng, 300.0, 300.0)
+    trajectory, matched = survey(rng, error, EVEN)
+    estimate = estimate_correction(trajectory, matched, BELIEVED)
+    corrected = estimate.correction.corrected
+    assert rms(error - (corrected.position - trajectory.position)) < 0.02  # m
+    assert not estimate.outliers
+
+
+def test_steps_that_control_contradicts_are_left_out():
+    "A drift of 3 m just before a step where control saw none: only the restart stays"
+    rng = np.random.default_rng(3)
+    error = walk(rng, 300.0, 300.0)
+    times = np.sort(np.append(EVEN, [119.0, 119.5]))
+    trajectory, matched = survey(rng, error, times)
+    equations = position_equations(trajectory, matched, BELIEVED, 1, position_prior)
+    at = np.array([START + 119.6])
+    step = Steps(at, at + 0.1, np.array([[3.0, 0.0, 0.0]]), np.array([0.01]))
+    history = replace(equations.stated.history, steps=step, restarts=step.middle)
+    stated = replace(equations.stated, history=history, starts=np.array([START, START + 119.65]))
+    doubted = replace(equations, stated=stated)
+    assert with_fallbacks(doubted, step).fallbacks == 1
+    assert with_drift_history(doubted).fallbacks == 0
+
+
+def test_a_drive_joined_of_two_needs_no_fall_back():
+    "A jump of a kilometre is a restart, and nothing tells that the drift had grown to it"
+    rng = np.random.default_rng(5)
+    error = walk(rng, 300.0, 300.0)
+    trajectory, matched = survey(rng, error, EVEN)
+    away = np.where(trajectory.gps_time > START + 120.0, 1000.0, 0.0)[:, None] * [1.0, 0.0, 0.0]
+    joined = Trajectory(trajectory.gps_time, trajectory.position + away, trajectory.attitude)
+    rows = np.searchsorted(trajectory.gps_time, matched.gps_time)
+    place = matched.observations.position + away[rows]
+    matched = Matched(
+        replace(matched.observations, position=place),
+        replace(matched.surveyed, position=matched.surveyed.position + away[rows]),
+    )
+    equations = position_equations(joined, matched, BELIEVED, 1, position_prior)
+    assert len(equations.stated.history.steps) == 1
+    assert with_drift_history(equations).fallbacks == 0
+
+
+def test_a_target_in_the_middle_of_a_step_has_it_in_its_noise():
+    "GNSS returns just when a target is scanned: the target counts little and harms nothing"
+    rng = np.random.default_rng(2)
+    error = walk(rng, 80.0, 140.0, 0.02)
+    trajectory, matched = survey(rng, error, np.sort(np.append(EVEN, 139.95)))
+    equations = position_equations(trajectory, matched, BELIEVED, 1, position_prior)
+    steps = equations.stated.history.steps
+    inside = (matched.gps_time >= steps.before[0]) & (matched.gps_time <= steps.after[0])
+    assert inside.sum() == 1
+    noise = np.einsum("nii->n", equations.noise.own)
+    assert noise[inside][0] > 100 * noise[~inside].max()

@@ -1,0 +1,216 @@
+"""The parameters' posterior is likelihood times prior, and its points stand for all of it."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
+from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.assembly import position_equations
+from mlscorr.estimate.posterior import (
+    IMPROBABLE,
+    Objective,
+    choose_parameters,
+    most_probable,
+)
+from mlscorr.estimate.prior import NAMES, Prior, mounting_prior
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.survey import Pos
+from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, smooth_case
+from tests.beds.tied_passes import tied_passes
+
+
+def drawn(objective, seed=1):
+    "Free logarithms within the prior"
+    rng = np.random.default_rng(seed)
+    return objective.initial + 0.5 * objective.spread * rng.normal(size=len(objective.initial))
+
+
+@pytest.mark.parametrize("family", (*FAMILIES, INTEGRATED))
+def test_the_objective_is_log_likelihood_plus_log_prior(objective, equations, family):
+    "The normal density of the logarithms, but for its constant, and the solution's likelihood"
+    at = drawn(objective)
+    parameters = objective.parameters(family, at)
+    logarithm = norm(objective.initial, objective.spread).logpdf(at).sum()
+    logarithm += np.log(objective.spread * np.sqrt(2 * np.pi)).sum()
+    expected = equations.solve(parameters).log_likelihood + logarithm
+    assert objective(family, at) == pytest.approx(expected, abs=1e-9)
+
+
+def test_parameters_and_logarithms_are_each_others_inverse(objective):
+    "There and back to 1e-12; the attitude's time is that of the drift where it follows it"
+    at = drawn(objective)
+    parameters = objective.parameters("matern32", at)
+    np.testing.assert_allclose(objective.logarithms(parameters), at, atol=1e-12)
+    assert parameters.attitude_time == pytest.approx(parameters.drift_time)
+
+
+def test_fixed_parameters_stay_at_their_start(objective):
+    "Those that are not free have the prior's start value, wherever the others go"
+    parameters = objective.parameters("matern32", drawn(objective))
+    fixed = set(range(len(NAMES))) - set(objective.prior.free) - {NAMES.index("attitude_time")}
+    for i in fixed:
+        expected = np.exp(objective.prior.start[i])
+        assert getattr(parameters, NAMES[i]) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("family", ["matern32", INTEGRATED])
+def test_the_gradient_is_the_slope(objective, family):
+    "Forward differences agree with central ones of half the step to a hundredth of their size"
+    at = drawn(objective)
+    _, gradient = objective.gradient(family, at)
+    h = SETTINGS.step / 2
+    central = [
+        (objective(family, at + h * e) - objective(family, at - h * e)) / (2 * h)
+        for e in np.eye(len(at))
+    ]
+    np.testing.assert_allclose(gradient, central, atol=0.02 * (1 + np.abs(central).max()))
+
+
+def test_the_maximum_is_higher_than_all_about_it(objective):
+    "From the start and from elsewhere the same height, above 40 points drawn within the prior"
+    at, value = objective.maximum("matern32", objective.initial)
+    assert value == pytest.approx(objective("matern32", at), abs=1e-9)
+    other = objective.maximum("matern32", drawn(objective, 5))[1]
+    assert other == pytest.approx(value, abs=0.05)
+    assert all(objective("matern32", drawn(objective, seed)) < value for seed in range(40))
+
+
+def gaussian(curvature, centre):
+    "An objective that is a quadratic: its Laplace approximation is exact"
+
+    class Quadratic(Objective):
+        def __call__(self, family, logarithms):
+            left = logarithms - centre
+            return float(7.0 - 0.5 * left @ curvature @ left)
+
+    k = len(centre)
+    return Quadratic((), Prior(np.zeros(k), np.arange(k), np.full(k, 10.0), False))
+
+
+def test_the_covariance_about_a_mode_is_the_inverse_curvature():
+    "Of a quadratic it is exact, correlations included"
+    root = np.random.default_rng(3).normal(size=(3, 3))
+    curvature, centre = root @ root.T + np.eye(3), np.array([0.3, -0.2, 0.5])
+    covariance = gaussian(curvature, centre).covariance("matern32", centre, 7.0)
+    np.testing.assert_allclose(covariance, np.linalg.inv(curvature), rtol=1e-6)
+
+
+@pytest.mark.parametrize("curvature", [np.diag([1e-6, 4.0]), np.diag([-2.0, 4.0])])
+def test_nothing_is_known_less_than_before(curvature):
+    "A flat or rising direction is as wide as the prior, 10, and the other keeps its own 1/2"
+    covariance = gaussian(curvature, np.zeros(2)).covariance("matern32", np.zeros(2), 7.0)
+    np.testing.assert_allclose(covariance, np.diag([100.0, 0.25]), rtol=1e-6, atol=1e-9)
+
+
+def test_each_family_has_a_mode(equations):
+    "Four families, the best first, each of the height that its parameters have"
+    modes, objective = most_probable(equations), Objective.of(equations)
+    assert sorted(chosen.family for chosen, _ in modes) == sorted((*FAMILIES, INTEGRATED))
+    values = [value for _, value in modes]
+    assert values == sorted(values, reverse=True)
+    for chosen, value in modes:
+        again = objective(chosen.family, objective.logarithms(chosen))
+        assert again == pytest.approx(value, abs=1e-8)
+
+
+def test_a_search_that_starts_at_the_modes_stays_there(equations):
+    "Started from its own result the posterior's height changes by less than 0.05"
+    modes = most_probable(equations)
+    again = {
+        chosen.family: value for chosen, value in most_probable(equations, [m for m, _ in modes])
+    }
+    for chosen, value in modes:
+        assert again[chosen.family] == pytest.approx(value, abs=0.05)
+
+
+def test_weights_and_probabilities_sum_to_one(posterior):
+    "Those of families, and those of points; the most probable family has the most points"
+    assert sum(share for _, share in posterior.modes) == pytest.approx(1.0)
+    assert sum(weight for _, weight in posterior.points) == pytest.approx(1.0)
+    shares = [share for _, share in posterior.modes]
+    assert shares == sorted(shares, reverse=True)
+    by_family = {}
+    for chosen, weight in posterior.points:
+        by_family[chosen.family] = by_family.get(chosen.family, 0.0) + weight
+    listed = {c.family: s for c, s in posterior.modes if s > SETTINGS.smallest_share}
+    total = sum(listed.values())
+    assert by_family == pytest.approx({family: s / total for family, s in listed.items()})
+
+
+def test_points_are_always_the_same(equations, posterior):
+    "No random number enters: again, and with targets in another order, the same points to 1e-3"
+    again = choose_parameters(equations, points=8)
+    assert again == posterior
+    shuffled = equations.select(np.random.default_rng(1).permutation(len(equations.names)))
+    for (a, u), (b, v) in zip(
+        choose_parameters(shuffled, points=8).points, posterior.points, strict=True
+    ):
+        assert u == pytest.approx(v, rel=0.02, abs=1e-4)
+        assert a.drift_time == pytest.approx(b.drift_time, rel=0.02)
+
+
+def test_no_point_stands_for_all(posterior):
+    "The heaviest has at most five times the mean weight of its family's points"
+    for family in {chosen.family for chosen, _ in posterior.points}:
+        weights = [w for chosen, w in posterior.points if chosen.family == family]
+        # cut at five times the mean before the cut; after it the mean is smaller
+        assert max(weights) <= max(SETTINGS.heaviest / len(weights), 1.0) * sum(weights) + 1e-12
+
+
+def test_more_drift_than_stated_raises_its_scale():
+    "Drifts of 10 cm under a stated sigma of 1 cm: the most probable scale is 3 to 30"
+    rng = np.random.default_rng(2)
+    wave = 0.1 * np.sin(2 * np.pi * EPOCHS[:, None] / [90.0, 130.0, 70.0] + rng.uniform(0, 6, 3))
+    case = Case(EPOCHS, wave, even(14), rng, np.full((len(EPOCHS), 3), 0.01))
+    best = most_probable(case.equations())[0][0]
+    assert 3.0 < max(best.drift_scale, best.bias_scale) < 30.0
+
+
+def test_large_surveys_are_cut_into_blocks_of_time():
+    "250 targets are three blocks, one after the other in time, of all targets together"
+    times = np.sort(np.random.default_rng(4).uniform(2.0, 198.0, 250))
+    case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4))
+    case.observations = case.observations[np.random.default_rng(5).permutation(250)]
+    blocks = Objective.of(case.equations()).blocks
+    assert len(blocks) == 3 and sorted(len(block.names) for block in blocks) == [83, 83, 84]
+    assert {name for block in blocks for name in block.names} == set(case.control.name)
+    ends = [block.span for block in blocks]
+    assert all(before[1] < after[0] for before, after in pairwise(ends))
+
+
+def test_the_trend_of_a_block_is_what_its_epochs_carry():
+    "All targets within a second carry a shift, whatever order was asked for"
+    case = Case(EPOCHS, CONSTANT, np.linspace(100.0, 100.5, 6), np.random.default_rng(6))
+    assert [block.order for block in Objective.of(case.equations(order=2)).blocks] == [0]
+
+
+def test_a_calibration_frees_the_attitude_time():
+    "Where the attitude doesn't follow the drift, its time is what its own logarithm says"
+    case = smooth_case(7, n=6)
+    equations = position_equations(case.recorded, case.matched, Pos(), 0, mounting_prior)
+    objective = Objective.of(equations)
+    at = drawn(objective)
+    chosen = objective.parameters("matern32", at)
+    position = [NAMES[i] for i in objective.prior.free].index("attitude_time")
+    assert chosen.attitude_time == pytest.approx(np.exp(at[position]))
+    assert replace(chosen, attitude_time=1.0).drift_time != pytest.approx(chosen.attitude_time)
+
+
+def test_a_search_turns_back_from_scales_that_rounding_spoils():
+    "Drift of a kilometre beside ties of a hundredth of a millimetre: improbable, not the end"
+    survey = tied_passes(1, number=40)
+    control = estimate_correction(survey.trajectory, survey.matched).equations
+    ties = TieEquations.of(control.trajectory, control.pos, survey.ties, control.stated.starts)
+    ties = replace(ties, variance=1e-6 * ties.variance)
+    objective = Objective.of(replace(control, ties=ties))
+    farthest = objective.initial + SETTINGS.farthest * objective.spread
+    with pytest.raises(np.linalg.LinAlgError, match="Rounding leaves the log-likelihood"):
+        objective.blocks[0].solve(objective.parameters("matern32", farthest))
+    assert objective("matern32", farthest) == IMPROBABLE
+    _, value = objective.maximum("matern32", objective.initial)
+    assert value > objective("matern32", objective.initial)

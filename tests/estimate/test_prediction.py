@@ -1,0 +1,140 @@
+"""The POS error at every epoch is the average over what the parameters may be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mlscorr.estimate.posterior import Posterior
+from mlscorr.estimate.prediction import bridge_steps, predict_pose_error, predict_under
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.pos import find_steps
+from mlscorr.survey import Trajectory
+from tests.beds.pos_errors import EPOCHS, START, smooth_case
+
+ROWS = np.array([0, 137, 900, 1500, 2000])
+
+
+@pytest.fixture(scope="module")
+def parameters(objective):
+    return objective.parameters("matern32", objective.initial)
+
+
+def sure(*pairs):
+    "A posterior of these parameters and weights"
+    return Posterior(pairs, pairs)
+
+
+def test_some_epochs_are_those_of_all(equations, parameters):
+    "Predicted at five epochs or at all 2001: the same error and covariance"
+    whole, spread = predict_under(equations, parameters)
+    mean, covariance = predict_under(equations, parameters, ROWS)
+    assert whole.shape == (2001, 6) and spread.shape == (2001, 6, 6)
+    np.testing.assert_allclose(mean, whole[ROWS], atol=1e-12)
+    np.testing.assert_allclose(covariance, spread[ROWS], atol=1e-14)
+
+
+def test_at_a_target_it_is_what_the_target_says(equations, parameters):
+    "By B at a target's epoch the predicted misclosure is the observed one to its noise, 3 sigma"
+    rows = np.round((equations.gps_time - START) / 0.1).astype(int)
+    pose, _ = predict_under(equations, parameters, rows)
+    predicted = np.einsum("nij,nj->ni", equations.partials, pose)
+    assert np.abs(predicted - equations.misclosure).max() < 0.02  # m
+    assert np.abs(equations.misclosure).max() > 0.05  # m
+
+
+def test_one_set_of_parameters_predicts_itself(equations, parameters):
+    "Where nothing else is possible the average is that prediction, with its covariance"
+    mean, covariance = predict_pose_error(equations, sure((parameters, 1.0)))
+    expected, spread = predict_under(equations, parameters)
+    np.testing.assert_allclose(mean, expected, atol=1e-9)
+    np.testing.assert_allclose(covariance, spread, rtol=1e-5, atol=1e-15)
+
+
+def test_two_sets_are_mixed_by_weight(equations, parameters):
+    "At control epochs mean and variance are those of a mixture of 30 and 70 %"
+    other = replace(parameters, drift_time=parameters.drift_time / 3, drift_scale=2.0)
+    mean, covariance = predict_pose_error(equations, sure((parameters, 0.3), (other, 0.7)))
+    rows = np.searchsorted(equations.trajectory.gps_time, equations.gps_time)
+    parts = [predict_under(equations, p, rows) for p in (parameters, other)]
+    expected = 0.3 * parts[0][0] + 0.7 * parts[1][0]
+    square = sum(
+        w * (np.einsum("qii->qi", c) + m**2) for w, (m, c) in zip((0.3, 0.7), parts, strict=True)
+    )
+    np.testing.assert_allclose(mean[rows], expected, atol=1e-9)
+    variance = np.einsum("qii->qi", covariance[rows])
+    np.testing.assert_allclose(variance, square - expected**2, rtol=1e-6, atol=1e-16)
+
+
+def test_doubt_about_parameters_widens_the_sigma(equations, parameters):
+    "Two readings that disagree leave no axis surer than both are in the mean"
+    other = replace(parameters, drift_time=parameters.drift_time / 10, drift_scale=5.0)
+    _, covariance = predict_pose_error(equations, sure((parameters, 0.5), (other, 0.5)))
+    spreads = [predict_under(equations, p)[1] for p in (parameters, other)]
+    variance = [np.einsum("qii->qi", c)[:, :3] for c in (covariance, *spreads)]
+    rows = np.linspace(0, 2000, SETTINGS.prediction_epochs).round().astype(int)
+    mean = (variance[1] + variance[2]) / 2
+    assert (variance[0][rows] > (1 - 1e-6) * mean[rows]).all()
+
+
+def test_parameters_of_no_weight_are_not_worked_out(equations, parameters):
+    "A point of a weight of 1e-4 changes no bit, and what is left counts as one"
+    wild = replace(parameters, drift_scale=1e3)
+    alone = predict_pose_error(equations, sure((parameters, 1.0)))
+    both = predict_pose_error(equations, sure((parameters, 1.0 - 1e-4), (wild, 1e-4)))
+    for here, there in zip(both, alone, strict=True):
+        np.testing.assert_allclose(here, there, rtol=1e-12, atol=1e-15)
+
+
+def test_covariances_are_covariances(equations, posterior):
+    "Symmetric and positive at all epochs, of position and rotation together"
+    mean, covariance = predict_pose_error(equations, posterior)
+    assert np.isfinite(mean).all()
+    np.testing.assert_array_equal(covariance, covariance.swapaxes(1, 2))
+    sigma = np.sqrt(np.einsum("qii->qi", covariance))
+    correlation = covariance / (sigma[:, :, None] * sigma[:, None, :])
+    assert np.linalg.eigvalsh(correlation).min() > -1e-9
+
+
+def test_the_sigma_is_least_where_control_is(equations, posterior):
+    "Of E and N the smallest sigma of the drive is beside a target, the largest far from all"
+    _, covariance = predict_pose_error(equations, posterior)
+    sigma = np.sqrt(np.einsum("qii->qi", covariance)[:, :2]).max(axis=1)
+    control = equations.gps_time - START
+    away = np.abs(EPOCHS[:, None] - control).min(axis=1)
+    assert away[np.argmin(sigma)] < 2.0 and away[np.argmax(sigma)] > 5.0  # s
+
+
+def test_another_place_gives_the_same_error(parameters):
+    "300 km away the predicted errors are the same to 1 um"
+    case = smooth_case(11, n=7)
+    expected = predict_under(case.equations(order=1), parameters, ROWS)[0]
+    offset = np.array([-300_000.0, 200_000.0, 1_000.0])
+    for name in ("recorded", "true", "observations", "control"):
+        value = getattr(case, name)
+        setattr(case, name, replace(value, position=value.position + offset))
+    moved = case.equations(order=1)
+    np.testing.assert_allclose(predict_under(moved, parameters, ROWS)[0], expected, atol=1e-6)
+
+
+def test_epochs_over_which_a_fall_back_is_spread_follow_the_vehicle():
+    "A step of 2.6 m within 0.1 s on a bend: 1 mm of the true path, where half was off by metres"
+    time = 413_200.0 + np.arange(0.0, 40.0, 0.01)  # s of week
+    angle = 8.0 * (time - time[0]) / 50.0
+    circle = 50.0 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    share = np.clip((time - time[2000]) / 0.1, 0.0, 1.0)
+    error = np.outer(1.0 - share, [2.0, -1.5, 0.7])  # m, gone once GNSS is back
+    path = np.array([523_000.0, 3_378_000.0, 40.0]) + circle
+    recorded = Trajectory(time, path - error, Rotation.identity(len(time)))
+    steps = find_steps(recorded)
+    pose = np.zeros((len(time), 6))
+    pose[time < steps.middle, :3] = error[0]
+    covariance = np.tile(np.diag([0.01**2] * 3 + [1e-8] * 3), (len(time), 1, 1))
+    inside = (time > steps.before) & (time < steps.after)
+    assert inside.sum() >= 9 and np.abs(pose[inside, :3] - error[inside]).max() > 0.9  # m
+    bridged, wider = bridge_steps(recorded, steps, pose, covariance)
+    assert np.abs(bridged[inside, :3] - error[inside]).max() < 0.001  # m
+    np.testing.assert_array_equal(bridged[~inside], pose[~inside])
+    sigma = np.sqrt(np.einsum("qii->qi", wider[inside])[:, :3])
+    assert (sigma >= 0.01).all() and sigma.max() < 0.2  # m

@@ -1,0 +1,94 @@
+"""What is believed of correlation times and scales follows from the drive."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.estimate.assembly import position_equations
+from mlscorr.estimate.prior import NAMES, SPLIT, mounting_prior, position_prior
+from mlscorr.survey import Pos
+from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, outage_case
+
+STEADY, GROWING = "steady", "growing"
+
+
+def equations_of(kind, pos=None, n=5, prior=position_prior):
+    "Of a drive without sigmas, with steady ones, or with those of an outage"
+    if kind == GROWING:
+        case = outage_case(1, n)
+    else:
+        sigma = np.full((len(EPOCHS), 3), 0.02) if kind == STEADY else None
+        case = Case(EPOCHS, CONSTANT, even(n), np.random.default_rng(1), sigma)
+    return position_equations(case.recorded, case.matched, pos or Pos(), 0, prior)
+
+
+def start(prior, name):
+    "A parameter's start value"
+    return float(np.exp(prior.start[NAMES.index(name)]))
+
+
+def spread(prior, name):
+    "One sigma of a parameter's logarithm, None where it is fixed"
+    free = [NAMES[i] for i in prior.free]
+    return prior.spread[free.index(name)] if name in free else None
+
+
+@pytest.mark.parametrize("n", [3, 5, 9])
+def test_drift_is_correlated_over_four_control_intervals(n):
+    "The paper's rule where the POS states its sigmas: 4 times 194 s over n - 1"
+    prior = position_prior(equations_of(STEADY, n=n))
+    interval = 194.0 / (n - 1)
+    assert start(prior, "drift_time") == pytest.approx(4.0 * interval, rel=1e-6)
+    assert start(prior, "bias_time") == pytest.approx(4.0 * interval, rel=1e-6)
+    assert start(prior, "jitter_time") == pytest.approx(interval, rel=1e-6)
+
+
+def test_without_sigmas_the_believed_time_holds():
+    "17 s where survey.toml says so, whatever the interval of the control points"
+    prior = position_prior(equations_of(None, Pos(correlation_time=17.0)))
+    assert start(prior, "drift_time") == pytest.approx(17.0)
+    prior = mounting_prior(equations_of(STEADY, Pos(correlation_time=17.0)))
+    assert start(prior, "drift_time") == pytest.approx(17.0)
+
+
+def test_the_attitude_follows_the_drift_in_a_correction_alone():
+    "Its time is free about 120 s in a calibration, where targets tell of the gyros"
+    correction, calibration = position_prior(equations_of(None)), mounting_prior(equations_of(None))
+    assert correction.attitude_follows and spread(correction, "attitude_time") is None
+    assert not calibration.attitude_follows
+    assert start(calibration, "attitude_time") == pytest.approx(120.0)
+    assert spread(calibration, "attitude_time") == pytest.approx(np.log(3.0))
+
+
+@pytest.mark.parametrize("kind", [None, STEADY, GROWING])
+def test_jitter_and_bias_are_free_where_sigma_has_two_parts(kind):
+    "A sigma without a part that GNSS holds has drift alone, and its four parameters stay"
+    equations = equations_of(kind)
+    free = {NAMES[i] for i in position_prior(equations).free}
+    is_split = bool(np.any(equations.stated.gnss))
+    assert (set(SPLIT) <= free) == is_split and (not set(SPLIT) & free) == (not is_split)
+    hidden = replace(equations, stated=replace(equations.stated, position=np.zeros((5, 3))))
+    assert not set(SPLIT) & {NAMES[i] for i in position_prior(hidden).free}
+
+
+def test_scales_are_ten_and_times_two_or_three():
+    "One sigma: factor 10 on scales of position, 2 on drift time and attitude, 3 on other times"
+    prior = mounting_prior(equations_of(GROWING))
+    factors = {name: np.exp(spread(prior, name)) for name in NAMES}
+    assert factors == pytest.approx(
+        {
+            **dict.fromkeys(("drift_scale", "walk_scale", "jitter_scale", "bias_scale"), 10.0),
+            **dict.fromkeys(("jitter_time", "bias_time", "attitude_time"), 3.0),
+            **dict.fromkeys(("drift_time", "attitude_scale"), 2.0),
+        }
+    )
+
+
+def test_what_is_stated_is_believed_first():
+    "All scales start at one but that of the random walk beside an integrated drift, at a tenth"
+    prior = position_prior(equations_of(GROWING))
+    for name in ("drift_scale", "jitter_scale", "bias_scale", "attitude_scale"):
+        assert start(prior, name) == pytest.approx(1.0)
+    assert start(prior, "walk_scale") == pytest.approx(0.1)
+    assert len(prior.spread) == len(prior.free)

@@ -1,0 +1,64 @@
+"""The POS error as signals: what each has for a sigma and a clock."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
+from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
+from mlscorr.pos import stated_sigma
+from mlscorr.survey import Pos, Trajectory
+
+TIME = 413200.0 + np.arange(0.0, 100.0, 0.5)  # s
+PARAMETERS = SignalParameters("matern32", 2.0, 30.0, 0.1, 1.0, 5.0, 3.0, 60.0, 1.5, 90.0)
+
+
+@pytest.fixture(scope="module")
+def stated():
+    "A drive at UTM size whose sigma grows from 2 cm to 1 m in the second half"
+    sigma = np.repeat(np.where(TIME[100] < TIME, 1.0, 0.02)[:, None], 3, axis=1)
+    path = np.array([528000.0, 3379000.0, 20.0]) + np.outer(TIME - TIME[0], [0.0, 10.0, 0.0])
+    trajectory = Trajectory(TIME, path, Rotation.identity(len(TIME)), sigma)
+    return stated_sigma(trajectory, Pos(), TIME)
+
+
+def partials(n):
+    return np.broadcast_to(np.eye(6)[:3], (n, 3, 6))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_drift_has_the_stated_sigma_times_its_scale(stated, family):
+    "sqrt(1 m^2 - 2 cm^2) times 2 in the outage, nothing before; bias and jitter where GNSS holds"
+    drift, jitter, bias, attitude = pose_signals(
+        stated, replace(PARAMETERS, family=family), partials(len(TIME))
+    )
+    assert drift.mixing[-1] == pytest.approx(2.0 * np.sqrt(1 - 0.02**2) * np.eye(3))
+    assert not drift.mixing[0].any()
+    assert jitter.mixing[0] == pytest.approx(0.02 * np.eye(3))
+    assert bias.mixing[-1] == pytest.approx(0.06 * np.eye(3))
+    assert attitude.covariance.correlation_time == 90.0  # s
+
+
+def test_integrated_drift_is_two_walks_on_one_clock(stated):
+    "Velocity and position random walk grow together; bias and attitude are Matern 3/2 then"
+    signals = pose_signals(stated, replace(PARAMETERS, family=INTEGRATED), partials(len(TIME)))
+    velocity, walk, _, bias, _ = signals
+    assert velocity.clock is not None and np.array_equal(velocity.clock, walk.clock)
+    assert velocity.covariance.family == INTEGRATED and walk.covariance.family == "exponential"
+    assert bias.covariance.family == "matern32"
+    growth = velocity.mixing[-1, 0, 0] / velocity.mixing[-41, 0, 0]
+    since = TIME[[-1, -41]] - stated.starts[-1]
+    assert growth == pytest.approx((since[0] / since[1]) ** 1.5, rel=1e-6)
+
+
+def test_fall_backs_show_nothing_but_drift(stated):
+    "In the last rows jitter, bias and attitude are hidden, in the others they stay"
+    signals = pose_signals(stated, PARAMETERS, partials(len(TIME)))
+    drift, *others = drift_alone(signals, 2)
+    assert drift.mixing[-2:].any()
+    for shown, signal in zip(others, signals[1:], strict=True):
+        assert not shown.mixing[-2:].any()
+        assert np.array_equal(shown.mixing[:-2], signal.mixing[:-2])
+    assert drift_alone(signals, 0) is signals

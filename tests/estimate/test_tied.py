@@ -1,0 +1,115 @@
+"""Ties beside control points: what they add, which of them hold, and what they can't tell."""
+
+import numpy as np
+import pytest
+
+from mlscorr.estimate import believed_correction, estimate_correction, with_ties
+from tests.beds.tied_passes import tied_passes
+
+
+def rms(left):
+    "Root mean square of the length of vectors (n, 3). Units: m"
+    return float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
+
+
+def corrected(survey):
+    "Estimates by control alone, and with ties"
+    alone = estimate_correction(survey.trajectory, survey.matched)
+    return alone, with_ties(alone, survey.ties)
+
+
+@pytest.fixture(scope="module")
+def clean():
+    survey = tied_passes(1)
+    return survey, *corrected(survey)
+
+
+def test_ties_carry_control_to_a_pass_without_any(clean):
+    "Five points in one pass: 1 cm remains of decimetres in the pass back, within its sigmas"
+    survey, alone, tied = clean
+    back = survey.trajectory.gps_time > survey.trajectory.passes[1, 0]
+    assert rms(survey.left(alone.correction)[back]) > 0.15  # m
+    left = survey.left(tied.correction)[back]
+    assert rms(left) < 0.015  # m
+    sigma = tied.correction.corrected.position_sigma[back]
+    assert np.mean(np.abs(left) < 2 * sigma) > 0.88
+
+
+def test_ties_help_the_pass_that_has_control(clean):
+    "Between control points the drift of both passes together is known better than of either"
+    survey, alone, tied = clean
+    there = survey.trajectory.gps_time <= survey.trajectory.passes[0, 1]
+    before, after = (rms(survey.left(e.correction)[there]) for e in (alone, tied))
+    assert after < 1.1 * before
+
+
+def test_residuals_are_those_of_the_noise(clean):
+    "What is left of ties is their noise of 4 mm, and none is refused but by chance"
+    _, _, tied = clean
+    assert tied.ties.used.mean() > 0.98
+    assert np.sqrt(np.mean(tied.ties.after[tied.ties.used] ** 2)) == pytest.approx(0.004, rel=0.2)
+    assert tied.ties.warnings == ()
+
+
+def test_wrong_ties_are_refused(clean):
+    "A fifth wrong by 0.1 to 0.5 m costs less than a fifth of the accuracy"
+    survey = tied_passes(1, wrong=0.2)
+    _, tied = corrected(survey)
+    wrong = np.abs(tied.ties.after) > 0.05  # m
+    assert wrong.mean() == pytest.approx(0.2, abs=0.07)
+    assert not tied.ties.used[wrong].any()
+    expected = rms(clean[0].left(clean[2].correction))
+    assert rms(survey.left(tied.correction)) < 1.2 * expected + 0.001  # m
+
+
+def test_without_control_passes_agree_and_nothing_more_is_claimed():
+    "Ties alone: passes agree to millimetres, the sigmas are still those of the POS"
+    survey = tied_passes(2, control=())
+    tied = with_ties(believed_correction(survey.trajectory), survey.ties)
+    assert np.median(np.abs(survey.ties.misclosure)) > 0.1  # m
+    assert np.median(np.abs(tied.ties.after)) < 0.005  # m
+    sigma = np.linalg.norm(tied.correction.corrected.position_sigma, axis=1)
+    assert np.median(sigma) > 0.1  # m
+    assert any("relative only" in sentence for sentence in tied.warnings)
+    assert tied.alternatives == ()
+    assert tied.support.contains(survey.trajectory.gps_time).all()
+
+
+def test_a_wrong_control_point_is_named():
+    "A point that is 0.4 m off is an outlier where ties hold its epoch to the other pass"
+    times = (5.0, 15.0, 25.0, 35.0, 45.0, 55.0)
+    survey = tied_passes(3, control=times)
+    survey.matched.surveyed.position[2] += [0.25, 0.3, 0.0]  # m
+    _, tied = corrected(survey)
+    assert [outlier.name for outlier in tied.outliers] == ["T2"]
+    assert "Control point T2 contradicts what ties carry to it" in " ".join(tied.warnings)
+    assert rms(survey.left(tied.correction)) < 0.04  # m
+
+
+def test_a_wrong_control_point_among_three_is_named_and_used():
+    "Too few are left to tell which is wrong, so each that contradicts the ties has a sentence"
+    survey = tied_passes(3, control=(15.0, 30.0, 45.0), number=30)
+    survey.matched.surveyed.position[1] += [0.25, 0.3, 0.0]  # m
+    _, tied = corrected(survey)
+    assert tied.outliers == ()
+    assert tied.used.all()
+    sentences = [text for text in tied.warnings if "contradicts what ties carry" in text]
+    assert any(text.startswith("Control point T1 ") for text in sentences)
+    assert all("too few are left to tell" in text for text in sentences)
+
+
+def test_ties_that_contradict_each_other_are_not_used():
+    "Where more than half are wrong by up to metres, control alone decides, and it is said"
+    survey = tied_passes(4, wrong=0.8, apart=3.0)
+    alone, tied = corrected(survey)
+    moved = tied.correction.corrected.position - alone.correction.corrected.position
+    assert np.abs(moved).max() < 1e-9  # m
+    assert "None of the 300 ties" in " ".join(tied.warnings)
+
+
+def test_order_of_ties_does_not_matter(clean):
+    "Ties in any order give the same correction to 2 mm: other ones choose the parameters"
+    survey, alone, tied = clean
+    shuffled = survey.ties[np.random.default_rng(0).permutation(len(survey.ties))]
+    other = with_ties(alone, shuffled).correction.corrected.position
+    assert np.abs(other - tied.correction.corrected.position).max() < 2e-3  # m

@@ -1,0 +1,135 @@
+"""Mutated inputs: read as they stand or refused in our own words, never a traceback or a hang.
+
+``make faults`` tries thousands of them; MLSCORR_FAULTS is the number of each kind.
+"""
+
+import os
+import time
+import warnings
+
+import numpy as np
+import pytest
+
+from mlscorr.io.control import read_control
+from mlscorr.io.las import read_records, sample_gps_times
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.las_copy import write_corrected
+from mlscorr.io.survey_sections import SurveyFile
+from mlscorr.io.toml_file import read_toml
+from mlscorr.io.trajectory import read_trajectory
+from mlscorr.survey import CloudFile
+from tests.io.test_las import START, correction, write_street
+
+NUMBER = int(os.environ.get("MLSCORR_FAULTS", "40"))
+LIMIT = 2.0  # s of the processor, for one file
+POINTS = 100
+CELLS = (
+    *(b"nan", b"inf", b"1e999", b"1e-320", b"0x1", b"1_000", b"-0", b"1,5", b"9" * 400, b""),
+    *(b'"', b"'", b"-", b"=", b"#", b";", b"[" * 200, b"\n", b"\r"),
+    *(b"\xff", b"\0", b"\x1b[2J", b"\xc2\xa0"),
+)
+
+
+def flipped(data, rng):
+    data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+
+
+def overwritten(data, rng):
+    start = rng.integers(len(data))
+    size = int(rng.choice([1, 2, 4, 8]))
+    data[start : start + size] = rng.choice([b"\0", b"\xff", rng.bytes(1)]) * size
+
+
+def cut(data, rng):
+    del data[rng.integers(len(data)) :]
+
+
+def removed(data, rng):
+    start = rng.integers(len(data))
+    del data[start : start + rng.integers(1, 20)]
+
+
+def doubled(data, rng):
+    start = rng.integers(len(data))
+    data[start:start] = data[start : start + rng.integers(1, 200)]
+
+
+def replaced(data, rng):
+    "Another cell for one between commas or line ends"
+    start = rng.integers(len(data))
+    ends = [i for i in (data.find(b",", start), data.find(b"\n", start)) if i >= 0]
+    data[start : min(ends, default=start)] = CELLS[rng.integers(len(CELLS))]
+
+
+BYTES = (flipped, overwritten, cut, removed, doubled)
+TEXT = (*BYTES, replaced, replaced, replaced)
+
+
+def mutated(whole, rng, ways):
+    "A file changed in one to three ways"
+    data = bytearray(whole)
+    for _ in range(rng.integers(1, 4)):
+        if data:
+            ways[rng.integers(len(ways))](data, rng)
+    return bytes(data)
+
+
+def outcome(path, read):
+    "What a reader gives, or None where it refuses the file in our own words and in time"
+    start = time.process_time()
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            return read(path)
+    except ValueError as error:
+        assert path.name in str(error), error
+        assert len(str(error)) < 1500 and "\x1b" not in str(error)
+    finally:
+        assert time.process_time() - start < LIMIT
+    return None
+
+
+def records(path):
+    return b"".join(chunk.tobytes() for chunk in read_records(read_layout(path), 1000))
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+@pytest.mark.parametrize("point_format", [1, 6])
+def test_mutated_clouds_are_copied_or_refused(suffix, point_format, tmp_path):
+    "A copy by a correction of zero has the records of its input, whatever the input is"
+    whole = write_street(tmp_path / f"in{suffix}", point_format, POINTS).read_bytes()
+    path, target = tmp_path / f"bad{suffix}", tmp_path / f"out{suffix}"
+    zero = correction(START + np.linspace(-1.0, 21.0, 50))
+    rng = np.random.default_rng(18)
+
+    def copy(bad):
+        points = sample_gps_times(bad)[0]
+        write_corrected(CloudFile(bad, points, 0.0, "week"), target, zero)
+        return records(bad), records(target)
+
+    refused = 0
+    for _ in range(NUMBER // 2):
+        path.write_bytes(mutated(whole, rng, BYTES))
+        pair = outcome(path, copy)
+        refused += pair is None
+        assert pair is None or pair[0] == pair[1]
+    assert 0 < refused < NUMBER // 2
+
+
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        ("control.csv", read_control),
+        ("trajectory.csv", read_trajectory),
+        ("survey.toml", lambda path: read_toml(path, SurveyFile, "it")),
+    ],
+)
+def test_mutated_texts_are_read_or_refused(name, read, street, tmp_path):
+    "Tables and survey.toml: no exception but a sentence that names the file"
+    whole = b"".join((street / name).read_bytes().splitlines(keepends=True)[:60])
+    path = tmp_path / name
+    rng = np.random.default_rng(18)
+    refused = 0
+    for _ in range(2 * NUMBER):
+        path.write_bytes(mutated(whole, rng, TEXT))
+        refused += outcome(path, read) is None
+    assert 0 < refused < 2 * NUMBER

@@ -1,0 +1,79 @@
+"""Roughness and returns are those of the scanner, not of what it looks at."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.gap.observe.channels import return_rate, roughness
+from mlscorr.gap.observe.pairing import build_rows
+from mlscorr.gap.observe.patch_search import find_patches
+from mlscorr.io.las import read_chunks
+
+
+def test_roughness_is_what_the_scanner_is_believed_to_make(survey, targets, patches, pairing):
+    "With the right belief the median ratio is 1 within 3 %; with half the noise it is near 4"
+    rows = pairing.rows.select(pairing.rows.channel == "roughness")
+    assert np.median(rows.residual) == pytest.approx(0.0, abs=0.03)
+    scatter = 1.4826 * np.median(np.abs(rows.residual - np.median(rows.residual)))
+    assert scatter == pytest.approx(np.sqrt(np.median(rows.noise)), rel=0.25)
+    noise = survey.scanner.range_noise / 2
+    quieter = replace(survey, scanner=replace(survey.scanner, range_noise=noise), reference=None)
+    again = build_rows(quieter, *no_targets(targets), patches).rows
+    again = again.residual[again.channel == "roughness"]
+    assert np.median(again) == pytest.approx(np.log(4.0), abs=0.1)
+
+
+def test_what_is_curved_does_not_count_as_noisy(survey):
+    "Waves of 1 cm height and 0.6 m length are not told as roughness, noise of 1 cm is"
+
+    def waves(chunk, rng):
+        return 0.01 * np.sin(chunk.xyz[:, :2].sum(axis=1) * 2 * np.pi / 0.8)
+
+    def noise(chunk, rng):
+        return rng.normal(0.0, 0.01, len(chunk))
+
+    told = []
+    for disturbance in (waves, noise):
+        rng = np.random.default_rng(6)
+
+        def chunks(file, disturbance=disturbance, rng=rng):
+            for chunk in read_chunks(file):
+                up = disturbance(chunk, rng)[:, None] * np.array([0.0, 0.0, 1.0])
+                yield replace(chunk, xyz=chunk.xyz + up)
+
+        found = find_patches(survey, chunks=chunks)
+        road = found.normal[:, 2] > 0.9
+        told.append(roughness(survey, found[road])[3].mean())
+    assert told[0] < 0.2 and told[1] > 0.85
+
+
+def no_targets(targets):
+    "No matched target, and what find_targets read"
+    return targets[0][np.zeros(len(targets[0]), dtype=bool)], targets[1]
+
+
+def thinned(keep):
+    "A reader of clouds that keeps some points: keep(n) gives (n,) bool"
+
+    def chunks(file):
+        for chunk in read_chunks(file):
+            yield chunk[keep(len(chunk))]
+
+    return chunks
+
+
+def test_lost_returns_are_told_from_a_thinned_cloud(survey, pairing):
+    "No loss is 0; a loss of 8 % is found to 1 %; every third point, or 1 of 4, is a delivery"
+    rate = pairing.rows.channel == "return_rate"
+    assert rate.sum() > 100
+    assert np.abs(pairing.rows.residual[rate]).max() < 0.02
+    rng = np.random.default_rng(2)
+    lossy = find_patches(survey, chunks=thinned(lambda n: rng.random(n) >= 0.08))
+    share, _, told = return_rate(lossy)
+    assert share[told].mean() == pytest.approx(-0.08, abs=0.01)
+    third = find_patches(survey, chunks=thinned(lambda n: np.arange(n) % 3 == 0))
+    share, _, told = return_rate(third)
+    assert np.median(share[told]) == 0.0
+    quarter = find_patches(survey, chunks=thinned(lambda n: rng.random(n) < 0.25))
+    assert not return_rate(quarter)[2].any()

@@ -1,0 +1,27 @@
+"""Planes that were seen twice are compared once, the earlier view with the later one."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from mlscorr.gap.observe.shared_planes import shared_rows
+
+
+def test_a_raised_pass_stands_off_its_planes_along_their_normals(survey, patches):
+    "2 cm more height in the first pass is 2 cm in the residuals of the road, to 3 mm"
+    rng = np.random.default_rng(0)
+    level = shared_rows(survey, patches, rng, limit=10_000)
+    lift = np.array([0.0, 0.0, 0.02])
+    first = (patches.pass_number == 1)[:, None]
+    raised = replace(patches, centre=patches.centre + lift * first)
+    rows = shared_rows(survey, raised, np.random.default_rng(0), limit=10_000)
+    assert len(level) > 50 and len(rows) > 50
+    assert (rows.gps_time < rows.gps_time_2).all()
+    before, after = (np.median(part.residual[part.direction[:, 2] > 0.9]) for part in (level, rows))
+    assert abs(after - before - lift[2]) < 0.003
+
+
+def test_a_single_pass_shares_nothing(survey, patches):
+    "Planes of eight seconds of one pass are seen once"
+    alone = patches[patches.pass_number == 1]
+    assert shared_rows(survey, alone, np.random.default_rng(0)) is None

@@ -1,0 +1,41 @@
+"""What gap.json says of a survey, its effects and their separability."""
+
+import json
+
+import gap_features
+import numpy as np
+import pytest
+
+from mlscorr.effects import make_effect
+from mlscorr.gap.document import map_document, separability_document
+from mlscorr.gap.infer.separability import Separability
+
+
+def test_separability_is_told_in_plain_numbers():
+    "Two parameters of correlation 0.96 are one class; biases are 4.13 sigmas"
+    normal = np.array([[4.0, 4.8, 0.0], [4.8, 6.25, 0.0], [0.0, 0.0, 1.0]])
+    effects = ("range_bias", "vertical_datum", "time_offset")
+    content = separability_document(Separability(effects, effects, ("m", "m", "s"), normal))
+    assert content["classes"] == [["range_bias", "vertical_datum"]]
+    assert content["correlation"]["matrix"][0][1] == pytest.approx(0.96)
+    (part,) = content["detectable"]["range_bias"]
+    assert (part["unit"], part["detectable"]) == ("m", pytest.approx(4.13 / 2))
+    json.dumps(content)
+
+
+def test_the_map_holds_the_way_and_all_targets():
+    "At most twice 1500 epochs, and each target with its role"
+    survey = gap_features.geometry(3, targets=6, patches=0, rough=False).survey
+    content = map_document(survey)
+    assert len(content["trajectory"]) <= 3000
+    assert np.allclose(content["trajectory"][0], survey.trajectory.position[0, :2], atol=0.01)
+    assert [(t["name"], t["role"]) for t in content["targets"]] == [
+        (name, "control") for name in survey.control.name
+    ]
+
+
+def test_an_effect_is_told_as_a_scenario_names_it():
+    "Name and parameters, which make the same effect again"
+    effect = make_effect("position_bump", magnitude=[0.1, 0.0, -0.2], time=5.0, width=3.0)
+    content = effect.document()
+    assert make_effect(content.pop("name"), **content) == effect

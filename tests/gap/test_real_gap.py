@@ -1,0 +1,120 @@
+"""What the examples on real data claim: a POS that loses GNSS, two passes that don't meet."""
+
+import os
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlscorr.survey import Pos
+from tests.beds.places import EXAMPLES
+from tests.beds.shared import shared
+
+REAL = EXAMPLES / "real"
+BELIEVED = Pos(0.023, np.radians([0.0145, 0.0145, 0.065]))  # as the simulated unit states it
+REPLICAS = 20
+
+
+@pytest.fixture(scope="module")
+def real():
+    "Import a module of examples/real by its name; none of them stays imported"
+    before = set(sys.modules)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(REAL)
+        yield import_module
+    for name in set(sys.modules) - before:
+        if Path(getattr(sys.modules[name], "__file__", None) or "/").parent == REAL:
+            del sys.modules[name]
+
+
+@pytest.fixture(scope="module")
+def drive(real):
+    "The module of the real drive, and that drive"
+    shared("data", "real_pos_error")
+    module = real("pos_drive")
+    return module, module.real_drive(np.random.default_rng(1))
+
+
+def test_the_real_pos_is_worse_in_its_outages(real, drive):
+    "Two real outages: position_noise is named, in windows that are them; without, none is likely"
+    pos_drive, one = drive
+    pos_measure, rng = real("pos_measure"), np.random.default_rng(1)
+    cycles, quiet = pos_drive.spans(one, 2)
+
+    def told(span):
+        rows, survey = pos_drive.window_rows(one, span, one.recorded, BELIEVED, rng)
+        answer = pos_measure.diagnosed(rows, survey, rng, REPLICAS)
+        return pos_measure.verdict_of(one, span, answer)
+
+    both = told((cycles[0][0], cycles[1][1]))
+    assert "position_noise" in both["verdict"].split("+")
+    assert both["p_value"] < 1e-6
+    assert both["outage_found"] > 0.6
+    assert both["found_in_outage"] > 0.6
+    assert told(quiet[0])["p_value"] > 0.01
+
+
+def test_outage_drift_in_the_simulator_shrinks_the_real_gap(real, drive):
+    "The gap lies in outages; drift in the simulator takes most of it on outages not chosen on"
+    pos_drive, one = drive
+    pos_measure, rng = real("pos_measure"), np.random.default_rng(2)
+    choice = [pos_drive.BELIEF, {**pos_drive.BELIEF, "odometer": False}]
+    models = pos_drive.outage_models(one, 2, choice, draws=1)
+    cycles, _ = pos_drive.spans(one, 8)
+    rows = {s: pos_drive.window_rows(one, s, one.recorded, BELIEVED, rng) for s in cycles}
+    several = pos_measure.measure(cycles, rows, one, models, rng, REPLICAS)
+    share = [m["plain"][m["lost"]].sum() / m["plain"].sum() for m in several]
+    assert np.median(share) > 0.9  # of the squared misfit beyond belief
+    assert max(np.mean(m["lost"]) for m in several) < 0.5
+    shrink = [pos_measure.shrunk(m["before"].mean(), m["after"].mean()) for m in several]
+    assert np.median(shrink) > 0.5
+    assert np.mean(np.array(shrink) > 0) >= 0.75
+
+
+@pytest.fixture
+def two_pass_gap(real):
+    "The example on two real passes"
+    shared("data", "routescene_uav")
+    return real("two_pass_gap")
+
+
+def test_boresight_closes_the_misfit_of_real_passes_over_a_car(two_pass_gap):
+    "Two uncorrected UAV passes: boresight is named, and planes held out meet as believed then"
+    one = two_pass_gap.scene("Car")
+    assert np.percentile(one.away, 95) < 0.004  # m, of the file's points, put there by their pose
+    result = two_pass_gap.study(one, np.random.default_rng(1), folds=2, chance=REPLICAS)
+    assert "boresight" in result["verdict"].split("+")
+    assert result["p_value"] < 1e-6
+    assert result["shrink"] > 0.8
+    assert result["before"] > 2 * result["null_band"][1]
+    assert result["after"] < result["null_band"][1]
+
+
+def test_boresight_is_named_for_real_passes_over_a_tent(two_pass_gap):
+    "Another scene and day: boresight again"
+    one = two_pass_gap.scene("Tent")
+    rng = np.random.default_rng(1)
+    patches = two_pass_gap.find_patches(one.survey, chunks=lambda file: [one.cloud])
+    rows = two_pass_gap.shared_rows(one.survey, patches, rng)
+    told = two_pass_gap.diagnosed(rows, one.survey, rng, REPLICAS).verdict
+    assert "boresight" in told.label.split("+")
+    assert told.p_value < 1e-6
+
+
+@pytest.mark.parametrize("script", ["pos_gap.py", "two_pass_gap.py"])
+def test_an_example_without_its_data_says_where_it_was_looked_for(script, tmp_path):
+    "One sentence with the folder and the way out, nothing else, and nothing is written"
+    run = subprocess.run(
+        [sys.executable, REAL / script],
+        capture_output=True, text=True, cwd=tmp_path,
+        env={**os.environ, "MLSCORR_SHARED": str(tmp_path / "shared")},
+    )  # fmt: skip
+    assert run.returncode == 0
+    assert not run.stderr
+    assert len(run.stdout.splitlines()) == 1
+    assert str(tmp_path / "shared" / "data") in run.stdout
+    assert "MLSCORR_SHARED" in run.stdout
+    assert not list(tmp_path.iterdir())

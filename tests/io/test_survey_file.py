@@ -1,0 +1,463 @@
+"""A survey folder in: survey.toml, control.csv, and what must fit together."""
+
+import shutil
+import warnings
+
+import laspy
+import numpy as np
+import pytest
+
+from mlscorr.io.control import read_control
+from mlscorr.io.survey_file import read_survey, read_survey_file
+from mlscorr.survey import Pos, Scanner
+from tests.beds.shared import shared
+
+TOML = """
+name = "street"
+crs = "EPSG:32650"
+
+[cloud]
+files = ["pass-*.las"]
+
+[trajectory]
+file = "trajectory.csv"
+
+[control]
+file = "control.csv"
+"""
+CONTROL = """name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role
+T01,532012.4919,3373991.4813,44.4800,0.003,0.004,circle,0.6,control
+T02,532030.0000,3373978.1746,44.5047,0.003,0.004,square,0.5,check
+T03,532060.0000,3374008.1746,42.5047,0.002,0.005,circle,0.6,control
+"""
+WEEK = 604800.0 * 2300  # s
+
+
+@pytest.fixture
+def folder(tmp_path):
+    "A survey of 40 s along a street at UTM coordinates, in GPS seconds of week"
+    (tmp_path / "survey.toml").write_text(TOML)
+    (tmp_path / "control.csv").write_text(CONTROL)
+    gps_time = 413200 + 0.05 * np.arange(800)
+    rows = [f"{t:.4f},{532000 + 5 * (t - 413200):.4f},3374000,42,0.1,-0.2,90.0" for t in gps_time]
+    header = "gps_time,easting,northing,height,roll,pitch,heading\n"
+    (tmp_path / "trajectory.csv").write_text(header + "\n".join(rows) + "\n")
+    write_las(tmp_path / "pass-1.las", np.linspace(413202.0, 413215.0, 100))
+    write_las(tmp_path / "pass-2.las", np.linspace(413220.0, 413235.0, 200) + WEEK - 1e9, True)
+    return tmp_path
+
+
+def write_las(path, gps_time, is_standard=False):
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = [0.001] * 3, [532000.0, 3374000.0, 0.0]
+    header.global_encoding.gps_time_type = laspy.header.GpsTimeType(int(is_standard))
+    las = laspy.LasData(header)
+    las.x = 532000.0 + np.arange(len(gps_time))
+    las.y = np.full(len(gps_time), 3374010.0)
+    las.z = np.full(len(gps_time), 40.0)
+    las.gps_time = gps_time
+    las.write(path)
+
+
+def toml(folder, old, new):
+    "Change survey.toml"
+    text = (folder / "survey.toml").read_text()
+    assert old in text
+    (folder / "survey.toml").write_text(text.replace(old, new))
+    return folder
+
+
+# ---- survey.toml
+
+
+def test_a_survey_is_read_with_its_defaults(folder):
+    "Only what must be given is given: beliefs come from the nouns, the mounting stays open"
+    survey = read_survey(folder)
+    assert (survey.name, survey.crs, survey.path) == (
+        "street",
+        "EPSG:32650",
+        folder / "survey.toml",
+    )
+    assert [cloud.path.name for cloud in survey.clouds] == ["pass-1.las", "pass-2.las"]
+    assert [cloud.points for cloud in survey.clouds] == [100, 200]
+    assert survey.control.name == ("T01", "T03")
+    assert survey.check.name == ("T02",)
+    assert survey.mounting is None
+    assert survey.reference is None
+    assert survey.scanner == Scanner()
+    assert survey.pos.attitude_sigma == pytest.approx(Pos().attitude_sigma)
+    assert len(survey.trajectory) == 800
+
+
+def test_each_cloud_has_its_own_time_constant(folder):
+    "One file in week seconds, one in adjusted standard time: both reach the trajectory, and say so"
+    survey = read_survey(folder / "survey.toml")
+    assert [cloud.time_constant for cloud in survey.clouds] == [0.0, 1e9 - WEEK]
+    assert [cloud.time_system for cloud in survey.clouds] == ["week", "standard"]
+    assert "WGS 84 / UTM zone 50N" in survey.notes[0]
+    assert "pass-2.las: adjusted standard GPS time" in survey.notes[2]
+
+
+def test_only_a_planned_survey_may_have_no_cloud(folder):
+    "Without [cloud] a survey is refused; planned, it is read"
+    text = (folder / "survey.toml").read_text()
+    start, end = text.index("[cloud]"), text.index("[trajectory]")
+    (folder / "survey.toml").write_text(text[:start] + text[end:])
+    with pytest.raises(ValueError, match="cloud is missing"):
+        read_survey(folder)
+    assert read_survey(folder, planned=True).clouds == ()
+
+
+def test_degrees_become_radians_and_the_mounting_a_rotation(folder):
+    "R_L^P = Rz(c) Ry(b) Rx(a): with [90, 0, 0] the scanner's y axis points up"
+    with (folder / "survey.toml").open("a") as file:
+        file.write("[mounting]\nlever_arm = [0.1, -0.6, 0]\nboresight = [90.0, 0.0, 30.0]\n")
+        file.write("[scanner]\nrange_noise = 0.004\nangle_noise = 0.002\nlines_per_second = 150\n")
+        file.write("[pos]\nposition_sigma = 0.5\nattitude_sigma = [0.006, 0.006, 0.014]\n")
+        file.write('[scene]\nreference = "trajectory.csv"\n')
+    survey = read_survey(folder)
+    assert survey.mounting.lever_arm == pytest.approx([0.1, -0.6, 0.0])
+    turned = survey.mounting.boresight.apply([[0, 1, 0], [1, 0, 0]])
+    assert turned == pytest.approx(np.array([[0, 0, 1], [np.cos(np.pi / 6), 0.5, 0]]), abs=1e-12)
+    assert survey.scanner == Scanner(0.004, np.radians(0.002), 150)
+    assert np.degrees(survey.pos.attitude_sigma) == pytest.approx([0.006, 0.006, 0.014])
+    assert (survey.pos.position_sigma, survey.pos.correlation_time) == (0.5, 30.0)
+    assert survey.reference == folder / "trajectory.csv"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "files =",
+            "file =",
+            r"cloud\.files is missing.*cloud\.file is an unknown key.* is cloud\.f",
+        ),
+        ("[trajectory]", "[trajectroy]", "trajectroy is an unknown key; .* is trajectory"),
+        ('name = "street"', "lever_arm = [0.0, 0.0, 0.0]", r"lever_arm .* is mounting\.lever_arm"),
+        ("[control]\nfile =", "[control]\npath =", r"control\.file is missing"),
+        (
+            'file = "trajectory.csv"',
+            "file = 3",
+            r"trajectory\.file = 3 can't be used.*valid string",
+        ),
+        ('["pass-*.las"]', '"pass-1.las"', r"cloud\.files = 'pass-1.las' .*valid list"),
+        ('["pass-*.las"]', "[]", r"cloud\.files = \[\] .*at least 1 item"),
+        ("[cloud]", '[cloud]\ngps_time = "utc"', r"cloud\.gps_time = 'utc' .*'auto', 'week'"),
+        ("[control]", "[mounting]\nlever_arm = [0.0, 1.0]\n[control]", r"mounting\.boresight is m"),
+        (
+            "[control]",
+            "[pos]\nposition_sigma = -1\n[control]",
+            r"pos\.position_sigma = -1 .*greater",
+        ),
+        ("[control]", '[pos]\nposition_sigma = "1"\n[control]', "valid number"),
+        ("[control]", "[pos]\nattitude_sigma = [1.0, nan, 1.0]\n[control]", r"attitude_sigma\.1 ="),
+        ("[control]", "[matching]\nradius = 3\n[control]", r"matching\.radius is an unknown key"),
+        ("[control]", "[matching]\nsearch_radius = 0\n[control]", r"search_radius = 0 .*greater"),
+        ("[control]", "[scanner]\nrange_noise = inf\n[control]", "finite number"),
+        ("[control]", "[mounting]\nlever_arm = [100.5, 0.0, 0.0]\n[control]", "less than or equal"),
+    ],
+)
+def test_wrong_keys_are_named(folder, old, new, message):
+    "Unknown (then with the nearest known one), missing, of the wrong type or size: all named"
+    with pytest.raises(ValueError, match=message):
+        read_survey_file(toml(folder, old, new))
+
+
+def test_ties_are_used_unless_survey_toml_says_off(folder):
+    "[ties] use is auto or off, and nothing else"
+    assert read_survey(folder).use_ties
+    toml(folder, "[control]", '[ties]\nuse = "off"\n[control]')
+    assert not read_survey(folder).use_ties
+    toml(folder, '"off"', '"sometimes"')
+    with pytest.raises(ValueError, match="use"):
+        read_survey(folder)
+
+
+def test_the_search_radius_is_ten_metres_or_what_survey_toml_says(folder):
+    "3.5 m reach the Survey that matching and extraction take it from"
+    assert read_survey(folder).search_radius == 10.0  # m
+    toml(folder, "[control]", "[matching]\nsearch_radius = 3.5\n[control]")
+    assert read_survey(folder).search_radius == 3.5
+
+
+def test_all_wrong_keys_come_in_one_error(folder):
+    "Who mistyped three keys hears of three"
+    toml(folder, "[cloud]", "nam = 1\n[cloud]\nfilez = 2\n[scaner]\nx = 1\n[scanner]")
+    with pytest.raises(ValueError, match=r"cloud\.filez .*cloud\.files.*scaner .* is scanner") as e:
+        read_survey_file(folder)
+    assert str(e.value).count("unknown key") >= 3
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b'name = "street\n', "not valid TOML: .*at line 1"),
+        (TOML.replace("[cloud]", "[cloud").encode(), "not valid TOML: .*at line 5"),
+        (b"name = 'a'\nname = 'b'\n", "not valid TOML"),
+        (b"name = '\xff\xfe'\n", "not a text file in UTF-8"),
+        (b"", "cloud is missing. trajectory is missing"),
+    ],
+)
+def test_bad_toml_is_located(folder, content, message):
+    "Bad syntax, bad encoding, nothing: the line is named"
+    (folder / "survey.toml").write_bytes(content)
+    with pytest.raises(ValueError, match=message):
+        read_survey(folder)
+
+
+def test_a_byte_order_mark_is_no_syntax_error(folder):
+    "Some editors put one in front"
+    (folder / "survey.toml").write_bytes(b"\xef\xbb\xbf" + TOML.encode())
+    assert read_survey_file(folder).name == "street"
+
+
+def test_a_missing_survey_says_what_is_expected(tmp_path):
+    "A folder without survey.toml, or a path that isn't there"
+    for path in (tmp_path, tmp_path / "nowhere" / "survey.toml"):
+        with pytest.raises(FileNotFoundError, match=r"does not exist; a survey is a folder with"):
+            read_survey(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "trajectory.csv",
+            "trajectori.csv",
+            r"trajectory\.file of .*trajectori.csv, which does not",
+        ),
+        ("control.csv", "points.csv", r"control\.file of .*points.csv, which does not exist"),
+        ("pass-*.las", "drive-*.las", r"cloud\.files of .*no file is like .*drive-\*"),
+        ("pass-*.las", "pass-9.las", r"cloud\.files of .*pass-9.las, which does not exist"),
+        ("[control]", '[scene]\nreference = "r.ply"\n[control]', r"scene\.reference of"),
+        ('trajectory.csv"', 'trajectory.csv"\naccuracy = "s.out"', r"trajectory\.accuracy of"),
+    ],
+)
+def test_missing_files_are_named_with_their_key(folder, old, new, message):
+    "A name or a glob without a file: key and path are named"
+    with pytest.raises(FileNotFoundError, match=message):
+        read_survey(toml(folder, old, new))
+
+
+def test_the_same_cloud_twice_is_refused(folder):
+    "Listed by name and caught by the glob: it would be counted twice"
+    toml(folder, '["pass-*.las"]', '["./pass-1.las", "pass-*.las"]')
+    with pytest.raises(ValueError, match=r"names the file .*pass-1.las \(2 times\)"):
+        read_survey(folder)
+
+
+def test_clouds_of_the_same_name_are_refused(folder):
+    "Outputs keep their names, so two folders can't hold one each"
+    (folder / "other").mkdir()
+    shutil.copy(folder / "pass-1.las", folder / "other" / "pass-1.las")
+    toml(folder, '["pass-*.las"]', '["**/pass-1.las"]')
+    with pytest.raises(ValueError, match=r"same name in different folders.*pass-1.las"):
+        read_survey(folder)
+
+
+@pytest.mark.parametrize(
+    ("crs", "message"),
+    [
+        ("EPSG:326500", "'EPSG:326500' is unknown"),
+        ("EPSG:4326", "projected CRS is needed"),
+        ("EPSG:2227", "not in metres"),
+    ],
+)
+def test_a_crs_that_can_not_be_meant_is_refused(folder, crs, message):
+    "Unknown, geographic, in feet"
+    with pytest.raises(ValueError, match=message):
+        read_survey(toml(folder, "EPSG:32650", crs))
+
+
+def test_an_sbet_without_a_crs_is_refused(folder):
+    "Latitude and longitude can't be brought anywhere"
+    shutil.copy(shared("data", "leeward_sbet", "sbet.out"), folder / "sbet.out")
+    toml(folder, 'crs = "EPSG:32650"\n', "")
+    with pytest.raises(ValueError, match=r"set crs in survey\.toml"):
+        read_survey(toml(folder, "trajectory.csv", "sbet.out"))
+
+
+def test_clouds_outside_the_trajectory_are_refused(folder):
+    "A cloud of the next day: the file and both spans are named"
+    write_las(folder / "pass-3.las", np.linspace(499602.0, 499615.0, 100))
+    with pytest.raises(ValueError, match=r"None of the sampled times of pass-3.las, \[499602.000"):
+        read_survey(folder)
+
+
+def test_the_asked_time_system_is_obeyed(folder):
+    "Both files as week seconds: the one in standard time fits no more, and the key is named"
+    toml(folder, "[cloud]", '[cloud]\ngps_time = "week"')
+    with pytest.raises(ValueError, match=r'pass-2.las.*cloud.gps_time = "week"'):
+        read_survey(folder)
+
+
+@pytest.mark.parametrize("content", [b"", b"LASF" + bytes(100)])
+def test_a_broken_cloud_is_refused(folder, content):
+    "Empty or cut off within the header"
+    (folder / "pass-1.las").write_bytes(content)
+    with pytest.raises(ValueError, match=r"pass-1\.las"):
+        read_survey(folder)
+
+
+# ---- control against trajectory
+
+
+def exchange(folder, change):
+    "Rewrite easting and northing of every control point"
+    lines = [line.split(",") for line in CONTROL.strip().splitlines()]
+    for cells in lines[1:]:
+        cells[1:3] = change(float(cells[1]), float(cells[2]))
+    text = "".join(",".join(map(str, cells)) + "\n" for cells in lines)
+    (folder / "control.csv").write_text(text)
+    return folder
+
+
+def test_swapped_control_is_refused(folder):
+    "Northing in the column of easting: 4000 km away, but 25 m when exchanged"
+    with pytest.raises(ValueError, match=r"swapped in .*control.csv.* 40\d\d km .*Exchange"):
+        read_survey(exchange(folder, lambda e, n: (n, e)))
+
+
+def test_control_of_another_zone_is_refused(folder):
+    "The same points in the next zone lie hundreds of km off: distance and cause are named"
+    with pytest.raises(ValueError, match=r"lies 57\d\.\d km from it .limit 5 km.*CRS or zones"):
+        read_survey(exchange(folder, lambda e, n: (e - 573_000.0, n + 12_000.0)))
+
+
+def test_far_control_points_beside_near_ones_are_normal(folder):
+    "One control file may serve a whole town: what is near counts"
+    with (folder / "control.csv").open("a") as file:
+        file.write("T99,552012.0,3373991.0,44.4,0.003,0.004,circle,0.6,control\n")
+    assert len(read_survey(folder).control) == 3
+
+
+# ---- control.csv
+
+
+def control(tmp_path, old="", new="", text=CONTROL):
+    assert old in text
+    (tmp_path / "control.csv").write_text(text.replace(old, new, 1) if old else text)
+    return tmp_path / "control.csv"
+
+
+def test_control_is_split_by_role(tmp_path):
+    "Control and check points: names, positions, sigmas of E, N, H, kinds, sizes"
+    points, check = read_control(control(tmp_path))
+    assert points.position[1] == pytest.approx([532060.0, 3374008.1746, 42.5047], abs=1e-9)
+    assert points.sigma[1].tolist() == [0.002, 0.002, 0.005]
+    assert (points.kind, check.kind) == (("circle", "circle"), ("square",))
+    assert check.size.tolist() == [0.5]
+    assert np.isnan(points.normal).all()
+    assert len(points + check) == 3
+
+
+def test_control_tolerates_how_tables_are_typed(tmp_path):
+    "A byte order mark, blank lines, spaces, quotes, capitals and empty lines of commas are free"
+    text = "\ufeff\n" + CONTROL.replace(",", " , ").replace("T01", '"T01, gate"').upper()
+    (tmp_path / "control.csv").write_text(text + "\n\n,,,,,,,,\n", encoding="utf-8")
+    points, check = read_control(tmp_path / "control.csv")
+    assert points.name == ("T01, GATE", "T03")
+    assert check.kind == ("square",)
+
+
+def test_control_may_be_of_one_role_only(tmp_path):
+    "No check points: an empty ControlPoints, not None"
+    points, check = read_control(control(tmp_path, text=CONTROL.replace("check", "control")))
+    assert (len(points), len(check)) == (3, 0)
+    assert (points + check).position.shape == (3, 3)
+
+
+def test_normals_are_optional_by_point(tmp_path):
+    "Given normals come out with length one, others as NaN"
+    lines = CONTROL.strip().splitlines()
+    lines = [lines[0] + ",normal_e,normal_n,normal_h", lines[1] + ",3,0,4", lines[3] + ",,,"]
+    points, _ = read_control(control(tmp_path, text="\n".join([*lines, ""])))
+    assert points.normal[0] == pytest.approx([0.6, 0.0, 0.8])
+    assert np.isnan(points.normal[1]).all()
+    with pytest.raises(ValueError, match=r"T01 .* normal .*not all zero"):
+        read_control(control(tmp_path, "3,0,4", "0,0,0", "\n".join([*lines, ""])))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("sigma_vertical", "sigma_v", "no column sigma_vertical; .* meant by 'sigma_v'"),
+        ("T02", "T01", "names T01 more than once"),
+        ("T02", "", "Line 3 .* has no name"),
+        ("44.4800", "nan", "Line 2 .* height 'nan', which is not a finite number"),
+        ("44.4800", "", "Line 2 .* height '', which is not a number"),
+        ("44.4800", "44;48", "Line 2 .* height '44;48'"),
+        ("circle", "disc", "T01 .* unknown kind 'disc'; known are circle, .* and board"),
+        ("check", "chek", "T02 .* unknown role 'chek'.* Is check meant"),
+        ("circle,0.6", "circle,600", "T01 .* size 600 m, .*millimetres"),
+        ("circle,0.6", "circle,0", "T01 .* size 0 m.* positive"),
+        ("0.003,0.004", "0,0.004", "T01 .* sigma_horizontal 0 m; it must be greater"),
+        ("0.003,0.004", "0.003,-1", "T01 .* sigma_vertical -1 m"),
+        (",circle,0.6,control", "", "Line 2 .* has 6 columns where the header has 9: .* cut off"),
+    ],
+)
+def test_bad_control_is_refused(tmp_path, old, new, message):
+    "Every bad cell is named with its line or point, its value, and what is expected"
+    with pytest.raises(ValueError, match=message):
+        read_control(control(tmp_path, old, new))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty"),
+        ("\n \n", "is empty"),
+        (CONTROL.splitlines()[0], "header but no points"),
+        (CONTROL.replace(",", ";"), "separated by semicolons"),
+        (CONTROL[: CONTROL.index("T03") + 20], "Line 4 .* cut off"),
+    ],
+)
+def test_control_without_content_is_refused(tmp_path, text, message):
+    "Empty, header only, other separators, cut off"
+    with pytest.raises(ValueError, match=message):
+        read_control(control(tmp_path, text=text))
+
+
+def test_a_sigma_in_millimetres_is_warned_of(tmp_path):
+    "A surveyed point with a sigma of 3 m corrects nothing: 3 mm is meant"
+    with pytest.warns(UserWarning, match="T01 .* sigma_horizontal 3 m .*millimetres"):
+        read_control(control(tmp_path, "0.003,0.004", "3,0.004"))
+
+
+# ---- surveys that lie beside the project
+
+
+@pytest.mark.parametrize(
+    ("name", "passes"),
+    [
+        ("wuhan_drive", 1),
+        ("practice_none", 1),
+        ("practice_time_offset", 1),
+        ("practice_lever_arm", 2),
+        ("practice_position_bump", 1),
+    ],
+)
+def test_shared_surveys_are_read_without_a_warning(name, passes):
+    "16 control and 8 check points, every cloud in the trajectory's own time, nothing to remark"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        survey = read_survey(shared("surveys", name))
+    assert (len(survey.control), len(survey.check)) == (16, 8)
+    assert [cloud.time_constant for cloud in survey.clouds] == [0.0] * passes
+    assert len(survey.trajectory.gaps) == passes - 1
+    assert survey.mounting.lever_arm == pytest.approx([0.1, -0.6, 0.4])
+
+
+def test_an_sbet_survey_says_what_was_assumed(folder):
+    "Datum, heights and heading of a geographic trajectory are written down"
+    source = shared("data", "leeward_sbet")
+    for name in ("sbet.out", "points.las"):
+        shutil.copy(source / name, folder / name)
+    toml(folder, "EPSG:32650", "EPSG:32611")
+    toml(folder, "pass-*.las", "points.las")
+    toml(folder, "trajectory.csv", "sbet.out")
+    survey = read_survey(exchange(folder, lambda e, n: (e - 212_000, n + 807_000)))
+    assert "taken as WGS 84, the datum of WGS 84 / UTM zone 11N" in survey.notes[1]
+    assert "ellipsoidal heights were kept" in survey.notes[2]
+    assert "meridian convergence" in survey.notes[3]

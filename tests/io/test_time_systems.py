@@ -1,0 +1,137 @@
+"""The constant between the cloud's gps_time and the trajectory's."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mlscorr.frames import attitude_from_angles
+from mlscorr.io.time_systems import match_times
+from mlscorr.survey import Trajectory
+
+WEEK_NUMBER = 2300  # the week of 2024-02-04
+OF_WEEK = np.linspace(413200.0, 413800.0, 500)  # s
+SYSTEMS = {
+    "week": OF_WEEK,
+    "standard": OF_WEEK + 604800.0 * WEEK_NUMBER - 1e9,
+    "gps": OF_WEEK + 604800.0 * WEEK_NUMBER,
+}
+
+
+def trajectory(start=OF_WEEK[0] - 5.0, end=OF_WEEK[-1] + 5.0):
+    gps_time = np.arange(start, end, 0.1)
+    level = attitude_from_angles(np.zeros(len(gps_time)), 0.0, 0.0)
+    return Trajectory(gps_time, np.zeros((len(gps_time), 3)), level)
+
+
+@pytest.mark.parametrize("trajectory_system", SYSTEMS)
+@pytest.mark.parametrize("cloud_system", SYSTEMS)
+def test_recovers_the_constant_between_any_two_systems(cloud_system, trajectory_system):
+    "Cloud and trajectory may each use any of three systems: the constant is found to the bit"
+    cloud, goal = SYSTEMS[cloud_system], SYSTEMS[trajectory_system]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # plain GPS seconds contradict either flag
+        match = match_times(
+            "a.laz", cloud, cloud_system == "standard", trajectory(goal[0] - 5, goal[-1] + 5)
+        )
+    assert match.constant == goal[0] - cloud[0]
+    assert (match.cloud_system, match.trajectory_system) == (cloud_system, trajectory_system)
+    assert match.inside == 1.0
+
+
+@pytest.mark.parametrize("is_standard", [False, True])
+@pytest.mark.parametrize("trajectory_system", SYSTEMS)
+def test_a_header_that_lies_is_overruled_and_warned_of(is_standard, trajectory_system):
+    "Real files carry plain GPS seconds under either flag: what fits is taken, and said"
+    goal = SYSTEMS[trajectory_system]
+    with pytest.warns(UserWarning, match="plain GPS seconds since 1980"):
+        match = match_times(
+            "Car.laz", SYSTEMS["gps"], is_standard, trajectory(goal[0] - 5, goal[-1] + 5)
+        )
+    assert match.cloud_system == "gps"
+    assert match.constant == goal[0] - SYSTEMS["gps"][0]
+
+
+def test_week_seconds_under_a_standard_flag_are_found():
+    "Equal times need no constant, but their size tells that the header is wrong"
+    with pytest.warns(UserWarning, match="header of a.laz says adjusted standard"):
+        match = match_times("a.laz", OF_WEEK, True, trajectory())
+    assert (match.constant, match.cloud_system) == (0.0, "week")
+
+
+def test_a_rollover_at_the_end_of_the_week_is_bridged():
+    "A drive through Saturday midnight: the trajectory counts on, the cloud starts again at 0 s"
+    match = match_times("a.laz", np.linspace(3.0, 80.0, 50), False, trajectory(604700.0, 604900.0))
+    assert match.constant == 604800.0
+    standard = np.linspace(604803.0, 604880.0, 50) + 604800.0 * WEEK_NUMBER - 1e9
+    match = match_times("a.laz", standard, True, trajectory(604700.0, 604900.0))
+    assert match.constant == 1e9 - 604800.0 * WEEK_NUMBER
+
+
+def test_a_few_times_outside_are_normal():
+    "The scanner is switched on before the POS: a tenth outside doesn't spoil the fit"
+    match = match_times("a.laz", OF_WEEK, False, trajectory(OF_WEEK[50], OF_WEEK[-1] + 1))
+    assert match.constant == 0.0
+    assert 0.85 < match.inside < 0.95
+
+
+def test_an_explicit_system_is_obeyed():
+    "Who sets cloud.gps_time gets it, whatever the header says, and without a warning"
+    match = match_times("a.laz", OF_WEEK, True, trajectory(), "week")
+    assert (match.constant, match.cloud_system) == (0.0, "week")
+
+
+def test_an_explicit_system_that_does_not_fit_is_refused():
+    "An order is not overruled by what would fit: the way back to auto is named"
+    with pytest.raises(ValueError, match=r'cloud.gps_time = "standard".*Try .*"auto"'):
+        match_times("a.laz", SYSTEMS["gps"], True, trajectory(), "standard")
+
+
+def test_times_of_another_day_are_refused_with_both_spans():
+    "Cloud and trajectory of different days: no constant may be invented"
+    with pytest.raises(ValueError, match=r"None of .*\[499600.000, 500200.000\].*413195.*days"):
+        match_times("a.laz", OF_WEEK + 86400.0, False, trajectory())
+
+
+def test_utc_is_not_taken_for_gps_time():
+    "18 leap seconds are no system of their own: a short trajectory tells, a long one can't"
+    with pytest.raises(ValueError, match="Only 42% of"):
+        match_times("a.laz", OF_WEEK[:26] - 18.0, False, trajectory(OF_WEEK[0], OF_WEEK[25]))
+
+
+def test_a_trajectory_that_covers_a_part_is_refused():
+    "With a third of the cloud covered, the file is said to be short, not the system wrong"
+    with pytest.raises(ValueError, match="covers a part of the cloud"):
+        match_times("a.laz", OF_WEEK, False, trajectory(OF_WEEK[0], OF_WEEK[170]))
+
+
+def test_a_cloud_without_times_is_refused():
+    "No points, no times: nothing can be worked out"
+    with pytest.raises(ValueError, match=r"a\.laz has no points"):
+        match_times("a.laz", np.empty(0), False, trajectory())
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    week=st.integers(1100, 3000),
+    start=st.floats(2_000.0, 600_000.0),
+    cloud_system=st.sampled_from(["week", "standard", "gps"]),
+    trajectory_system=st.sampled_from(["week", "standard", "gps"]),
+)
+def test_any_week_is_recovered(week, start, cloud_system, trajectory_system):
+    "From 2001 to 2037 the constant between two systems puts each time on its own to 1e-6 s"
+    of_week = start + np.linspace(0.0, 600.0, 50)
+    shift = {"week": 0.0, "standard": 604800.0 * week - 1e9, "gps": 604800.0 * week}
+    goal = of_week + shift[trajectory_system]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # plain GPS seconds contradict either flag
+        match = match_times(
+            "a.laz",
+            of_week + shift[cloud_system],
+            cloud_system == "standard",
+            trajectory(goal[0] - 5.0, goal[-1] + 5.0),
+        )
+    placed = of_week + shift[cloud_system] + match.constant
+    np.testing.assert_allclose(placed, goal, rtol=0, atol=1e-6)

@@ -1,0 +1,262 @@
+"""The diagnosis of the gap from files to files."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import mlscorr
+from mlscorr.cli import app
+from mlscorr.effects import make_effect
+from mlscorr.gap.infer.causes import Cause
+from mlscorr.gap.infer.error_models import STATED
+from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.signatures.simulators import as_believed, with_cause
+from mlscorr.io.las import read_chunks
+from mlscorr.simulate import Scenario, simulate
+from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator
+from tests.beds.shared import shared
+
+OFFSET = 0.02  # s
+KEYS = {
+    *("schema", "verdict", "gap", "headline", "advice", "where", "causes", "separability"),
+    *("closure", "next_data", "evidence", "innovations", "windows", "map", "channels"),
+    *("simulator", "left_out", "warnings", "notes", "name", "absent"),
+}
+
+
+@pytest.fixture(scope="module")
+def late(tmp_path_factory):
+    "A survey whose scanner clock is 20 ms off, without its truth"
+    scenario = Scenario(
+        drive={"duration": 30.0},
+        targets={"control": 12, "check": 3},
+        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+        effects=[{"name": "time_offset", "magnitude": OFFSET}],
+    )
+    folder = tmp_path_factory.mktemp("late") / "survey"
+    simulate(scenario, np.random.default_rng(3)).write(folder)
+    for truth in ("truth.json", "truth.npz"):
+        (folder / truth).unlink()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def diagnosed(late, tmp_path_factory):
+    "What the command writes for it"
+    out = tmp_path_factory.mktemp("diagnosed") / "out"
+    done = CliRunner().invoke(app, ["diagnose", str(late), "-o", str(out), "--json"])
+    assert done.exit_code == 0, done.output
+    return out
+
+
+def test_the_effect_that_acts_is_named_with_its_size(diagnosed):
+    "A clock that is 20 ms off is found, its size within the 95 % interval, and the gap closes"
+    told = json.loads((diagnosed / "gap.json").read_text())
+    assert told["schema"] == "mlscorr.gap/1"
+    assert set(told) == KEYS
+    assert told["verdict"]["label"] == "time_offset"
+    (offset,) = told["causes"][0]["parameters"]
+    assert abs(offset["estimate"] - OFFSET) < 1.96 * offset["sigma"]
+    assert offset["sigma"] < 0.002
+    closure = told["closure"]
+    assert closure["shrink"] > 0.9
+    assert closure["null_band"][1] < closure["before"]
+    assert abs(sum(told["where"][0]["share"]) - 1) < 1e-9
+
+
+def test_a_second_run_with_its_simulator_finds_nothing_more(late, diagnosed, tmp_path):
+    "With the simulator that the first run wrote nothing is left to find"
+    simulator = read_simulator(diagnosed / "simulator.toml")
+    assert [effect.name for effect in simulator.effects] == ["time_offset"]
+    again = mlscorr.diagnose(mlscorr.read_survey(late), simulator).document
+    assert again["verdict"]["label"] == "none"
+    assert again["simulator"]["effects"][0]["name"] == "time_offset"
+    assert again["closure"]["shrink"] == 0.0
+
+
+def test_the_page_and_the_numbers_say_the_same(diagnosed):
+    "The page opens with the verdict that the numbers hold, and asks nothing of the net"
+    page = (diagnosed / "gap.html").read_text()
+    assert "20" in page and "clock of the scanner" in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_the_diagnosis_never_opens_the_truth(late, tmp_path, diagnosed):
+    "With truth files that can't be read the result is the same, byte for byte"
+    folder = shutil.copytree(late, tmp_path / "late")
+    (folder / "truth.npz").mkdir()
+    (folder / "truth.json").mkdir()
+    done = CliRunner().invoke(app, ["diagnose", str(folder), "-o", str(tmp_path / "out"), "-q"])
+    assert done.exit_code == 0, done.output
+    one, two = ((out / "gap.json").read_bytes() for out in (diagnosed, tmp_path / "out"))
+    assert one == two
+
+
+def test_the_cloud_is_read_once(late, diagnosed, monkeypatch):
+    "Each file is decoded from its first to its last point, and no more, and the result is the same"
+    survey, decoded = mlscorr.read_survey(late), []
+
+    def counted(file):
+        for chunk in read_chunks(file):
+            decoded.append(len(chunk))
+            yield chunk
+
+    monkeypatch.setattr("mlscorr.pipeline.diagnosis.read_chunks", counted)
+    monkeypatch.setattr("mlscorr.pipeline.finding.read_chunks", None)
+    found = mlscorr.diagnose(survey).document
+    assert sum(decoded) == sum(file.points for file in survey.clouds)
+    told = json.loads((diagnosed / "gap.json").read_text())
+    assert found["closure"] == told["closure"]
+
+
+def test_a_mounting_that_differs_in_the_simulator_is_an_effect(late):
+    "A simulator that knows a lever arm 9 cm longer is one with a lever_arm effect of 9 cm"
+    survey = mlscorr.read_survey(late)
+    simulator = beliefs_of(survey)
+    arm = simulator.mounting.lever_arm + np.array([0.09, 0.0, 0.0])
+    believed = replace(simulator, mounting=replace(simulator.mounting, lever_arm=arm))
+    _, (effect,) = as_believed(survey, believed)
+    assert effect.name == "lever_arm"
+    assert np.allclose(effect.magnitude, [0.09, 0.0, 0.0], atol=1e-9)
+
+
+def test_a_cause_that_the_simulator_has_already_is_joined_with_it(late, tmp_path):
+    "15 ms and 5 ms more make one time_offset of 20 ms; a POS twice as bad has twice the sigma"
+    survey = mlscorr.read_survey(late)
+    effect = make_effect("time_offset", magnitude=0.015)
+    simulator = replace(beliefs_of(survey), effects=(effect,))
+    none = np.zeros(1)
+    kind = Signature(
+        type(effect), {}, ("magnitude",), ("s",), none + 1e-3, none[:, None], none, none
+    )
+    cause = Cause("time_offset", 1.0, (), ((kind, np.array([0.005])),), none, None, STATED)
+    (joined,) = with_cause(simulator, survey, cause).effects
+    assert abs(joined.magnitude - OFFSET) < 1e-12
+    worse = Cause("position_noise", 1.0, (), (), none, None, replace(STATED, scale=2.0))
+    pos = with_cause(simulator, survey, worse).pos
+    assert pos.position_sigma == 2 * survey.pos.position_sigma
+    window = (357710.0, 20.0, 12.0, "rise")
+    outage = Cause("position_noise", 1.0, (), (), none, None, replace(STATED, windows=(window,)))
+    improved = with_cause(simulator, survey, outage)
+    assert improved.pos.windows == (window,)
+    write_simulator(improved, tmp_path / "simulator.toml")
+    assert read_simulator(tmp_path / "simulator.toml").pos.windows == (window,)
+    assert as_believed(survey, improved)[0].pos.windows == (window,)
+
+
+def test_too_few_targets_are_told_with_the_plan(tmp_path):
+    "One target and no surface say nothing: what is missing, and what could be seen, is told"
+    scenario = Scenario(
+        drive={"duration": 8.0},
+        targets={"control": 1, "check": 1},
+        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    )
+    folder = tmp_path / "few"
+    simulate(scenario, np.random.default_rng(5)).write(folder)
+    with pytest.raises(ValueError, match="at least 12 targets") as error:
+        mlscorr.diagnose(mlscorr.read_survey(folder))
+    assert "time_offset" in str(error.value)
+
+
+def test_a_simulator_with_an_unknown_effect_is_refused(late, tmp_path):
+    "An effect that nobody knows is an error of usage that names the nearest known one"
+    (tmp_path / "simulator.toml").write_text('[[effects]]\nname = "time_ofset"\nmagnitude = 0.1\n')
+    arguments = ["diagnose", str(late), "-o", str(tmp_path / "out"), "--simulator"]
+    done = CliRunner().invoke(app, [*arguments, str(tmp_path / "simulator.toml")])
+    assert done.exit_code == 2
+    assert "time_offset" in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_reference_in_other_coordinates_is_an_error_of_input(tmp_path):
+    "A reference surface 100 m off is named as such, not taken for an effect"
+    import open3d as o3d
+
+    folder = shutil.copytree(shared("surveys", "practice_none"), tmp_path / "moved")
+    mesh = o3d.io.read_triangle_mesh(str(folder / "reference.ply"))
+    path = folder / "reference.ply"
+    path.chmod(0o644)
+    vertices = np.asarray(mesh.vertices) + np.array([0.0, 0.0, 100.0])
+    faces = np.asarray(mesh.triangles)
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
+    lines += [f"property double {axis}" for axis in "xyz"]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    lines += [f"{x:.4f} {y:.4f} {z:.4f}" for x, y, z in vertices]
+    lines += [f"3 {a} {b} {c}" for a, b, c in faces]
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(ValueError, match="coordinates"):
+        mlscorr.diagnose(mlscorr.read_survey(folder))
+
+
+def test_a_survey_is_planned_without_a_cloud(late, tmp_path):
+    "Before driving, the plan tells the smallest effects that show and what can't be told apart"
+    folder = shutil.copytree(late, tmp_path / "planned")
+    for cloud in folder.glob("*.laz"):
+        cloud.unlink()
+    text = (folder / "survey.toml").read_text()
+    start, end = text.index("[cloud]"), text.index("[trajectory]")
+    (folder / "survey.toml").write_text(text[:start] + text[end:])
+    done = CliRunner().invoke(app, ["plan", str(folder), "-o", str(tmp_path / "out"), "--json"])
+    assert done.exit_code == 0, done.output
+    plan = json.loads((tmp_path / "out" / "plan.json").read_text())
+    assert plan["schema"] == "mlscorr.plan/1"
+    (offset,) = plan["detectable"]["time_offset"]
+    assert 1e-4 < offset["detectable"] < 0.02
+    assert any({"lever_arm", "vertical_datum"} <= set(members) for members in plan["classes"])
+    refused = CliRunner().invoke(app, ["diagnose", str(folder), "-o", str(tmp_path / "other")])
+    assert refused.exit_code == 2
+    assert "cloud is missing" in refused.output
+
+
+def _with_control_moved(folder, out, names, away):
+    "The survey with some surveyed points moved to the east by metres"
+    shutil.copytree(folder, out)
+    lines = (out / "control.csv").read_text().splitlines()
+    for i, line in enumerate(lines):
+        name, east, *rest = line.split(",")
+        if name in names:
+            lines[i] = ",".join([name, str(float(east) + away), *rest])
+    (out / "control.csv").write_text("\n".join(lines) + "\n")
+    return mlscorr.read_survey(out)
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    "A survey in which nothing is wrong"
+    scenario = Scenario(
+        drive={"duration": 30.0},
+        targets={"control": 12, "check": 3},
+        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    )
+    folder = tmp_path_factory.mktemp("sound") / "survey"
+    simulate(scenario, np.random.default_rng(3)).write(folder)
+    return folder
+
+
+def test_a_moved_control_point_is_named_with_its_size(sound, tmp_path):
+    "A point surveyed 0.3 m too far east is the target_outlier, by name and to 2 cm"
+    survey = _with_control_moved(sound, tmp_path / "moved", ("T05",), 0.3)
+    found = mlscorr.diagnose(survey).document
+    assert found["verdict"]["label"] == "target_outlier"
+    assert found["causes"][0]["target"] == "T05"
+    east, north, height = (part["estimate"] for part in found["causes"][0]["parameters"])
+    assert np.allclose([east, north, height], [0.3, 0.0, 0.0], atol=0.02)
+
+
+def test_nothing_wrong_is_not_said_of_what_was_not_seen(sound, tmp_path):
+    "Where two stretches lie 3 m from their surveyed targets the verdict isn't none, and says where"
+    away = ("T04", "T05", "T06", "T10", "T11")
+    survey = _with_control_moved(sound, tmp_path / "outages", away, 3.0)
+    diagnosed = mlscorr.diagnose(survey)
+    found = diagnosed.document
+    assert found["verdict"]["label"] != "none"
+    if found["absent"]:  # else they were matched, and the rows tell of them
+        assert {name for run in found["absent"] for name in run["names"]} <= set(away)
+        assert "T05" in found["warnings"][0]
+        assert "T05" in found["next_data"][0]["survey"]
+        diagnosed.write(tmp_path / "out")
+        assert "not everything was seen" in (tmp_path / "out" / "gap.html").read_text()

@@ -1,0 +1,152 @@
+"""From two passes in a file each to one street: ties that a correction finds by itself."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mlscorr
+from mlscorr.estimate import believed_correction
+from mlscorr.pipeline.tying import tie_passes
+from mlscorr.simulate import Scenario, simulate
+from tests.beds import tie_streets as street_bed
+from tests.beds.reports import words
+
+
+@pytest.fixture(scope="module")
+def survey(tmp_path_factory):
+    "A street driven there and back, with an outage of 20 s on the way there, 4 control points"
+    folder = tmp_path_factory.mktemp("tied")
+    scenario = Scenario(
+        drive={"duration": 30.0, "speed": 6.0, "passes": [{}, {"direction": "back"}]},
+        targets={"control": 4, "check": 4},
+        scanner=[{"lines_per_second": 75, "points_per_line": 300}],
+        pos={"grade": "mems", "processing": "filtered", "outages": [[6.0, 18.0]]},
+    )
+    simulate(scenario, np.random.default_rng(5)).write(folder)
+    return mlscorr.read_survey(folder)
+
+
+@pytest.fixture(scope="module")
+def tied(survey):
+    return mlscorr.correct(survey)
+
+
+def misfit(result):
+    "Median size of the misclosures of used ties before and after. Units: m"
+    ties = result.estimate.ties
+    return (np.median(np.abs(values[ties.used])) for values in (ties.ties.misclosure, ties.after))
+
+
+def test_passes_come_together(tied):
+    "Planes that both passes saw are centimetres apart before, less than 5 mm after"
+    before, after = misfit(tied)
+    assert before > 0.02  # m
+    assert after < 0.005  # m
+    assert tied.estimate.ties.used.mean() > 0.9
+
+
+def test_check_points_fit_no_worse(survey, tied):
+    "With ties check points fit as well as without, to 2 mm, or better"
+    alone = mlscorr.correct(survey, ties="off")
+    assert alone.estimate.ties is None
+    assert "left out, as asked" in alone.estimate.untied
+    left = [np.linalg.norm(result.check["after"]["rmse"]) for result in (alone, tied)]
+    assert left[1] < left[0] + 0.002  # m
+
+
+def test_ties_alone_bring_passes_together(survey):
+    "Without control all points are check points, passes agree, and all rests on the POS"
+    with pytest.warns(UserWarning, match="relative only"):
+        result = mlscorr.correct(survey, ties="only")
+    assert result.control["n"] == 0
+    assert result.check["n_surveyed"] == 8
+    assert list(misfit(result))[1] < 0.005  # m
+
+
+def test_the_report_tells_what_ties_did(tied, tmp_path):
+    """report.json has misfits by pair of passes, and shares that add up to one; the page shows the
+    ties on a map, and a wall as each pass saw it
+    """
+    section = tied.write(tmp_path / "out")["ties"]
+    text = words((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
+    assert "What two passes both saw" in text
+    assert "scanned by pass 1" in text and "scanned by pass 2" in text
+    assert (tmp_path / "out" / "pictures" / "ties.png").exists()
+    assert [row["passes"] for row in section["pairs"]] == [[1, 2]]
+    assert section["pairs"][0]["after"]["median"] < 0.005  # m
+    assert sum(section["share"].values()) == pytest.approx(1.0)
+    assert 1 <= section["sufficient_control"] <= 4
+
+
+def test_one_pass_has_no_ties(street):
+    "A survey of one pass is corrected as without ties, and ties alone are refused in a sentence"
+    survey = mlscorr.read_survey(street)
+    result = mlscorr.correct(survey)
+    assert result.estimate.ties is None
+    with pytest.raises(ValueError, match=r"No two passes .* saw the same thing"):
+        mlscorr.correct(survey, ties="only")
+
+
+def test_one_pass_is_named_as_the_reason_in_terminal_report_and_page(commanded):
+    "Nothing was scanned twice: what that costs and what a second pass brings"
+    process, out = commanded
+    report = json.loads(process.stdout)
+    assert report["ties"]["n"] == report["ties"]["used"] == 0
+    reason = report["ties"]["reason"]
+    assert reason.startswith("Nothing was scanned twice") and "A second pass" in reason
+    assert reason in report["notes"]
+    assert reason in " ".join(process.stderr.split())
+    assert reason in words((out / "report.html").read_text(encoding="utf-8"))
+
+
+def tied_street(features):
+    "The bed's street with some TieFeatures, under what its POS states"
+    recorded = street_bed.survey()
+    return tie_passes(recorded, believed_correction(recorded.trajectory), features)
+
+
+def of_second(features, values):
+    "Values (n, 3) at the features of the second pass, else zero"
+    return np.where(features.pass_number[:, None] == 2, values, 0.0)
+
+
+def test_passes_that_never_meet_are_named():
+    "Streets 500 m apart: no tie, how many features were compared, and what would help; no warning"
+    features = street_bed.features()
+    apart = replace(features, centre=features.centre + of_second(features, [0.0, 500.0, 0.0]))
+    estimate = tied_street(apart)
+    assert estimate.ties is None
+    assert f"twice, or hardly: 0 of {len(features)} planes and poles of 2 passes" in estimate.untied
+    assert estimate.untied not in estimate.warnings
+
+
+def test_tiles_of_one_visit_are_not_blamed_for_having_no_ties():
+    "One drive in two files, whose ends meet: nothing was scanned at another time"
+    features = street_bed.features(1, 1)
+    late = features.gps_time > np.median(features.gps_time)
+    estimate = tied_street(replace(features, pass_number=1 + late))
+    assert estimate.untied.startswith("Nothing was scanned twice, or hardly: 0 of")
+    assert estimate.untied not in estimate.warnings
+
+
+def test_passes_that_meet_and_agree_nowhere_are_warned_of():
+    "Walls that the second pass saw from behind are no ties: a warning that names calibrate"
+    features = street_bed.features()
+    back = features.direction - of_second(features, 2 * features.direction)
+    estimate = tied_street(replace(features, direction=back))
+    assert estimate.ties is None
+    assert estimate.untied.startswith("Nothing that two passes both saw agrees")
+    assert "mlscorr calibrate" in estimate.untied
+    assert estimate.untied in estimate.warnings
+
+
+def test_a_tunnel_names_the_direction_that_nobody_holds():
+    "Walls and road along the way, their normals noisy: east is unheld where a pass lacks control"
+    features = street_bed.features()
+    features = features[(np.abs(features.direction[:, 0]) < 0.1) & (features.kind == "plane")]
+    estimate = tied_street(features)
+    (sentence,) = [text for text in estimate.warnings if "unheld" in text]
+    assert "E, N, H = 1.00" in sentence.replace("-", "")
+    assert estimate.untied == ""

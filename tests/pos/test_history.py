@@ -1,0 +1,69 @@
+"""When drift starts anew, and when it is said to grow."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mlscorr.pos import drift_history, stated_sigma
+from mlscorr.survey import Pos, Trajectory
+
+START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
+TIME = np.arange(0.0, 200.0, 0.1)
+OUTAGE = (TIME >= 80.0) & (TIME < 120.0)
+
+
+def drive(sigma=None, error=None):
+    "200 s to the north; sigma (n,) stands for all axes"
+    path = CORNER + np.outer(TIME, [0.0, 10.0, 0.0])
+    path = path if error is None else path - error[:, None] * [1.0, 0.5, -0.5]
+    sigma = None if sigma is None else np.repeat(sigma[:, None], 3, axis=1)
+    return Trajectory(START + TIME, path, Rotation.identity(len(TIME)), sigma)
+
+
+def grown(size):
+    return np.where(OUTAGE, size * (np.maximum(TIME - 80.0, 0.0) / 40.0) ** 1.5, 0.0)
+
+
+def test_sigma_tells_start_and_end_of_an_outage():
+    "Sigma that grows from 80 s and falls at 120 s: drift begins there, and starts anew here"
+    history = drift_history(drive(0.02 + grown(1.0)))
+    assert history.is_stated
+    assert history.restarts == pytest.approx([START + 120.0], abs=0.11)
+    assert history.starts[0] == pytest.approx(START + 82.0, abs=2.0)  # s: when it has doubled
+    assert np.isinf(history.starts[1])
+
+
+def test_a_step_and_a_fall_of_sigma_are_one_restart():
+    "The path steps when sigma falls: one restart, at the step"
+    history = drift_history(drive(0.02 + grown(1.0), grown(0.8)))
+    assert len(history.steps) == 1
+    assert history.restarts == pytest.approx(history.steps.middle)
+
+
+def test_without_sigma_each_segment_may_grow_at_once():
+    "Steps alone part the drive; nothing says when drift begins"
+    history = drift_history(drive(None, grown(0.8)))
+    assert not history.is_stated
+    assert history.restarts == pytest.approx([START + 119.95], abs=0.11)
+    assert history.starts == pytest.approx([START, history.restarts[0]])
+
+
+def test_clocks_leap_at_restarts_and_drift_grows_from_zero():
+    "Across a restart lags are thousands of correlation times; sigma grows as t^1.5 from a start"
+    trajectory = drive(None, grown(0.8))
+    starts = np.array([START + 80.0, np.inf])
+    stated = stated_sigma(trajectory, Pos(position_sigma=0.5), starts=starts)
+    leaps = np.diff(stated.clock)
+    assert np.sum(leaps > 1e6) == 1 and np.all(leaps > 0)
+    assert np.all(np.diff(stated.growth_clock) > 0)
+    sigma = stated.grown(1.5)[:, 0]
+    assert not sigma[TIME < 79.9].any() and not sigma[TIME > 120.1].any()
+    assert sigma[np.searchsorted(TIME, 110.0)] == pytest.approx(0.5 * 0.5**1.5, rel=0.01)  # m
+
+
+def test_a_history_is_worked_out_once_for_a_trajectory():
+    "As long as somebody holds it"
+    trajectory = drive()
+    history = drift_history(trajectory)
+    assert drift_history(trajectory) is history
+    assert drift_history(drive()) is not history

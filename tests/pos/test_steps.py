@@ -1,0 +1,74 @@
+"""Fall-backs of a filtered POS stand in its recorded path."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mlscorr.pos import find_steps
+from mlscorr.survey import Trajectory
+
+START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
+
+
+def city_drive(rate=10.0, seconds=300.0):
+    "Times, and a path at UTM size with turns and braking of a car in town"
+    time = np.arange(0.0, seconds, 1 / rate)
+    heading = 0.8 * np.sin(time / 15.0)
+    speed = 8.0 + 5.0 * np.sin(time / 11.0)
+    way = speed[:, None] * np.column_stack([np.sin(heading), np.cos(heading), 0.02 * heading])
+    return time, CORNER + np.cumsum(way, axis=0) / rate
+
+
+def outage(time, begin=100.0, end=160.0, size=(1.2, -0.8, 0.4)):
+    "An error that grows from nothing and is gone when GNSS is back"
+    share = np.where((time >= begin) & (time < end), (time - begin) / (end - begin), 0.0)
+    return share[:, None] ** 1.5 * size
+
+
+def recorded(time, path):
+    return Trajectory(START + time, path, Rotation.identity(len(time)))
+
+
+@pytest.mark.parametrize("rate", [5.0, 10.0, 50.0, 200.0])
+def test_a_fall_back_is_found_with_its_time_and_size(rate):
+    "One step of 1.5 m at the end of an outage, to 3 cm, at any rate of the trajectory"
+    time, path = city_drive(rate)
+    steps = find_steps(recorded(time, path - outage(time)))
+    assert len(steps) == 1
+    assert steps.before[0] < START + 160.0 <= steps.after[0] + 1e-6
+    assert steps.size[0] == pytest.approx([1.2, -0.8, 0.4], abs=0.03)  # m
+
+
+def test_a_fall_back_over_some_epochs_is_one_step():
+    "A filter that takes 0.2 s to fall back at 50 Hz makes one step of the whole size"
+    time, path = city_drive(50.0)
+    error = outage(time)
+    late = (time >= 160.0) & (time < 160.2)
+    error[late] = np.outer(1 - (time[late] - 160.0) / 0.2, [1.2, -0.8, 0.4])
+    steps = find_steps(recorded(time, path - error))
+    assert len(steps) == 1
+    assert steps.size[0] == pytest.approx([1.2, -0.8, 0.4], abs=0.1)  # m
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_nothing_else_is_a_step(seed):
+    "Turns, braking, noise of 5 mm and GNSS updates of 2 cm each second are none"
+    time, path = city_drive(10.0)
+    rng = np.random.default_rng(seed)
+    updates = np.repeat(rng.normal(0.0, 0.02, (300, 3)), 10, axis=0)
+    assert len(find_steps(recorded(time, path + updates))) == 0
+    assert len(find_steps(recorded(time, path + rng.normal(0.0, 0.005, path.shape)))) == 0
+
+
+def test_time_stamps_that_jitter_make_no_steps():
+    "10 ms of jitter in the time stamps is no fall-back"
+    time, path = city_drive(10.0)
+    late = time + np.random.default_rng(1).uniform(-0.01, 0.01, len(time))
+    assert len(find_steps(recorded(late, path))) == 0
+
+
+def test_passes_are_looked_at_apart():
+    "What a vehicle drove in a gap of the trajectory is no step"
+    time, path = city_drive(10.0)
+    apart = np.where(time > 150.0, time + 500.0, time)
+    assert len(find_steps(recorded(apart, path + np.where(time > 150.0, 300.0, 0.0)[:, None]))) == 0

@@ -1,0 +1,78 @@
+"""The first screen of a diagnosis: what is wrong, how sure, how far the gap shrinks."""
+
+import pytest
+
+from mlscorr.report.gap.verdict import advice, facts, verdict
+from tests.beds.gap_documents import KINDS, gap_document
+
+
+def summary(document):
+    "What the first screen says, in one row of words"
+    told = [*verdict(document).sentences, *(text for one in facts(document) for text in one)]
+    title, sentences = advice(document)
+    return " ".join([verdict(document).kicker, *told, title, *sentences])
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        ("effect", ["The clock of the scanner is 4.5 ms ± 0.5 ms behind", "98 in 100"]),
+        ("vector", ["the scanner really sits 93 mm ± 4 mm farther left."]),
+        ("none", ["Nothing is wrong that this survey could show", "97 in 100", "Of 100 surveys"]),
+        ("unknown", ["no known effect explains", "height error that grows with speed squared"]),
+        ("unknown", ["91 in 100", "the nearest known effect, lever arm", "16.4 mm → 1.9 mm"]),
+        ("pair", ["Two things are wrong", "2.1 ms ± 0.4 ms ahead of", "93 mm ± 4 mm farther left"]),
+        ("noise", ["Noisier than stated", "7.1 mm ± 0.4 mm of scatter", "more than 99 in 100"]),
+        ("alike", ["One of two is wrong", "Either the recorded lever arm", "31 mm ± 7 mm above"]),
+        ("alike", ["97 in 100"]),  # of the one or the other: 61 + 36
+        ("bump", ["between gps_time 413215 s and 413225 s: 17.2 cm ± 2.0 cm to the east", "88 in"]),
+        ("bump", ["Not ruled out: something unknown (3 in 100)."]),
+        ("too little", ["It can't be told yet", "Only 2 targets were seen; 12 are needed."]),
+    ],
+)
+def test_the_first_screen_says_what_is_wrong(kind, expected):
+    "The verdict in words, its size with its sigma, and how sure it is, are the document's"
+    text = summary(KINDS[kind]())
+    assert [piece for piece in expected if piece not in text] == []
+
+
+@pytest.mark.parametrize("kind", ["effect", "pair", "noise", "alike", "bump"])
+def test_the_first_screen_says_how_far_the_gap_shrinks_and_what_to_do(kind):
+    "Gap before and after on held-out data, its share and interval, the headline, the advice"
+    document = KINDS[kind]()
+    text = summary(document)
+    assert "16.4 mm → 1.9 mm" in text
+    assert "98.7 % of the squared gap is gone (95 %: 93 % to 99.4 %)." in text
+    assert document["headline"] in text
+    assert f"What to do now {' '.join(document['advice'])}" in text
+
+
+def test_without_advice_the_page_says_what_to_measure():
+    "Nothing is made up where the document holds no advice"
+    found = advice(gap_document(advice=[]))
+    assert found == ("What to measure next", ["Measure the same road at twice the speed."])
+    assert advice(gap_document(advice=[], next_data=[]))[1] == []
+
+
+def test_a_pattern_within_chance_is_explained():
+    "A cause named while the gap lies in the null band says that its pattern gives it away"
+    gap = {"before": 2.4, "after": -1.5, "unit": "mm", "null_band": [1.2, 3.7]}
+    said = "What gives it away is its pattern, not its size."
+    assert said in summary(gap_document(gap=gap))
+    assert said not in summary(gap_document())
+
+
+@pytest.mark.parametrize(
+    ("shrink", "interval", "said"),
+    [
+        (0.42, [0.1, 0.7], "42 % of the squared gap is gone (95 %: 10 % to 70 %)."),
+        (1.03, [0.97, 1.1], "All of the squared gap is gone (95 %: 97 % to 100 %)."),
+        (-0.2, [-0.5, 0.1], "The squared gap grew by 20 % (95 %: −50 % to 10 %)."),
+        (0.9, [None, None], "90 % of the squared gap is gone."),
+    ],
+)
+def test_a_gap_that_shrinks_or_grows_is_said_in_words(shrink, interval, said):
+    "More than all can't be gone; a gap that grew is called so"
+    document = gap_document()
+    document["closure"] |= {"shrink": shrink, "interval": interval}
+    assert said in summary(document)

@@ -1,0 +1,42 @@
+"""Open3D in a process of its own."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from mlscorr.cli.installation import _rendering
+from mlscorr.report.render import PictureOptions, draw, open3d_engine, sheet
+from tests.beds.street_of_points import SIZE
+
+
+@pytest.mark.parametrize(
+    "program, words",
+    [
+        ("import os; os.abort()", "exit code -6"),
+        ("import time; time.sleep(60)", "no picture within"),
+        ("raise ImportError('libGL.so.1')", "libGL.so.1"),
+        ("pass", "without a picture"),
+    ],
+)
+def test_a_broken_driver_costs_a_warning_and_no_picture(
+    survey, estimated, drawn, program, words, tmp_path, monkeypatch
+):
+    "Where the child aborts, hangs or lacks a library the z-buffer draws the same picture"
+    child = tmp_path / "child.py"
+    child.write_text(program)
+    monkeypatch.setattr(open3d_engine, "CHILD", child)
+    hurried = partial(open3d_engine.draw_pair, timeout=1.0)
+    monkeypatch.setattr(sheet, "draw_pair", hurried)
+    with pytest.warns(UserWarning, match=words):
+        (picture,) = draw(survey, *estimated, PictureOptions(SIZE), ["overview"], "open3d")
+    np.testing.assert_array_equal(picture.before, drawn[0].before)
+
+
+def test_open3d_draws_what_the_z_buffer_draws(survey, estimated, drawn):
+    "Both engines put points of the same colours on the same pixels, but for their rims"
+    if not (finding := _rendering()).ok:
+        pytest.skip(f"Open3D draws no off-screen picture here: {finding.found}")
+    (picture,) = draw(survey, *estimated, PictureOptions(SIZE), ["overview"], "open3d")
+    painted, drawn_here = ((p != 255).any(axis=2) for p in (picture.before, drawn[0].before))
+    assert (painted & drawn_here).sum() > 0.8 * (painted | drawn_here).sum()

@@ -1,0 +1,94 @@
+"""The page of a comparison: the methods in words, a table and a figure."""
+
+import numpy as np
+import pytest
+
+from mlscorr.report import basis, verdict, write_comparison
+from mlscorr.report.comparison_page import comparison_figure, ranking
+
+
+def fake(scores, **changes):
+    "A document of compare.json with these 3D RMSE (m)"
+    kinds = {"raw": "none", "lsc": "collocation", "ls-2": "over time"}
+    rows = []
+    for name, value in scores.items():
+        axes = None if value is None else [value / np.sqrt(3)] * 3
+        score = {"n": 8, "rmse": axes, "min": axes, "max": axes, "rmse_3d": value}
+        rows.append(
+            {
+                "name": name,
+                "kind": kinds.get(name, "one move"),
+                "about": f"About {name} <&>.",
+                "status": "determined" if value is not None else "not determined",
+                "why": None if value is not None else "All targets lie on one <line>.",
+                "check": score,
+                "control": score,
+                "seconds": None if value is None else 0.1,
+                "warnings": [],
+                "details": {},
+            }
+        )
+    document = {"name": "street", "crs": None, "control_points": 9, "check_points": 8}
+    document |= {"scored_by": "check", "cross_validation_groups": 0, "methods": rows, "unseen": []}
+    return document | changes
+
+
+@pytest.mark.parametrize(
+    ("scores", "words"),
+    [
+        ({"raw": 0.5, "shift": 0.2, "lsc": 0.02}, "Best is lsc (about lsc <&>): 3D RMSE 0.020 m"),
+        ({"raw": 0.5, "shift": 0.0215, "lsc": 0.02}, "Best are lsc and shift: 3D RMSE 0.020 m"),
+        ({"raw": 0.5, "ls-2": 0.02, "lsc": 0.03}, "lsc, with 0.030 m, is 0.010 m behind."),
+        ({"raw": 0.021, "shift": 0.02, "lsc": 0.03}, "No method improves this cloud by 2 mm"),
+        ({"raw": 0.5, "affine": None, "lsc": 0.02}, "against 0.500 m without any correction."),
+    ],
+)
+def test_the_verdict_says_what_the_numbers_say(scores, words):
+    "Best, tie, our own method behind, nothing gained: each in plain words"
+    assert words in " ".join(verdict(fake(scores)))
+
+
+def test_the_page_is_one_file_that_sorts_and_tells_what_is_missing(tmp_path):
+    "No address leads out of the page, its table is sorted, and text from outside is escaped"
+    path = tmp_path / "compare.html"
+    write_comparison(path, fake({"raw": 0.5, "shift": 0.2, "affine": None, "lsc": 0.02}))
+    page = path.read_text()
+    assert "http:" not in page.replace("http://www.w3.org", "") and "https:" not in page
+    assert "default-src 'none'; img-src data:;" in page
+    assert "All targets lie on one &lt;line&gt;." in page
+    rows = page[page.index("<tbody>") : page.index("</tbody>")]
+    assert rows.index(">lsc<") < rows.index(">shift<") < rows.index(">raw<")
+    assert "table.sortable" in page
+    assert 'src="data:image/svg+xml' in page
+
+
+def test_methods_are_ranked_and_those_without_a_score_are_not():
+    "By their 3D RMSE; a method that could not be fitted has no place"
+    document = fake({"raw": 0.5, "affine": None, "lsc": 0.02, "shift": 0.2})
+    assert [row["name"] for row in ranking(document)] == ["lsc", "shift", "raw"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "scored by 8 check points that took no part"),
+        ({"scored_by": "control"}, "this is the mere fit"),
+        (
+            {"scored_by": "cross_validated", "check_points": 1, "cross_validation_groups": 9},
+            "There is only 1 check point, so the scores are cross-validated over all points: "
+            "control points, each left out in turn",
+        ),
+    ],
+)
+def test_what_the_scores_rest_on_is_one_sentence(changes, words):
+    "Check points, cross-validation, or the fit alone"
+    assert words in basis(fake({"raw": 0.5, "lsc": 0.02}, **changes))
+
+
+def test_each_method_stands_at_its_rmse():
+    "A mark for each method on each axis, the best at the top, to 1e-12 m"
+    panels = comparison_figure(fake({"raw": 0.5, "lsc": 0.02})).axes
+    for panel in panels:
+        marks = [line for line in panel.lines if line.get_marker() in "ox"]
+        places = {float(line.get_ydata()[0]): line.get_xdata()[0] for line in marks}
+        np.testing.assert_allclose([places[0.0], places[1.0]], np.array([0.02, 0.5]) / np.sqrt(3))

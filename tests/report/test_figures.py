@@ -1,0 +1,28 @@
+"""All figures of a correction."""
+
+from mlscorr.report import write_pictures
+from mlscorr.report.figures import drawings
+from tests.beds.reports import drive, fabricate
+from tests.beds.tied_reports import tied_report
+
+
+def test_pictures_are_written_as_png(tmp_path):
+    "The same figures for another document"
+    paths = write_pictures(tmp_path, *fabricate(drive())[1:])
+    assert [path.name for path in paths] == ["correction.png", "map.png", "residuals.png"]
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
+
+
+def test_ties_have_a_map_of_their_own(tmp_path):
+    "ties.png and the page's figure, where something was seen twice"
+    _, correction, report, residuals = tied_report()
+    assert "ties" in drawings(correction, report, residuals)
+    paths = write_pictures(tmp_path, correction, report, residuals)
+    assert "ties.png" in [path.name for path in paths]
+
+
+def test_the_page_has_four_figures_as_svg():
+    "Position, attitude, map and residuals, each below 1 MB"
+    figures = drawings(*fabricate(drive())[1:])
+    assert list(figures) == ["correction", "attitude", "map", "residuals"]
+    assert all(b"<svg" in picture and len(picture) < 1e6 for picture in figures.values())

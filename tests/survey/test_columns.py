@@ -1,0 +1,22 @@
+"""Records of columns: each is its own, whatever it holds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.survey.columns import Columns
+
+
+@dataclass(frozen=True, eq=False)
+class Heights(Columns):
+    "A record of one column"
+
+    height: np.ndarray
+
+
+def test_records_are_told_apart_as_keys():
+    "Two records with other values are two keys of a cache, and one is the same as itself"
+    low, high = Heights(np.zeros(3)), Heights(np.ones(3))
+    assert low != high
+    assert {low: "low", high: "high"}[low] == "low"
+    assert np.array_equal(high[1:].height, np.ones(2))

@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from mlscorr.targets.clusters import bright_components, components, connected
+from mlscorr.targets.settings import SETTINGS
+
+ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
+
+
+def test_bright_components_are_separate_patches():
+    "Two bright patches 0.5 m apart are two components; their union comes at no level"
+    rng = np.random.default_rng(0)
+    xyz = np.column_stack([rng.uniform(-2, 2, (8000, 2)), np.zeros(8000)])
+    first = np.abs(xyz[:, :2] - [-0.5, 0]).max(axis=1) < 0.25
+    second = np.abs(xyz[:, :2] - [0.5, 0]).max(axis=1) < 0.25
+    intensity = np.where(first | second, 900.0, 100.0)
+    parts = [set(rows) for _, rows in bright_components(xyz + ORIGIN, intensity, 1.0)]
+    assert parts == [set(np.flatnonzero(first)), set(np.flatnonzero(second))] or parts == [
+        set(np.flatnonzero(second)),
+        set(np.flatnonzero(first)),
+    ]
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_points_as_near_as_the_link_belong_together(dimensions):
+    "A chain of points 8 cm apart is one component by 12 cm, and three where two links are broken"
+    chain = np.zeros((30, dimensions))
+    chain[:, 0] = 0.08 * np.arange(30)
+    assert len(np.unique(connected(chain, 0.12))) == 1
+    broken = np.delete(chain, [9, 10, 19, 20], axis=0)
+    assert len(np.unique(connected(broken, 0.12))) == 3
+    assert connected(chain[:0], 0.12).size == 0
+
+
+def test_components_of_too_few_points_are_left_out():
+    "Two patches, one with a point less than a target needs: the other comes alone, in order"
+    n = SETTINGS.smallest_count
+    rng = np.random.default_rng(1)
+    points = rng.uniform(0, 0.1, (2 * n - 1, 2))
+    points[n:] += 5.0
+    (part,) = components(points, 0.2)
+    assert part.tolist() == list(range(n))

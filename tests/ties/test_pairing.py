@@ -1,0 +1,142 @@
+"""Which features are the same thing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.survey import TieFeatures
+from mlscorr.ties import pair_features, residuals
+from tests.beds import tie_streets as street
+
+NOTHING = np.zeros(3)
+
+
+def walls(place, number, normal=(1.0, 0.0, 0.0), time=None):
+    "A plane at each place (n, 3), of the passes (n,)"
+    place, number = street.ORIGIN + np.array(place, float), np.array(number)
+    n = len(place)
+    return TieFeatures(
+        pass_number=number,
+        source=number - 1,
+        kind=np.full(n, "plane"),
+        gps_time=street.START + 100.0 * number if time is None else np.array(time),
+        centre=place,
+        direction=np.broadcast_to(np.array(normal), (n, 3)),
+        variance=np.full(n, 1e-6),
+        tilt=np.full(n, 1e-4),
+        extent=np.full(n, 0.3),
+        points=np.full(n, 100),
+        intensity=np.full(n, 90.0),
+        sweep=np.zeros((n, 3)),
+    )
+
+
+def pair(features, sigma, radius=2.0, correction=NOTHING, **options):
+    "Ties of features with the same correction and sigma everywhere"
+    n = len(features)
+    correction = np.broadcast_to(correction, (n, 3))
+    return pair_features(features, correction, np.full(n, sigma), radius, **options)
+
+
+def test_undisturbed_passes_agree_within_their_sigma():
+    "Ties of two passes without any error are zero within stated sigmas, at 3 mm and less"
+    ties = pair(street.features(), 0.02)
+    assert len(ties) > 300
+    ratio = ties.misclosure / ties.sigma
+    planes = ties.kind == "plane"
+    assert np.mean(np.abs(ratio) < 3) > 0.97
+    assert np.median(ties.sigma[planes]) < 0.0035
+    assert set(map(tuple, ties.pass_number)) == {(1, 2)}
+
+
+def test_metres_and_degrees_apart_true_pairs_prevail():
+    "Passes 1.5 m apart with a boresight off by 2 deg: with the true correction all are paired"
+    wrong, truth = street.misplaced(street.features(), (0.8, -1.0, 0.8), (1.0, 1.5, -1.0))
+    known = pair_features(wrong, truth, np.full(len(wrong), 0.05), 2.0)
+    assert len(known) > 300
+    assert np.mean(np.abs(residuals(known, truth)) < 0.02) > 0.98
+    blind = pair(wrong, 0.7)
+    assert len(blind) > 150
+    assert np.mean(np.abs(residuals(blind, truth)) < 0.05) > 0.5
+
+
+def test_a_correction_closes_what_it_should():
+    "The misclosure of a wall 0.4 m off is that, whatever was believed when it was paired"
+    features = walls([[0, 0, 0], [0.4, 0.2, 0.1]], [1, 2])
+    for believed in (0.0, 0.3):
+        correction = np.array([[believed, 0, 0], [0.0, 0, 0]])
+        ties = pair_features(features, correction, np.full(2, 0.3), 1.0)
+        assert np.isclose(ties.misclosure, 0.4, atol=1e-9).all()
+        assert np.isclose(residuals(ties, correction), 0.4 - believed, atol=1e-9).all()
+
+
+def test_a_repeated_facade_is_not_paired_with_the_next_window():
+    "Reveals 1.2 m apart, of which each pass sees every other: no pair where sigma is 0.2 m"
+    places = [[1.2 * i, 8.0, 3.0] for i in range(20)]
+    features = walls(places, [1 + i % 2 for i in range(20)])
+    assert len(pair(features, 0.2)) == 0
+    assert len(pair(features, 0.6)) > 0
+
+
+def test_a_parallel_street_is_another():
+    "Facades of the next street, 40 m aside and beyond any radius, are no partners"
+    features = walls([[0, 0, 2], [40.0, 0, 2]], [1, 2])
+    assert len(pair(features, 20.0, radius=10.0)) == 0
+    assert len(pair(features, 20.0, radius=50.0)) == 1
+
+
+def test_the_nearest_of_both_is_a_pair():
+    "Of two walls 0.3 m behind each other each finds itself in the other pass, not its neighbour"
+    features = walls([[0, 0, 0], [0.3, 0, 0], [0.08, 0, 0], [0.38, 0, 0]], [1, 1, 2, 2])
+    ties = pair(features, 0.2)
+    assert np.array_equal(ties.feature, [[0, 2], [1, 3]])
+
+
+def test_walls_seen_from_both_sides_are_two():
+    "A thin wall's other side faces away: no pair"
+    features = walls([[0, 0, 0], [0.1, 0, 0]], [1, 2])
+    turned = replace(features, direction=features.direction * np.array([[1], [-1]]))
+    assert len(pair(features, 0.2)) == 1
+    assert len(pair(turned, 0.2)) == 0
+
+
+@pytest.mark.parametrize(("degrees", "count"), [(5.0, 1), (12.0, 0)])
+def test_directions_are_parallel_within_the_angle(degrees, count):
+    "Up to the angle that is asked for, two walls may be the same"
+    features = walls([[0, 0, 0], [0.1, 0, 0]], [1, 2])
+    turn = np.radians(degrees)
+    direction = np.array([[1.0, 0, 0], [np.cos(turn), np.sin(turn), 0]])
+    features = replace(features, direction=direction)
+    assert len(pair(features, 0.2, angle=np.radians(8.0))) == count
+
+
+def test_one_pass_has_no_ties():
+    "What a single pass sees once is tied to nothing"
+    assert len(pair(street.features(1, 1), 1.0)) == 0
+
+
+def test_a_loop_is_tied_to_itself():
+    "The same pass 45 s later sees the wall again; 5 s later it still sees it for the first time"
+    places = [[0, 0, 0], [0.05, 0, 0], [0.02, 0, 0]]
+    time = street.START + np.array([0.0, 5.0, 45.0])
+    ties = pair(walls(places, [1, 1, 1], time=time), 0.2)
+    assert len(ties) == 1
+    assert ties.gps_time[0, 1] == time[2]
+
+
+def test_each_pass_gives_a_partner():
+    "Seen by four passes, a wall has six ties"
+    places = [[0.01 * i, 0, 0] for i in range(4)]
+    assert len(pair(walls(places, [1, 2, 3, 4]), 0.2)) == 6
+
+
+def test_a_pole_ties_both_directions_across_it():
+    "Two rows across the axis, none along it, and never with a plane"
+    features = walls([[0, 0, 0], [0.1, 0.05, 0.4], [0.1, 0.0, 0.0]], [1, 2, 2], (0.0, 0.0, 1.0))
+    features = replace(features, kind=np.array(["pole", "pole", "plane"]))
+    ties = pair(features, 0.2)
+    assert np.array_equal(ties.kind, ["pole", "pole"])
+    assert np.abs(ties.direction[:, 2]).max() < 1e-12
+    shift = np.linalg.solve(ties.direction[:, :2], ties.misclosure)
+    assert np.allclose(shift, [0.1, 0.05], atol=1e-9)

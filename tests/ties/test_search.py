@@ -1,0 +1,38 @@
+"""Ties of a survey of which only the POS's sigma is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.survey import Pos
+from mlscorr.ties import feature_sigma, residuals, search_ties
+from tests.beds import tie_streets as street
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.9, -0.8, 0.6)])
+def test_passes_of_a_poor_pos_are_tied(shift):
+    "Passes 1.3 m apart whose POS states 0.5 m are tied within 2 cm, cars and all"
+    wrong, truth = street.misplaced(street.features(), shift)
+    survey = replace(street.survey(), pos=Pos(position_sigma=0.5))
+    search = search_ties(survey, wrong)
+    assert len(search.ties) > 250
+    assert np.mean(np.abs(residuals(search.ties, truth)) < 0.02) > 0.97
+    assert len(search.refused) < 0.1 * len(search.ties)
+
+
+def test_the_survey_limits_the_search():
+    "A POS that states 50 m is searched to the survey's radius alone"
+    survey = replace(street.survey(), pos=Pos(position_sigma=50.0), search_radius=2.0)
+    assert search_ties(survey, street.features()).radius == 2.0
+
+
+def test_sigma_grows_with_the_distance():
+    "A heading that may be off by 10 deg moves what is 8 m away by 1.4 m, one sigma"
+    survey = replace(street.survey(), pos=Pos(0.001, np.radians([0.0, 0.0, 10.0])))
+    features = street.features()
+    apart = features.centre - survey.trajectory.at(features.gps_time).position
+    distance = np.linalg.norm(apart, axis=1)
+    sigma = feature_sigma(survey, features)
+    assert np.allclose(sigma[distance > 8], distance[distance > 8] * np.radians(10.0), rtol=0.01)
+    assert sigma.min() > 0.4  # the mounting may be off

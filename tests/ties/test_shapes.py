@@ -1,0 +1,113 @@
+"""Planes and poles from moments: how well their centres are known, and what is refused."""
+
+import numpy as np
+import pytest
+
+from mlscorr.ties import TieCollector
+from mlscorr.ties.thinning import direction_class
+from tests.beds import tie_streets as street
+
+
+def errors_of_planes(features):
+    "Distances (n,) of the centres from the true plane whose normal is nearest, and its sigmas"
+    local = features.centre - street.ORIGIN
+    walls = [[x, street.WALL * side] for x in street.CROSS_WALLS for side in (1,)]
+    number = direction_class(features.direction)
+    along, across, up = (np.isin(number, n) for n in ((4, 22), (10, 16), (14,)))
+    error = np.full(len(features), np.nan)
+    error[up] = local[up, 2]
+    error[across] = np.abs(local[across, 1]) - street.WALL
+    nearest = np.abs(local[along, :1] - np.array(walls)[:, 0]).argmin(axis=1)
+    error[along] = local[along, 0] - np.array(walls)[nearest, 0]
+    return error, np.sqrt(features.variance)
+
+
+def collected(points, number=0, rng=None, noise=street.NOISE):
+    "Features of some points that one pass measures"
+    rng = np.random.default_rng(1) if rng is None else rng
+    survey = street.survey(number + 1)
+    collector = TieCollector(survey)
+    collector.add(survey.clouds[number], street.scan(points, number, rng, noise))
+    return collector.features()
+
+
+def test_planes_are_as_good_as_they_say():
+    "Over seeds, road, facades and cross walls lie off by their sigma, within a factor of 1.5"
+    error, sigma = (
+        np.concatenate(column)
+        for column in zip(*(
+            errors_of_planes(f[f.kind == "plane"]) for f in map(street.features, range(1, 5))
+        ), strict=True)
+    )  # fmt: skip
+    assert len(error) > 2000
+    assert np.isfinite(error).all()
+    assert 1 / 1.5 < np.sqrt(np.mean((error / sigma) ** 2)) < 1.5
+    assert np.median(sigma) < 0.0015
+
+
+def test_roughness_that_neighbours_share_is_stated():
+    "A road with waves of 3 mm, 0.1 to 2 m long, is off by its sigma within a factor of 1.5"
+    ratios = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        x, y = rng.uniform(2, 30, 60_000), rng.uniform(2, 7, 60_000)
+        phases = rng.uniform(0, 2 * np.pi, (40, 1))
+        waves = 2 * np.pi / 10 ** rng.uniform(-1, 0.3, (40, 1))
+        turn = rng.uniform(0, 2 * np.pi, (40, 1))
+        height = np.sin(waves * (x * np.cos(turn) + y * np.sin(turn)) + phases).sum(axis=0)
+        road = np.column_stack([x, y, 0.003 * np.sqrt(2 / 40) * height])
+        features = collected(road, rng=rng, noise=0.001)
+        assert len(features) > 50
+        error = features.centre[:, 2] - street.ORIGIN[2]
+        ratios.append(error / np.sqrt(features.variance))
+    assert 1 / 1.5 < np.sqrt(np.mean(np.concatenate(ratios) ** 2)) < 1.5
+
+
+def test_posts_are_found_at_their_axis_from_both_sides():
+    "Passes on either side see another half of a post; both put its axis where it is, within 3 cm"
+    features = street.features()
+    poles = features[features.kind == "pole"]
+    assert set(poles.pass_number) == {1, 2}
+    feet = street.ORIGIN[:2] + np.array(street.POSTS)
+    apart = np.linalg.norm(poles.centre[:, None, :2] - feet, axis=2).min(axis=1)
+    assert apart.max() < 0.03
+    assert np.sqrt(np.mean(apart**2 / poles.variance / 2)) < 1.5
+    assert (poles.direction[:, 2] > 0.99).all()
+
+
+def test_normals_face_the_scanner():
+    "The road's normals point up, those of facades into the street, as long as 1"
+    features = street.features()
+    planes = features[features.kind == "plane"]
+    sight = street.survey().trajectory.at(planes.gps_time).position - planes.centre
+    assert (np.einsum("ni,ni->n", sight, planes.direction) > 0).all()
+    assert np.allclose(np.linalg.norm(planes.direction, axis=1), 1.0)
+
+
+@pytest.mark.parametrize("density", [1, 8])
+def test_a_column_is_no_better_than_its_curvature(density):
+    "The face of a column of 0.9 m is stated to 2 to 5 cm, however many points it has"
+    rng = np.random.default_rng(7)
+    angle, up = rng.uniform(-np.pi, 0, 2_000 * density), rng.uniform(0, 5, 2_000 * density)
+    ring = np.column_stack([10.6 + 0.45 * np.cos(angle), 5.5 + 0.45 * np.sin(angle), up])
+    features = collected(ring)
+    assert len(features) > 0
+    assert (features.variance > 0.02**2).all()
+
+
+@pytest.mark.parametrize("shape", ["bush", "person", "strip"])
+def test_what_is_no_plane_or_pole_is_refused(shape):
+    "Leaves, a person and a narrow strip give no feature at all"
+    rng = np.random.default_rng(7)
+    n = 2_000
+    foot = np.array([10.6, 5.5, 0.0])
+    ball = rng.normal(size=(n, 3))
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    angle, up = rng.uniform(-np.pi, 0, n), rng.uniform(0, 1, n)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
+    points = {
+        "bush": foot + [0, 0, 1] + ball * rng.uniform(0, 0.8, (n, 1)),
+        "person": foot + 0.22 * ring + np.outer(1.7 * up, [0, 0, 1]),
+        "strip": foot + np.outer(rng.uniform(-0.15, 0.15, n), [1, 0, 0]) + np.outer(up, [0, 0, 3]),
+    }[shape]
+    assert len(collected(points)) == 0
