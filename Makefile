@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
 
-.PHONY: demo test bench examples clean
+.PHONY: demo test faults bench tables examples clean
 
 demo: $(VENV)/ready
 	$(RUN)/mlscorr demo -o demo --overwrite
@@ -11,15 +11,27 @@ demo: $(VENV)/ready
 test: $(VENV)/ready
 	$(RUN)/ruff check .
 	$(RUN)/ruff format --check .
+	$(RUN)/mypy
 	$(RUN)/python -m pytest -n 2 --dist loadfile
+
+# 15 000 mutated clouds and 45 000 mutated tables, where make test tries some hundreds
+faults: $(VENV)/ready
+	MLSCORR_FAULTS=7500 $(RUN)/python -m pytest -n 2 tests/faults
 
 bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench.py
 	$(RUN)/python benchmarks/bench_simulate.py
 	$(RUN)/python benchmarks/bench_collocation.py
+	$(RUN)/python benchmarks/bench_tie_solver.py
+	$(RUN)/python benchmarks/bench_ties.py 2
 	$(RUN)/python benchmarks/bench_targets.py 2
+	$(RUN)/python benchmarks/bench_matching.py
 	$(RUN)/python benchmarks/bench_gap.py
 	$(RUN)/python benchmarks/bench_render.py
+
+# TABLES="scenarios results" writes these alone, CHECK=FOLDER is one of mlscorr blind
+tables: $(VENV)/ready
+	$(RUN)/python benchmarks/readme_tables.py $(TABLES) $(if $(CHECK),--check $(CHECK))
 
 examples: $(VENV)/ready
 	for script in examples/*.py examples/real/*_gap.py; do $(RUN)/python $$script || exit 1; done
