@@ -1,39 +1,36 @@
-"""Why two REAL passes of a UAV scanner don't meet: the two-pass misfit and what explains it.
+"""Why two REAL passes of a UAV scanner don't meet: the mounting first, then what it leaves.
 
     python examples/real/two_pass_gap.py [--seed S] [--out FOLDER] [--picture FILE.png]
 
 Real are the points, the sensor's positions and attitudes, and so the misfit of planes that both
 passes of a car and of a tent saw (coin-or/Gravity, LANL LA-UR-20-28196). These data were not
-corrected for boresight. Simulated is what a survey of the same beams and times would misfit by if
-the sensors were as believed, and what is left once the named cause is in the simulator. Without
-the points it says so and ends.
+corrected for boresight: planes of both passes give it, and the misfit is measured on planes of
+other squares of the ground. What is left then is diagnosed against a simulator that believes in
+its sensors. Without the points it says so and ends.
 """
 
 import argparse
 import json
-from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from page import ROOT, SHARED, counted, needed, picture, words
+from page import ROOT, SHARED, needed, picture, words
 from scipy.spatial.transform import Rotation, Slerp
-from two_pass_page import draw_slice, parameter_told, write
+from two_pass_page import draw_slice, turns, write
 
-from mlscorr.effects import in_order, make_effect
+from mlscorr.estimate import believed_mounting, calibration_with_ties
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.gap.infer.causes import infer_causes
-from mlscorr.gap.infer.observations import Observations
-from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe import background
 from mlscorr.gap.observe.patch_search import find_patches
-from mlscorr.gap.observe.rows import reference_of
 from mlscorr.gap.observe.shared_planes import shared_rows
 from mlscorr.gap.signatures import signatures
-from mlscorr.gap.signatures.changes import Bench
+from mlscorr.pipeline.tied_calibration import tie_mounting
 from mlscorr.survey import (
     CloudFile,
     ControlPoints,
+    Matched,
     Mounting,
     PointCloud,
     Pos,
@@ -41,6 +38,7 @@ from mlscorr.survey import (
     Survey,
     Trajectory,
 )
+from mlscorr.ties import TieCollector
 
 DATA = SHARED / "routescene_uav"
 FILES = "{}_points_time_derived.npz"  # of the name of a scene
@@ -52,9 +50,7 @@ BELIEVED_SCANNER = Scanner(0.02, np.radians(0.01), 10.0)  # Velodyne HDL-32E: 2 
 # What our simulator's MEMS unit states with GNSS; 2 cm as RTK does.
 BELIEVED_POS = Pos(0.02, np.radians([0.0136, 0.0136, 0.10]))
 FOLDS, SQUARE = 4, 1.0  # held-out planes, by squares of the ground (m)
-REPLICAS = 400
 CHANCE = 100  # replicas for the p-value
-TOLD = ("time_offset", "lever_arm", "range_bias")  # how small one these planes would show
 
 
 @dataclass(frozen=True)
@@ -71,18 +67,21 @@ def main():
     arguments = parse()
     files = [FILES.format(name) for name in SCENES]
     needed(DATA, files, "Car.adc.laz and Tent.adc.laz of coin-or/Gravity, with a time per point")
-    result, scenes = {}, {}
+    result, scenes, turned = {}, {}, {}
     for name in SCENES:
-        rng = np.random.default_rng(arguments.seed)
         scenes[name] = scene(name)
-        result[name] = study(scenes[name], rng)
+        answer = study(scenes[name], np.random.default_rng(arguments.seed))
+        if answer is None:
+            print(f"{name}: the passes saw no plane in common that the others agree with.")
+            continue
+        result[name], turned[name] = answer
         show(name, result[name])
+    if not result:
+        return
     arguments.out.mkdir(parents=True, exist_ok=True)
-    plain = {name: {k: v for k, v in one.items() if k != "drawn"} for name, one in result.items()}
-    (arguments.out / "two_pass_gap.json").write_text(json.dumps(plain, indent=1) + "\n")
-    turned = {name: corrected(scenes[name], result[name]) for name in scenes}
+    (arguments.out / "two_pass_gap.json").write_text(json.dumps(result, indent=1) + "\n")
     print(f"Page: {write(arguments.out, scenes, result, turned)}")
-    if turned["Car"] is not None:
+    if "Car" in result:
         drawn = (scenes["Car"], turned["Car"], result["Car"])
         print(f"Picture: {picture(arguments.picture, draw_slice, (7.6, 2.6), *drawn)}")
 
@@ -134,134 +133,87 @@ def _epochs(time, place, attitude):
     return even, moved, Slerp(time, attitude)(even)
 
 
-def study(one, rng, folds=FOLDS, chance=CHANCE):
-    """All numbers of a scene."""
-    survey = one.survey
-    patches = find_patches(survey, chunks=lambda file: [one.cloud])
-    rows = shared_rows(survey, patches, rng)
-    answer = diagnosed(rows, survey, rng, chance)
-    drawn, before = rms(replicas(rows, survey, rng)), rms(rows.residual)
-    residual, effects = held_out(rows, survey, rng, folds, chance)
-    shrink, interval = shrunk(rows, residual, folds)
-    return told(answer) | {
-        "points": len(one.cloud), "planes": len(rows),
-        "pose_check": float(np.percentile(one.away, 95) * 1e3),
-        "before": before, "after": rms(residual), "shrink": shrink, "shrink_interval": interval,
-        "null_band": np.percentile(drawn, SETTINGS.band).tolist(), "effects": effects,
-        "rows": {"position": rows.position.tolist(), "before": (1e3 * rows.residual).tolist(),
-                 "after": (1e3 * residual).tolist(), "normal": rows.direction.tolist(),
-                 "pass": rows.covariates["pass"].tolist()},
-        "drawn": (1e3 * drawn).tolist(),
-    }  # fmt: skip
-
-
-def told(answer):
-    """What the diagnosis says, plain."""
-    verdict, compared = answer.verdict, answer.separability
+def study(scene, rng, folds=FOLDS, chance=CHANCE):
+    """All numbers of a scene and its points as calibrated, or None where nothing was seen twice."""
+    survey = scene.survey
+    collector = TieCollector(survey)
+    collector.add(survey.clouds[0], scene.cloud)
+    start = believed_mounting(survey.trajectory, survey.mounting, Matched.none(), survey.pos)
+    calibration = tie_mounting(survey, start, Matched.none(), collector.features())
+    if calibration.ties is None:
+        return None
+    ties, estimate = calibration.ties.ties, calibration.lsc
+    after = np.array(ties.misclosure)
+    for out in _folds(ties, folds):
+        rest = calibration_with_ties(calibration, Matched.none(), ties[~out])
+        after[out] = misfit(survey, rest.lsc.mounting, ties[out])
+    calibrated = remounted(scene, estimate.mounting)
     return {
-        "verdict": verdict.label, "probability": verdict.probability,
-        "p_value": verdict.p_value, "set": list(verdict.set), "lead": verdict.lead,
-        "same": list(answer.same), "classes": [list(c) for c in compared.classes],
+        "points": len(scene.cloud), "planes": len(ties),
+        "pose_check": float(np.percentile(scene.away, 95) * 1e3),
+        "boresight": np.degrees(estimate.correction[3:]).tolist(),
+        "sigma": np.degrees(estimate.sigma[3:]).tolist(),
+        "determined": calibration.determined[3:].tolist(),
+        "before": (1e3 * ties.misclosure).tolist(), "after": (1e3 * after).tolist(),
+        "left": left(calibrated, rng, chance),
+    }, calibrated.cloud.xyz  # fmt: skip
+
+
+def misfit(survey, mounting, ties):
+    """How far (n,) both views of ties are apart under another mounting. Units: m."""
+    time = ties.gps_time.ravel()
+    beam = to_scanner(survey.trajectory, survey.mounting, ties.place.reshape(-1, 3), time)
+    place = georeference(survey.trajectory, mounting, beam, time).reshape(-1, 2, 3)
+    return np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
+
+
+def remounted(scene, mounting):
+    """The scene as another mounting gives it."""
+    survey, time = scene.survey, scene.cloud.gps_time
+    beam = to_scanner(survey.trajectory, survey.mounting, scene.cloud.xyz, time)
+    xyz = georeference(survey.trajectory, mounting, beam, time)
+    mounted = replace(survey, mounting=mounting)
+    return replace(scene, survey=mounted, cloud=replace(scene.cloud, xyz=xyz))
+
+
+def left(scene, rng, chance):
+    """What the diagnosis says of planes of both passes, plain; None where there are none."""
+    patches = find_patches(scene.survey, chunks=lambda file: [scene.cloud])
+    rows = None if patches is None else shared_rows(scene.survey, patches, rng)
+    if rows is None:
+        return None
+    signs, _ = signatures(rows, scene.survey)
+    seen = background(rows, scene.survey)
+    answer = infer_causes(rows, seen, scene.survey, signs, rng, chance)
+    return {
+        "planes": len(rows), "median": float(1e3 * np.median(np.abs(rows.residual))),
+        "verdict": answer.verdict.label, "probability": answer.verdict.probability,
+        "p_value": answer.verdict.p_value,
         "causes": [[c.effect, c.probability] for c in answer.causes[:6]],
-        "parameters": [
-            [c.effect, p.name, p.unit, p.estimate, p.sigma, p.detectable]
-            for c in answer.causes if c.effect == verdict.label for p in c.parameters
-        ],
-        "detectable": [
-            [n, float(d), u]
-            for n, d, u in zip(compared.names, compared.detectable, compared.units, strict=True)
-            if n.split()[0] in TOLD
-        ],
     }  # fmt: skip
 
 
-def shrunk(rows, after, folds):
-    """Share of the square of the misfit that is gone, and its 95 % interval by jackknife."""
-    blocks = np.array(
-        [[np.sum(r[f] ** 2) for f in _folds(rows, folds)] for r in (rows.residual, after)]
-    )
-    left = blocks.sum(axis=1, keepdims=True) - blocks  # without each fold in turn
-    spread = float(1.96 * np.std(1 - left[1] / left[0]) * np.sqrt(folds - 1))
-    share = float(1 - blocks[1].sum() / blocks[0].sum())
-    return share, [share - spread, min(share + spread, 1.0)]
-
-
-def diagnosed(rows, survey, rng, chance=CHANCE):
-    """Inference on planes that both passes saw."""
-    signs, _ = signatures(rows, survey)
-    return infer_causes(rows, background(rows, survey), survey, signs, rng, chance)
-
-
-def replicas(rows, survey, rng):
-    """Simulated misfits (m, k) of the same planes if all sensors were as believed. Units: m."""
-    observed = Observations.of(rows, background(rows, survey))
-    looks = observed.whitener().draw(rng, REPLICAS)  # both looks share the plane's height
-    drawn = np.zeros((len(rows), REPLICAS))
-    np.add.at(drawn, observed.row, looks)
-    return drawn[np.isin(np.arange(len(rows)), observed.row)]
-
-
-def rms(values):
-    """Root mean square of (m,) or (m, k) over rows."""
-    value = np.sqrt(np.mean(np.square(values), axis=0))
-    return float(value) if np.ndim(value) == 0 else value
-
-
-def _folds(rows, folds):
-    """Which planes (m,) are held out together: squares of the ground in turn, a list of bool."""
-    place = rows.position[:, :2] - rows.position[:, :2].min(axis=0)
+def _folds(ties, folds):
+    """Which ties (n,) are held out together: squares of the ground in turn, a list of bool."""
+    place = ties.place[:, 0, :2] - ties.place[:, 0, :2].min(axis=0)
     square = np.floor(place / SQUARE).astype(int)
     number = (square[:, 0] + 2 * square[:, 1]) % folds
-    return [number == k for k in range(folds)]
-
-
-def held_out(rows, survey, rng, folds, chance):
-    """Misfit (m,) of planes once the cause named from all others is in the simulator, and those."""
-    after, named = rows.residual.copy(), []
-    for out in _folds(rows, folds):
-        answer = diagnosed(rows.select(~out), survey, rng, chance)
-        cause = answer.causes[0] if answer.verdict.label != "unknown" else None
-        named.append(answer.verdict.label)
-        if cause is None or not out.any():
-            continue
-        bench = Bench(rows.select(out), survey)
-        for effect in in_order(e for e in cause.effects if not e.random):
-            after[out] -= bench.change(effect).shift
-    return after, named
-
-
-def corrected(one, result):
-    """Points of a scene with the boresight that was found taken out, or None."""
-    size = {p[1]: p[3] for p in result["parameters"] if p[2] == "deg"}
-    if set(size) != {"right", "forward", "up"}:
-        return None
-    effect = make_effect("boresight", magnitude=[-size[k] for k in ("right", "forward", "up")])
-    survey, time = one.survey, one.cloud.gps_time
-    beam = to_scanner(survey.trajectory, survey.mounting, one.cloud.xyz, time)
-    mounting = effect.apply(survey.mounting, reference_of(survey))
-    return georeference(survey.trajectory, mounting, beam, time)
+    return [number == k for k in range(folds) if (number == k).any()]
 
 
 def show(name, r):
     """The result as text."""
-    low, high = r["null_band"]
+    before, after = (np.median(np.abs(r[k])) for k in ("before", "after"))
+    print(f"{name}: boresight off by {turns(r)}, by {r['planes']} planes that both passes saw")
+    print(f"  misfit {before:.0f} -> {after:.0f} mm (median) on planes that were held out")
+    if r["left"] is None:
+        print("  then no plane is left that both passes saw")
+        return
+    rest = r["left"]
     print(
-        f"{name}: {r['planes']} planes in both passes; {words(r['verdict'])} "
-        f"(probability {r['probability']:.2f}, p of none {r['p_value']:.1g})"
+        f"  then {words(rest['verdict'])} (probability {rest['probability']:.2f}, p of none "
+        f"{rest['p_value']:.1g}) on {rest['planes']} planes, {rest['median']:.0f} mm (median)"
     )
-    print(
-        f"  misfit {1e3 * r['before']:.0f} -> {1e3 * r['after']:.0f} mm on held-out planes "
-        f"({r['shrink']:.0%} of its square [{r['shrink_interval'][0]:.0%}, "
-        f"{r['shrink_interval'][1]:.0%}]); {1e3 * low:.0f} to {1e3 * high:.0f} mm if all is as "
-        f"believed; named from the other planes: {counted(Counter(r['effects']))}"
-    )
-    for _, parameter, unit, value, sigma, least in r["parameters"]:
-        print(
-            f"  {parameter_told(parameter, unit)}: {value:.3f} ± {sigma:.3f} {unit}, "
-            f"detectable {least:.3f}"
-        )
-    alike = "; ".join(", ".join(words(effect) for effect in c) for c in r["classes"])
-    print(f"  can't be told apart here: {alike or 'none'}")
 
 
 if __name__ == "__main__":

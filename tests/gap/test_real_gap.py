@@ -81,27 +81,20 @@ def two_pass_gap(real):
     return real("two_pass_gap")
 
 
-def test_boresight_closes_the_misfit_of_real_passes_over_a_car(two_pass_gap):
-    "Two uncorrected UAV passes: boresight is named, and planes held out meet as believed then"
-    one = two_pass_gap.scene("Car")
-    assert np.percentile(one.away, 95) < 0.004  # m, of the file's points, put there by their pose
-    result = two_pass_gap.study(one, np.random.default_rng(1), folds=2, chance=REPLICAS)
-    assert "boresight" in result["verdict"].split("+")
-    assert result["p_value"] < 1e-6
-    assert result["shrink"] > 0.8
-    assert result["before"] > 2 * result["null_band"][1]
-    assert result["after"] < result["null_band"][1]
-
-
-def test_boresight_is_named_for_real_passes_over_a_tent(two_pass_gap):
-    "Another scene and day: boresight again"
-    one = two_pass_gap.scene("Tent")
-    rng = np.random.default_rng(1)
-    patches = two_pass_gap.find_patches(one.survey, chunks=lambda file: [one.cloud])
-    rows = two_pass_gap.shared_rows(one.survey, patches, rng)
-    told = two_pass_gap.diagnosed(rows, one.survey, rng, REPLICAS).verdict
-    assert "boresight" in told.label.split("+")
-    assert told.p_value < 1e-6
+@pytest.mark.parametrize(
+    ("name", "dense"), [("Car", (0.941, 1.181, 2.497)), ("Tent", (0.743, -0.143, 0.372))]
+)
+def test_boresight_closes_the_misfit_of_real_passes(two_pass_gap, name, dense):
+    "As a fit of all points gives it, within 2 sigma; a tenth is left of planes held out, no cause"
+    scene = two_pass_gap.scene(name)
+    assert np.percentile(scene.away, 95) < 0.004  # m, of the file's points, put there by their pose
+    result, _ = two_pass_gap.study(scene, np.random.default_rng(1), folds=2, chance=REPLICAS)
+    away = np.abs(np.subtract(result["boresight"], dense)) / result["sigma"]
+    assert (away < 2.0).all()
+    before, after = (np.median(np.abs(result[key])) for key in ("before", "after"))
+    assert before > 80.0  # mm
+    assert after < before / 10
+    assert result["left"]["verdict"] == "none"
 
 
 @pytest.mark.parametrize("script", ["pos_gap.py", "two_pass_gap.py"])
