@@ -1,6 +1,6 @@
-"""Write the tables of README.md anew by the commands that measure them.
+"""Write the tables of README.md and docs anew by the commands that measure them.
 
-    python benchmarks/readme_tables.py [NAME ...] [--readme README.md] [--check FOLDER]
+    python benchmarks/readme_tables.py [NAME ...] [--check FOLDER]
 
 A table stands between <!-- table: NAME --> and <!-- end of table -->. Without names all are
 measured (an hour or two); one whose data are not at hand stays as it is, with a word on stderr.
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 TABLE = r"(<!-- table: {} -->\n).*?(<!-- end of table -->)"
 SCENARIOS = {
     "car": "the paper's car: 186 s in a simulated canyon, 21 control points",
@@ -46,7 +47,7 @@ def place(text, name, table):
         TABLE.format(re.escape(name)), lambda match: match[1] + table + match[2], text, flags=re.S
     )
     if count != 1:
-        raise ValueError(f"README has {count} tables named '{name}', where one belongs.")
+        raise ValueError(f"The page has {count} tables named '{name}', where one belongs.")
     return text
 
 
@@ -128,16 +129,16 @@ def blind(check):
     return markdown(["", "cases", "reached, with 95 % interval", "goal"], rows)
 
 
-TABLES = {"blind": blind, "scenarios": scenarios, "results": results}
+TABLES = {"results": results, "blind": blind, "scenarios": scenarios}  # as pages have them
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", choices=[[], *TABLES])
-    parser.add_argument("--readme", type=Path, default=ROOT / "README.md")
     parser.add_argument("--check", type=Path, help="folder of mlscorr blind")
     arguments = parser.parse_args()
-    for name in arguments.names or names_in(arguments.readme.read_text()):
+    pages = {name: page for page in PAGES for name in names_in(page.read_text())}
+    for name in arguments.names or pages:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -145,7 +146,7 @@ def main():
         except (FileNotFoundError, KeyError) as error:
             print(f"{name} stays as it is: {error} is not at hand.", file=sys.stderr)
             continue
-        arguments.readme.write_text(place(arguments.readme.read_text(), name, table))
+        pages[name].write_text(place(pages[name].read_text(), name, table))
         print(table)
 
 

@@ -1,11 +1,9 @@
-"""The tables of the README are put in their place by the commands that measure them."""
+"""The tables of README and docs are put in their place by the commands that measure them."""
 
 import json
 
 import pytest
-from readme_tables import TABLES, blind, markdown, names_in, place
-
-from tests.beds.places import ROOT
+from readme_tables import PAGES, TABLES, blind, markdown, names_in, place
 
 TEXT = "before\n<!-- table: toy -->\n| old |\n<!-- end of table -->\nafter | kept |\n"
 
@@ -27,9 +25,9 @@ def test_a_table_without_a_place_is_refused():
         place(TEXT, "other", "")
 
 
-def test_every_table_of_the_readme_has_its_command():
-    "Each mark in the README names a table that can be measured"
-    assert names_in((ROOT / "README.md").read_text()) == list(TABLES)
+def test_every_table_has_its_command():
+    "Each mark in README and docs names a table that can be measured, and each table has one place"
+    assert [name for page in PAGES for name in names_in(page.read_text())] == list(TABLES)
 
 
 def test_the_blind_check_becomes_a_table(tmp_path):

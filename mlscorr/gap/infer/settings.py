@@ -14,7 +14,7 @@ class Settings:
     """Priors, grids and limits of the inference.
 
     Where no source is named, it is python benchmarks/gap_study.py with seeds 5000, 6000 and 7000,
-    which the studies of the README don't use.
+    which the studies of the docs don't use.
     """
 
     confidence: float = 0.95
