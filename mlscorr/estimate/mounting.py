@@ -130,7 +130,7 @@ def calibration_by(
         determined=determined,
         screening=screening,
         used=used,
-        guards=find_guards(equations, equations.solve(parameters), parameters, drift.corrected),
+        guards=find_guards(equations, parameters, drift.corrected),
         equations=equations,
         notes=notes,
     )

@@ -244,7 +244,7 @@ def _estimate(trajectory, names, kept, screening, notes):
         left_out=left_out,
         log_likelihood=solved.log_likelihood,
         sigma0=solved.sigma0,
-        guards=find_guards(kept, solved, parameters, correction.corrected),
+        guards=find_guards(kept, parameters, correction.corrected),
         notes=notes,
     )
 

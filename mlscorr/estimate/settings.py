@@ -21,7 +21,7 @@ class Settings:
 
     # Tests
     significance: float = 0.001  # Baarda's (1968), but over all targets or steps together
-    global_significance: float = 0.05  # of the global test, both sides together
+    smallest_redundancy: float = 1e-6  # of all noise together, below which there is none to test
     undetected: float = 0.2  # share of detectable errors that w misses (Baarda 1968)
     determined_ratio: float = 0.5  # posterior over prior variance where control told a component
     faded_times: float = 3.0  # correlation times after which a signal is 5 % of what it was

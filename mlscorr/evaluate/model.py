@@ -74,7 +74,7 @@ def _global_test(test):
     return {
         "statistic": test.statistic,
         "redundancy": test.redundancy,
-        "limits": [test.lower, test.upper],
+        "limits": [0.0, test.upper],
         "passed": test.passed,
     }
 

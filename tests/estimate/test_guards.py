@@ -1,5 +1,6 @@
 """What control points can't tell is said, with times and numbers."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,12 +11,13 @@ from mlscorr.estimate import estimate_correction
 from mlscorr.estimate.guards import (
     GlobalTest,
     Guards,
+    _global_test,
     find_guards,
     global_test_warnings,
     guard_warnings,
     sparse_warnings,
 )
-from mlscorr.estimate.posterior import Objective
+from mlscorr.estimate.posterior import Objective, choose_parameters
 from mlscorr.survey import Trajectory
 from tests.beds.pos_errors import CONSTANT, EPOCHS, START, Case, even, smooth_case, waves
 
@@ -85,19 +87,13 @@ def guards_with(test=None, gap=(0.0, 0.0)):
     return Guards(gap, (), np.ones(6), test)
 
 
-@pytest.mark.parametrize(
-    "statistic, side", [(25.0, None), (100.0, "more"), (2.0, "less"), (46.9, None), (47.1, "more")]
-)
-def test_the_global_test_is_chi_squared(statistic, side):
-    "Of 30 degrees of freedom 16.8 to 47.0 pass; below and above a sentence says which"
-    limits = chi2.ppf([0.025, 0.975], 30)
-    test = GlobalTest(statistic, 30, *limits)
+@pytest.mark.parametrize(("statistic", "passes"), [(2.0, True), (59.6, True), (59.8, False)])
+def test_the_global_test_is_chi_squared(statistic, passes):
+    "Of 30 degrees of freedom up to 59.7 passes; above a sentence says so"
+    test = GlobalTest(statistic, 30.0, chi2.isf(0.001, 30))
     sentences = list(global_test_warnings(guards_with(test)))
-    assert test.passed == (side is None)
-    if side is None:
-        assert not sentences
-    else:
-        assert f"vary {side} than" in sentences[0] and "outside [17, 47] of 30" in sentences[0]
+    assert test.passed == passes == (not sentences)
+    assert passes or "vary more than" in sentences[0]
 
 
 def test_without_redundancy_there_is_no_global_test():
@@ -107,13 +103,24 @@ def test_without_redundancy_there_is_no_global_test():
     assert case.estimate().guards.global_test is None
 
 
-def test_the_global_test_is_the_weighted_sum_of_squares():
-    "sigma0 squared times the redundancy, 3 n misclosures less 3 (order + 1) parameters"
-    estimate = smooth_case(13, n=7).estimate()
-    test = estimate.guards.global_test
-    assert test.redundancy == 3 * 7 - 3 * 2
-    assert test.statistic == pytest.approx(estimate.sigma0**2 * test.redundancy)
-    assert [test.lower, test.upper] == pytest.approx(chi2.ppf([0.025, 0.975], test.redundancy))
+def test_the_global_test_is_that_of_least_squares_without_signals():
+    "Where all the variance is noise it is the weighted sum of squares of all redundant misclosures"
+    equations = smooth_case(13, n=7).equations()
+    test = _global_test(equations, None)
+    assert test.redundancy == pytest.approx(3 * 7 - 3 * (equations.order + 1))
+    assert test.statistic == pytest.approx(equations.solve(None).sigma0 ** 2 * test.redundancy)
+    assert test.upper == pytest.approx(chi2.isf(0.001, test.redundancy))
+
+
+def test_understated_sigmas_fail_the_global_test_and_true_ones_do_not():
+    "Control points four times as far off as they say are told of, beside drift that is as it says"
+    equations = smooth_case(13, n=24).equations()
+    parameters = choose_parameters(equations).modes[0][0]
+    noise = np.random.default_rng(3).normal(size=equations.misclosure.shape)
+    sigma = np.sqrt(np.einsum("nii->ni", equations.noise.separate))
+    spoiled = replace(equations, misclosure=equations.misclosure + np.sqrt(15.0) * sigma * noise)
+    assert _global_test(equations, parameters).passed
+    assert not _global_test(spoiled, parameters).passed
 
 
 def test_components_are_determined_below_half_of_their_variance():
@@ -134,8 +141,7 @@ def found(times, trajectory=None):
     corrected = SimpleNamespace(
         gps_time=case.recorded.gps_time, position_sigma=unknown, attitude_sigma=unknown
     )
-    solved = equations.solve(parameters)
-    return find_guards(equations, solved, parameters, corrected), equations, parameters
+    return find_guards(equations, parameters, corrected), equations, parameters
 
 
 @pytest.mark.parametrize(
