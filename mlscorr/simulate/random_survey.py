@@ -1,5 +1,6 @@
 """Scenarios of all sorts, small enough to be made by the hundred in seconds each."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -72,9 +73,10 @@ def random_survey(
         scenario = random_scenario(np.random.default_rng(choice), name)
         seed = world.generate_state(4)  # a SeedSequence would go on where the first survey stopped
         try:
-            made = simulate(scenario, np.random.default_rng(seed))
+            with warnings.catch_warnings(action="error"):
+                made = simulate(scenario, np.random.default_rng(seed))
             break
-        except ValueError:  # targets that find no place beside this way
+        except (ValueError, UserWarning):  # targets that find no place beside this way
             if number == MIX.attempts - 1:
                 raise
     more = _heavier(made, np.random.default_rng(tails))

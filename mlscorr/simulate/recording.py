@@ -189,16 +189,16 @@ def surveyed_targets(
     )
 
 
-def spread_checks(count: int, check: int) -> np.ndarray:
+def spread_checks(count: int, scenario: TargetScenario) -> np.ndarray:
     """Which of the targets are check points: evenly among them, not at the ends, (count,) bool.
 
     Parameters
     ----------
     count : int
-        Of all targets.
-    check : int
-        Of check points.
+        Of the targets that found a place; as large a share of them is check points as of all.
+    scenario : TargetScenario
     """
+    check = round(count * scenario.check / (scenario.control + scenario.check))
     is_check = np.zeros(count, dtype=bool)
     is_check[((np.arange(check) + 0.5) * count / max(check, 1)).astype(int)] = True
     return is_check

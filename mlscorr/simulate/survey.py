@@ -252,7 +252,7 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
         true_mountings=mountings,
         mountings=tuple(with_effects("mounting", mounting) for mounting in mountings),
         targets=with_effects("control", targets),
-        is_check=spread_checks(len(targets), scenario.targets.check),
+        is_check=spread_checks(len(targets), scenario.targets),
         true_centre=centre,
         effects=effects,
         reference=reference,

@@ -6,6 +6,7 @@ import pytest
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.simulate.drive.passes import drive
+from mlscorr.simulate.recording import spread_checks
 from mlscorr.simulate.scenario import (
     DriveScenario,
     PassScenario,
@@ -515,8 +516,24 @@ def test_targets_without_room_beside_the_drive_are_refused(tmp_path):
     path = write_ply(
         tmp_path / "trench.ply", np.vstack([vertices, corners]), np.vstack([triangles, faces])
     )
-    with pytest.raises(ValueError, match="Target 1 finds no free place beside the drive at"):
+    with pytest.raises(
+        ValueError, match=r"(\d+) of \1 targets find no free place beside the drive"
+    ):
         build_scene(on_mesh(path), line, length, rng(2))
+
+
+def test_targets_without_room_are_left_out_and_counted():
+    "Where a boat turns round on a river some targets find no free sight; the others stand"
+    drive_ = DriveScenario(u_turn=True, speed=4.0)
+    scenario = Scenario(scene={"kind": "river"}, drive=drive_)
+    wanted = scenario.targets.control + scenario.targets.check
+    drive_rng, scene_rng = rng(0).spawn(2)
+    line, length, _ = drive(scenario, drive_rng)
+    with pytest.warns(UserWarning, match=rf"\d of {wanted} targets find no free place.*without"):
+        targets = build_scene(scenario, line, length, scene_rng).targets
+    assert wanted / 2 < len(targets) < wanted
+    is_check = spread_checks(len(targets), scenario.targets)
+    assert abs(is_check.mean() - scenario.targets.check / wanted) < 0.5 / len(targets)
 
 
 def test_the_line_along_positions_keeps_to_them():

@@ -1,5 +1,6 @@
 """Where targets stand along a way, what hides them, and where other things keep clear of them."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -101,7 +102,8 @@ def place_targets(
     yaw : float
         Turn of the scan plane against the cross-section, which posts' targets face. Units: rad.
 
-    Raises ValueError for targets that are too large or too many, or that find no place.
+    Those that find no place are left out with a warning. Raises ValueError for targets that are too
+    large or too many, or of which none finds a place.
     """
     count = scenario.control + scenario.check
     s = _along(scenario, count, length, rng)
@@ -111,14 +113,19 @@ def place_targets(
     )
     steps = np.array([0, 0.03, -0.03, 0.08, -0.08, 0.15, -0.15, 0.25, -0.25, 0.4, -0.4])
     spots: list[TargetSpot] = []
-    kinds = []
+    kinds, unplaced = [], []
     for i in range(count):
         kind = scenario.kinds[i % len(scenario.kinds)]
         half = _half(kind, scenario.size)
         side, support = start_side * (-1) ** i, scenario.supports[order[i]]
         near = np.clip(s[i] + length / count * steps, 0.0, length)
-        spots.append(_find_spot(site, near, side, support, half, spots, rng))
+        spot = _find_spot(site, near, side, support, half, spots, rng)
+        if spot is None:
+            unplaced.append(s[i])
+            continue
+        spots.append(spot)
         kinds.append(kind)
+    _tell_unplaced(unplaced, count)
     spots = [_faced(spot, yaw, rng) if spot.support == "post" else spot for spot in spots]
     hidden = _choose_hidden(spots, scenario.hidden, rng)
     posts = [_own_post(spot, scenario.size) for spot in spots if spot.support == "post"]
@@ -171,7 +178,9 @@ def _along(scenario, count, length, rng):
 
 
 def _find_spot(site, near, side, support, half, others, rng):
-    """The first TargetSpot at lengths near (k,) in m with room, apart from others; or a post."""
+    """The first TargetSpot at lengths near (k,) in m with room, apart from others; or a post; or
+    None.
+    """
     apart = 2 * np.sqrt(2) * half + SETTINGS.target_clearance
     for kind in dict.fromkeys([support, "post"]):
         for s in near:
@@ -181,10 +190,20 @@ def _find_spot(site, near, side, support, half, others, rng):
                     np.linalg.norm(spot.centre - other.centre) > apart for other in others
                 ):
                     return spot
-    raise ValueError(
-        f"Target {len(others) + 1} finds no free place beside the drive at {near[0]:.0f} m: too "
-        "little room between drive and walls, no ground, or no free sight."
+    return None
+
+
+def _tell_unplaced(places, count):
+    """Warn of targets that found no place, by where they should stand (m); refuse if none did."""
+    if not places:
+        return
+    sentence = (
+        f"{len(places)} of {count} targets find no free place beside the drive (first: at "
+        f"{places[0]:.0f} m): too little room between drive and walls, no ground, or no free sight."
     )
+    if len(places) == count:
+        raise ValueError(f"{sentence} Give smaller targets, other supports, or another way.")
+    warnings.warn(f"{sentence} The survey is made without them.", stacklevel=2)
 
 
 def _faced(spot, yaw, rng):
