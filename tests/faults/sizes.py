@@ -1,0 +1,15 @@
+"""How many faults are tried: some in ``make test``, all of them in ``make faults``.
+
+MLSCORR_FAULTS is the share of the full numbers, 1 in ``make faults``; without it time is not judged
+either, as other tests may run beside these.
+"""
+
+import os
+
+SHARE = float(os.environ.get("MLSCORR_FAULTS", "0"))
+IS_FULL = SHARE > 0
+
+
+def tries(few, many):
+    "Number of faults to try"
+    return max(few, round(SHARE * many)) if IS_FULL else few
