@@ -36,9 +36,11 @@ def drift(time, seed):
     return size * np.sin(turns).sum(axis=2)
 
 
-def tied_passes(seed, control=(3.0, 16.0, 30.0, 44.0, 57.0), number=300, wrong=0.0, apart=0.5):
+def tied_passes(
+    seed, control=(3.0, 16.0, 30.0, 44.0, 57.0), number=300, wrong=0.0, apart=0.5, shared=0.0
+):
     """TiedPasses: control points at times of the first pass, ties of facades, road and cross
-    walls, a share of which is wrong by up to a distance apart.
+    walls, a share of which is wrong by up to a distance apart; those of a second share an error.
     """
     rng = np.random.default_rng(seed)
     elapsed = np.arange(0.0, LENGTH, 0.1)
@@ -54,7 +56,7 @@ def tied_passes(seed, control=(3.0, 16.0, 30.0, 44.0, 57.0), number=300, wrong=0
     )
     times = np.array(control)
     matched = _matched(times, trajectory, seed, rng)
-    return TiedPasses(trajectory, error, matched, _ties(number, wrong, apart, seed, rng))
+    return TiedPasses(trajectory, error, matched, _ties(number, wrong, apart, shared, rng, seed))
 
 
 def _matched(times, trajectory, seed, rng):
@@ -71,7 +73,7 @@ def _matched(times, trajectory, seed, rng):
     return Matched(observed, points)
 
 
-def _ties(number, wrong, apart, seed, rng):
+def _ties(number, wrong, apart, shared, rng, seed):
     first = rng.uniform(1.0, LENGTH - 1.0, number)
     second = 2 * LENGTH + PAUSE - first  # when the same place is passed on the way back
     normal = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])[
@@ -84,6 +86,8 @@ def _ties(number, wrong, apart, seed, rng):
     noise[is_wrong] += rng.choice([-1.0, 1.0], is_wrong.sum()) * rng.uniform(
         apart / 5, apart, is_wrong.sum()
     )
+    of_second = shared * rng.standard_normal((int(LENGTH), 3))[first.astype(int)]
+    noise += np.einsum("ni,ni->n", normal, of_second)
     views[:, 1] += noise[:, None] * normal
     return Ties(
         gps_time=START + np.column_stack([first, second]),
