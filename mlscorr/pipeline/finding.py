@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.las import read_chunks
@@ -329,6 +330,20 @@ def silent(_title: str, _total: int) -> Callable:
     return lambda _points: None
 
 
+def _other_heights(survey, radius):
+    """A sentence where surveyed points lie farther above or below the drive than is searched."""
+    place, path = survey.surveyed.position, survey.trajectory.position
+    nearest = cKDTree(path[:, :2]).query(place[:, :2])[1]
+    above = float(np.median(place[:, 2] - path[nearest, 2]))
+    if abs(above) < radius:
+        return ""
+    return (
+        f" In the median the surveyed points lie {abs(above):.1f} m "
+        f"{'above' if above > 0 else 'below'} the trajectory: their heights may be of another "
+        "geoid or over an ellipsoid, or in feet."
+    )
+
+
 def _nothing_found(survey, candidates, near):
     """The sentence for a cloud in which no surveyed target was found."""
     surveyed = survey.surveyed
@@ -342,6 +357,7 @@ def _nothing_found(survey, candidates, near):
         return (
             f"No point of the cloud lies within {radius:.1f} m of any of the {len(surveyed)} "
             "surveyed points. Are control and cloud in the same CRS and of the same street?"
+            f"{_other_heights(survey, radius)}"
         )
     return (
         f"None of the {len(surveyed)} surveyed targets was found among {near.points} points "
