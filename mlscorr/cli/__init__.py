@@ -2,6 +2,8 @@
 
 import os
 import warnings
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 
@@ -25,15 +27,29 @@ COMMANDS = (
 )
 
 app = typer.Typer(
-    help="Correct mobile laser scans with surveyed targets by least squares collocation.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in COMMANDS:
     app.command()(command)
 app.add_typer(blind, name="blind")
+
+
+def _show_version(is_asked):
+    if is_asked:
+        print(version("mlscorr"))
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    is_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """Correct mobile laser scans with surveyed targets by least squares collocation."""
 
 
 def main() -> None:

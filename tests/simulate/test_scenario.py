@@ -200,7 +200,7 @@ def test_the_examples_drift_as_their_sky_lets_them(name, least, most):
 
 
 def run(*arguments):
-    command = [sys.executable, "-m", "mlscorr.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "mlscorr", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True)
 
 
