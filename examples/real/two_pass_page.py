@@ -23,8 +23,8 @@ REAL = [
             "the make is not stated).",
             "The POS: 2 cm, and the attitude sigmas of our simulator's MEMS unit, as its make is "
             "not stated.",
-            "Nothing of the lever arm: the file has the position of the sensor itself, so it should "
-            "be zero, and is estimated beside the boresight all the same.",
+            "The lever arm: the file has the position of the sensor itself, so it should be zero; "
+            "it is estimated beside the boresight all the same.",
         ],
     ),
     (
