@@ -46,7 +46,7 @@ def drive(seed):
         ratios = costs(result, Path(folder))
     cloud = simulated.cloud[::EVERY]
     error = result.estimate.correction.apply(cloud).xyz - simulated.pulses.point[::EVERY]
-    sigma = result.point_sigma.at(cloud.xyz, cloud.gps_time)
+    sigma = result.point_sigma().at(cloud.xyz, cloud.gps_time)
     known = np.isfinite(sigma).all(axis=1)
     ratio = error[known] / sigma[known]
     numbers = [*np.sqrt(np.mean(error[known] ** 2, axis=0)), *np.sqrt(np.mean(ratio**2, axis=0))]
@@ -59,7 +59,7 @@ def costs(result, folder):
     file, correction, sigma = (
         result.survey.clouds[0],
         result.estimate.correction,
-        result.point_sigma,
+        result.point_sigma(),
     )
     best, size = [np.inf, np.inf], [0, 0]
     for _ in range(REPEATS):

@@ -25,19 +25,38 @@ def calibrate(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate lever arm and boresight of a survey's scanner by control points and ties."""
+    """Calibrate lever arm and boresight of a survey's scanners by control points and ties."""
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
         result = mlscorr.calibrate(recorded, progress=progress, ties=False if no_ties else None)
         content = result.write(out, with_drift, clouds, overwrite, progress)
     print_json(content, as_json)
-    _tell_mounting(content)
-    _tell_misclosures(content)
-    _tell_ties(content["ties"])
+    if "scanners" in content:
+        _tell_scanners(content["scanners"])
+    else:
+        _tell_mounting(content)
+        _tell_misclosures(content)
+        _tell_ties(content["ties"])
     say(f"Calibration: {out / 'calibration.json'}")
     say(f"Survey:      {out / 'survey.toml'}, with the calibrated mounting")
     if not clouds:
         say("Its clouds are still as the recorded mounting put them; --clouds writes them anew.")
+
+
+def _tell_scanners(scanners):
+    """What the recorded mounting of each scanner lacks, a line each."""
+    for name, content in scanners.items():
+        lacks = [
+            " ".join(
+                f"{value:.4f} ± {sigma:.4f}"
+                for value, sigma in zip(part["correction"], part["sigma"], strict=True)
+            )
+            for part in (content["lsc"][key] for key in ("lever_arm", "boresight"))
+        ]
+        say(
+            f"Scanner {name} lacks right, forward, up: lever arm {lacks[0]} m, boresight "
+            f"{lacks[1]} deg; determined: {sum(content['determined'])} of 6"
+        )
 
 
 def _tell_mounting(content):

@@ -106,7 +106,7 @@ def mounting_equations(
     corrected : (6,) array
         Units: m and rad.
     weak : (6,) array
-        One sigma of what is known of a mounting without any measurement. Units: m and rad.
+        One sigma of what is known of the mounting without the survey. Units: m and rad.
     """
     n, times = len(matched), matched.gps_time
     trajectory, position = equations.trajectory, matched.observations.position

@@ -27,8 +27,6 @@ from mlscorr.estimate.settings import SETTINGS
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.survey import SAME_EPOCH, Matched, Mounting, Pos, Trajectory
 
-UNMEASURED = np.repeat(SETTINGS.unmeasured, 3)  # m, rad
-
 
 # The matrices are small: on a busy machine threads would wait longer than they work
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -169,7 +167,7 @@ def _least_squares(equations, matched, recorded):
     covariance = solved.trend_covariance
     # What the weak hold of the mounting adds to the redundancy is what it adds to the estimate
     observed, sigma0 = 3 * len(matched), 1.0
-    redundancy = observed - 6 + np.sum(np.diag(covariance) / UNMEASURED**2)
+    redundancy = observed - 6 + np.sum(np.diag(covariance) / prior_sigma(recorded) ** 2)
     if observed:
         sigma0 = solved.sigma0 * np.sqrt(observed / redundancy)
     estimate = MountingEstimate(mounting, correction, sigma0**2 * covariance, float(sigma0))
@@ -199,7 +197,23 @@ def linearized(
         matched.gps_time,
     )
     moved = replace(matched, observations=replace(matched.observations, position=position))
-    return mounting, mounting_equations(equations, moved, mounting, correction, UNMEASURED)
+    weak = prior_sigma(recorded)
+    return mounting, mounting_equations(equations, moved, mounting, correction, weak)
+
+
+def prior_sigma(mounting: Mounting) -> np.ndarray:
+    """One sigma (6,) of what is known of a mounting without the survey. Units: m, rad.
+
+    That of its measured part, and what is known without any measurement of the other.
+
+    Parameters
+    ----------
+    mounting : Mounting
+    """
+    unmeasured = np.repeat(SETTINGS.unmeasured, 3)
+    if mounting.measured is None:
+        return unmeasured
+    return np.where(np.isnan(mounting.measured), unmeasured, mounting.measured)
 
 
 def georeferenced_anew(

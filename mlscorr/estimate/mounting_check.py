@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
-from mlscorr.estimate.mounting import UNMEASURED
+from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import TieEquations
@@ -88,7 +88,7 @@ def find_mounting_error(
     columns = np.vstack([control.reshape(-1, 6), ties])
     weights = [_weights(estimate, control[:, :, k], ties[:, k]) for k in range(6)]
     weights = np.column_stack(weights)
-    matrix = columns.T @ weights + np.diag(UNMEASURED**-2)
+    matrix = columns.T @ weights + np.diag(prior_sigma(mounting) ** -2)
     covariance = np.linalg.inv(matrix)
     right = weights.T @ np.append(equations.misclosure.ravel(), equations.ties.misclosure)
     correction = covariance @ right

@@ -37,14 +37,14 @@ class BeamCheck:
         def watch(file: CloudFile) -> Iterator[PointCloud]:
             rows = self.samples[file.path] = []
             for chunk in read(file):
-                rows.append(self._sample(chunk))
+                rows.append(self._sample(chunk, self.survey.of(file).mounting))
                 yield chunk
 
         return watch
 
-    def _sample(self, chunk):
+    def _sample(self, chunk, mounting):
         """Time (s), horizontal length (m) and angle off the scan plane (rad) of beams: (n, 3)."""
-        trajectory, mounting = self.survey.trajectory, self.survey.mounting
+        trajectory = self.survey.trajectory
         some = chunk[:: max(1, len(chunk) // IO.sampled_points)]
         some = some[trajectory.segment(some.gps_time) >= 0]
         if not len(some):

@@ -2,6 +2,7 @@
 
 import glob
 import os
+from collections.abc import Sequence
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -18,8 +19,8 @@ def write_survey_copy(
     source: str | Path,
     target: str | Path,
     folder: str | Path,
-    mounting: Mounting | None = None,
-    clouds: list[str] | None = None,
+    mountings: Sequence[Mounting] = (),
+    clouds: Sequence[Sequence[str]] = (),
     trajectory: str | None = None,
 ) -> None:
     """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
@@ -32,10 +33,10 @@ def write_survey_copy(
         The file to write.
     folder : path
         Where the file will stand in the end: paths are written relative to it.
-    mounting : Mounting, optional
-        To 0.01 mm and 1e-6 deg.
-    clouds : list of str, optional
-        New cloud.files, in the folder.
+    mountings : sequence of Mounting, optional
+        Of each scanner, to 0.01 mm and 1e-6 deg.
+    clouds : sequence of sequences of str, optional
+        New files of each scanner, in the folder.
     trajectory : str, optional
         New trajectory.file, in the folder.
     """
@@ -45,20 +46,24 @@ def write_survey_copy(
     for section, key in PATHS:
         if key in document.get(section, {}):
             document[section][key] = _moved(there, document[section][key])
-    files = document["cloud"]["files"]
-    for number, name in enumerate(files):  # one by one, which keeps comments between them
-        files[number] = _moved(there, name, source.parent)
-    if clouds is not None:
-        document["cloud"]["files"] = clouds
+    scanner = document.get("scanner")
+    scanners = scanner if isinstance(scanner, list) else []
+    for section in (document["cloud"], *scanners):
+        for number, name in enumerate(section["files"]):  # which keeps comments between them
+            section["files"][number] = _moved(there, name, source.parent)
+    if clouds:
+        document["cloud"]["files"] = [name for names in clouds for name in names]
+        for section, names in zip(scanners, clouds, strict=bool(scanners)):
+            section["files"] = list(names)
     if trajectory is not None:
         document["trajectory"]["file"] = trajectory
         document["trajectory"].pop("accuracy", None)  # its sigmas are its own
-    if mounting is not None:
+    for section, mounting in zip(scanners or [document], mountings, strict=bool(mountings)):
         lever_arm, boresight = mounting_values(mounting)
-        document["mounting"]["lever_arm"] = lever_arm
-        document["mounting"]["boresight"] = boresight
+        section["mounting"]["lever_arm"] = lever_arm
+        section["mounting"]["boresight"] = boresight
         if mounting.covariance is not None:
-            _set_covariance(document["mounting"], mounting.covariance)
+            _set_covariance(section["mounting"], mounting.covariance)
     Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
 
 

@@ -1,7 +1,5 @@
 """survey.toml and the files it names, as one Survey."""
 
-import glob
-from collections import Counter
 from pathlib import Path
 
 from mlscorr.io.control import NO_POINTS, holds_points, read_control
@@ -9,13 +7,19 @@ from mlscorr.io.inputs import input_file
 from mlscorr.io.las import sample_gps_times
 from mlscorr.io.sbet import check_area, check_crs, describe_projection
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.survey_paths import files_of
+from mlscorr.io.survey_scanners import mounted_scanners, scanner_notes
 from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
 from mlscorr.io.time_systems import match_times
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
-from mlscorr.survey import CloudFile, Pos, Survey
+from mlscorr.survey import CloudFile, Pos, Scanner, Survey
 
 FILE_NAME = "survey.toml"
+UNKNOWN_POS = (
+    f"Nothing says how well the POS is known: {Pos.position_sigma} m over "
+    f"{Pos.correlation_time:.0f} s are assumed. Give the trajectory's sigmas, or [pos]."
+)
 
 
 def read_survey(path: str | Path, planned: bool = False) -> Survey:
@@ -44,7 +48,7 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     """
     path = _survey_toml(path)
     settings = read_survey_file(path, planned)
-    clouds, trajectory_file, accuracy, control_file, reference = files = _files(path, settings)
+    clouds, trajectory_file, accuracy, control_file, reference = files = files_of(path, settings)
     inputs = tuple(input_file(*named) for named in _named(path, files))
     trajectory = read_trajectory(trajectory_file, settings.crs, accuracy)
     control = check = NO_POINTS
@@ -54,29 +58,30 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     is_geographic = trajectory_file.suffix.lower() in SBET_SUFFIXES
     notes = _crs_notes(settings.crs, trajectory, is_geographic)
     system = settings.cloud.gps_time if settings.cloud else "auto"
-    cloud_files = [_cloud_file(cloud, trajectory, system) for cloud in clouds]
-    notes += [note for _, note in cloud_files]
+    read = [_cloud_file(cloud, trajectory, system) for cloud in clouds]
+    cloud_files = tuple(file for file, _ in read)
+    scanners = mounted_scanners(path, settings, cloud_files)
+    is_one = len(scanners) == 1
+    notes += [*(note for _, note in read), *scanner_notes(scanners)]
     if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
-        notes.append(
-            f"Nothing says how well the POS is known: {Pos.position_sigma} m over "
-            f"{Pos.correlation_time:.0f} s are assumed. Give the trajectory's sigmas, or [pos]."
-        )
+        notes.append(UNKNOWN_POS)
     return Survey(
         name=settings.name or path.absolute().parent.name,
         path=path,
         crs=settings.crs,
-        clouds=tuple(file for file, _ in cloud_files),
+        clouds=cloud_files,
         trajectory=trajectory,
-        mounting=settings.mounting.mounting() if settings.mounting else None,
+        mounting=scanners[0].mounting if is_one else None,
         control=control,
         check=check,
-        scanner=settings.scanner.scanner(),
+        scanner=scanners[0].scanner if is_one else Scanner(),
         pos=settings.pos.pos(),
         reference=reference,
         search_radius=settings.matching.search_radius,
         use_ties=settings.ties.use == "auto",
         notes=tuple(notes),
         inputs=inputs,
+        scanners=() if is_one else scanners,
     )
 
 
@@ -136,7 +141,7 @@ def input_files(path: str | Path, planned: bool = False) -> list[Path]:
         For files that aren't there.
     """
     path = _survey_toml(path)
-    return [file for _, file in _named(path, _files(path, read_survey_file(path, planned)))]
+    return [file for _, file in _named(path, files_of(path, read_survey_file(path, planned)))]
 
 
 def _named(path, files):
@@ -154,53 +159,6 @@ def _survey_toml(path):
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist; a survey is a folder with {FILE_NAME}.")
     return path
-
-
-def _files(path, settings):
-    """Paths of the clouds, trajectory, accuracy, control and reference; all of them exist."""
-    folder = path.parent
-
-    def existing(key, name):
-        if name is None:
-            return None
-        if not (folder / name).is_file():
-            raise FileNotFoundError(f"{key} of {path} names {folder / name}, which does not exist.")
-        return folder / name
-
-    clouds = []
-    for name in settings.cloud.files if settings.cloud else ():
-        if glob.has_magic(name) and not (folder / name).exists():
-            matches = sorted(
-                folder / match for match in glob.glob(name, root_dir=folder, recursive=True)
-            )
-            if not matches:
-                raise FileNotFoundError(f"cloud.files of {path}: no file is like {folder / name}.")
-            clouds += matches
-        else:
-            clouds.append(existing("cloud.files", name))
-    if clouds:
-        _check_distinct(path, clouds)
-    return (
-        clouds,
-        existing("trajectory.file", settings.trajectory.file),
-        existing("trajectory.accuracy", settings.trajectory.accuracy),
-        existing("control.file", settings.control and settings.control.file),
-        existing("scene.reference", settings.scene.reference),
-    )
-
-
-def _check_distinct(path, clouds):
-    """Refuse a cloud file that is named twice, and two of one name: outputs keep the names."""
-    for kind, values in (
-        ("names the file", [str(cloud.resolve()) for cloud in clouds]),
-        (
-            "has files of the same name in different folders, and outputs keep their names:",
-            [cloud.name.casefold() for cloud in clouds],
-        ),
-    ):
-        value, count = Counter(values).most_common(1)[0]
-        if count > 1:
-            raise ValueError(f"cloud.files of {path} {kind} {value} ({count} times).")
 
 
 def _cloud_file(path, trajectory, setting):

@@ -1,10 +1,10 @@
 """What stands in survey.toml, section by section, in its own units (deg)."""
 
 from dataclasses import replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.toml_file import TomlSection
@@ -45,18 +45,17 @@ class MountingSection(TomlSection):
 
 
 class CalibratedMountingSection(MountingSection):
-    """The same, and how well a calibration knows it."""
+    """The same, and how well a calibration knows it, or a tape one of both."""
 
     lever_arm_sigma: Annotated[list[Positive], Three] | None = None  # m
     boresight_sigma: Annotated[list[Positive], Three] | None = None  # deg: right, forward, up
     correlation: Annotated[list[Annotated[list[Share], Six]], Six] | None = None
 
     @model_validator(mode="after")
-    def _has_both_sigmas(self) -> Self:
-        known = [v is not None for v in (self.lever_arm_sigma, self.boresight_sigma)]
-        if any(known) != all(known) or (self.correlation is not None and not all(known)):
-            raise ValueError("lever_arm_sigma and boresight_sigma are needed both, or neither")
+    def _can_be(self) -> Self:
         if self.correlation is not None:
+            if self.lever_arm_sigma is None or self.boresight_sigma is None:
+                raise ValueError("correlation needs both, lever_arm_sigma and boresight_sigma")
             matrix = np.array(self.correlation)
             rounding = 0.5e-6 * len(matrix)  # of an eigenvalue, where six decimals are written
             if not np.array_equal(matrix, matrix.T) or np.linalg.eigvalsh(matrix)[0] < -rounding:
@@ -64,11 +63,12 @@ class CalibratedMountingSection(MountingSection):
         return self
 
     def mounting(self) -> Mounting:
-        """The Mounting with its covariance."""
-        mounting = super().mounting()
-        if self.lever_arm_sigma is None or self.boresight_sigma is None:
-            return mounting
-        sigma = np.append(self.lever_arm_sigma, np.radians(self.boresight_sigma))
+        """The Mounting with its covariance, or with the sigmas of what was measured."""
+        mounting, unknown = super().mounting(), [np.nan] * 3
+        sigma = np.append(self.lever_arm_sigma or unknown, self.boresight_sigma or unknown)
+        sigma[3:] = np.radians(sigma[3:])
+        if np.isnan(sigma).any():
+            return mounting if np.isnan(sigma).all() else replace(mounting, measured=sigma)
         correlation = np.eye(6) if self.correlation is None else np.array(self.correlation)
         return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
 
@@ -89,6 +89,37 @@ class ScannerSection(TomlSection):
     def scanner(self) -> Scanner:
         """The same in radians."""
         return Scanner(self.range_noise, np.radians(self.angle_noise), self.lines_per_second)
+
+
+class MountedScannerSection(ScannerSection):
+    """One of several scanners: its files, what is believed of it, and its mounting."""
+
+    name: Annotated[str, Field(min_length=1)] | None = None
+    files: Annotated[list[str], Field(min_length=1)]
+    mounting: CalibratedMountingSection | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_files(cls, document: Any) -> Any:
+        if isinstance(document, dict) and "point_source_ids" in document:
+            raise ValueError(
+                "point_source_ids can't tell scanners apart: split each cloud file by scanner, and "
+                "name what each scanner wrote in its files"
+            )
+        return document
+
+
+def _kind_of_scanner(document):
+    return _LIST if isinstance(document, list | tuple) else _TABLE
+
+
+# Names of the alternatives, which keys in sentences leave out because they are blank
+_TABLE, _LIST = "", " "
+Scanners = Annotated[
+    Annotated[ScannerSection, Tag(_TABLE)]
+    | Annotated[list[MountedScannerSection], Field(min_length=1), Tag(_LIST)],
+    Discriminator(_kind_of_scanner),
+]
 
 
 class PosSection(TomlSection):
@@ -131,11 +162,32 @@ class PlannedSurveyFile(TomlSection):
     trajectory: TrajectorySection
     mounting: CalibratedMountingSection | None = None
     control: ControlSection | None = None
-    scanner: ScannerSection = ScannerSection()
+    scanner: Scanners = ScannerSection()
     pos: PosSection = PosSection()
     matching: MatchingSection = MatchingSection()
     ties: TiesSection = TiesSection()
     scene: SceneSection = SceneSection()
+
+    @model_validator(mode="after")
+    def _parts_scanners(self) -> Self:
+        names = [name for name, _ in self.scanners]
+        if names and self.mounting is not None:
+            raise ValueError(
+                "[mounting] is that of one scanner; with [[scanner]] each has its own, written "
+                "[scanner.mounting] below it"
+            )
+        if len(names) > len(set(names)):
+            raise ValueError(
+                f"the {len(names)} [[scanner]] need names of their own, and these are "
+                f"{', '.join(names)} (without a name it is the number)"
+            )
+        return self
+
+    @property
+    def scanners(self) -> list[tuple[str, MountedScannerSection]]:
+        """Each [[scanner]] with its name, or its number from 1; none with one [scanner]."""
+        sections = self.scanner if isinstance(self.scanner, list) else []
+        return [(section.name or str(n), section) for n, section in enumerate(sections, start=1)]
 
 
 class SurveyFile(PlannedSurveyFile):

@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -73,10 +73,13 @@ def _causes(items):
 
 def _sentence(item, model):
     """One sentence on one of pydantic's findings, with the dotted key."""
-    key = ".".join(str(part) for part in item["loc"])
+    key = ".".join(filter(str.strip, map(str, item["loc"])))
     if item["type"] == "extra_forbidden":
-        name = ".".join(part for part in item["loc"] if isinstance(part, str))
+        name = ".".join(part for part in item["loc"] if isinstance(part, str) and part.strip())
         near = nearest(name, _keys(model))
+        if near == name:
+            section = name.split(".")[0]
+            return f"{key} is a key of one of several: write [[{section}]], not [{section}]."
         return f"{shown(key)} is an unknown key; the nearest known one is {near}."
     if item["type"] == "missing":
         return f"{key} is missing."
@@ -96,7 +99,13 @@ def _keys(model, prefix=""):
     keys = []
     for name, field in model.model_fields.items():
         keys.append(prefix + name)
-        for kind in getattr(field.annotation, "__args__", (field.annotation,)):
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                keys += _keys(kind, f"{prefix}{name}.")
+        for section in _sections(field.annotation):
+            keys += _keys(section, f"{prefix}{name}.")
     return keys
+
+
+def _sections(annotation):
+    """Models among the types of an annotation, those of lists and alternatives too."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [section for part in get_args(annotation) for section in _sections(part)]

@@ -4,28 +4,20 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from mlscorr.correction import Correction
-from mlscorr.estimate import Calibration
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.evaluate.scores import score
-from mlscorr.evaluate.target_rows import surveyed_rows, unseen_rows
-from mlscorr.evaluate.ties import misfit_section
+from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.io.las import sample_gps_times
 from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.io.survey_copy import mounting_values, write_survey_copy
-from mlscorr.io.survey_file import FILE_NAME
-from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, write_calibrated_survey
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
-from mlscorr.survey import Matched, Survey
+from mlscorr.survey import Survey
 
 
 def calibrate(
@@ -33,13 +25,13 @@ def calibrate(
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
     ties: bool | None = None,
-) -> CalibratedSurvey:
+) -> CalibratedSurvey | CalibratedScanners:
     """Estimate what a survey's recorded mounting lacks by its targets, and what passes both saw.
 
     Parameters
     ----------
     survey : Survey
-        Of one scanner: a survey.toml holds one mounting.
+        Where it has several scanners, each is calibrated by its own files in turn.
     rng : numpy.random.Generator, optional
         For the plane fit's random samples; the same seed each time by default.
     progress : function, optional
@@ -50,7 +42,7 @@ def calibrate(
 
     Returns
     -------
-    CalibratedSurvey
+    CalibratedSurvey, or CalibratedScanners where there are several
         The check points take no part.
 
     Raises
@@ -74,6 +66,19 @@ def calibrate(
     >>> round(float(result.calibration.lsc.correction[2]), 1)  # m, up
     0.2
     """
+    if not survey.scanners:
+        return _calibrated(survey, "", rng, progress, ties)
+    parts = {}
+    for name, part in survey.by_scanner.items():
+        try:
+            parts[name] = _calibrated(part, f"Scanner {name}: ", rng, progress, ties)
+        except ValueError as error:
+            raise ValueError(f"Scanner {name}: {error}") from error
+    return CalibratedScanners(survey, parts)
+
+
+def _calibrated(survey, title, rng, progress, ties):
+    """The CalibratedSurvey of one scanner, with its title before each warning."""
     if survey.mounting is None:
         raise ValueError(
             f"{survey.path} has no [mounting]: a calibration needs the lever_arm (m) and boresight "
@@ -83,29 +88,24 @@ def calibrate(
     ties = survey.use_ties if ties is None else ties
     control, check, finding, calibration = estimate_site(survey, ties, rng, progress)
     for sentence in calibration.warnings:
-        warnings.warn(sentence, stacklevel=2)
+        warnings.warn(f"{title}{sentence}", stacklevel=3)
     missing = unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned)
     return CalibratedSurvey(survey, calibration, control, check, missing)
 
 
 @dataclass(frozen=True)
-class CalibratedSurvey:
-    """A calibrated survey: the calibration, the targets, and ``write``.
+class CalibratedScanners:
+    """A calibrated survey of several scanners, each by what it saw, and ``write``.
 
     Parameters
     ----------
     survey : Survey
-    calibration : Calibration
-    matched_control, matched_check : Matched
-    missing : list of TargetRow
-        Surveyed points without an observation.
+    by_scanner : dict
+        CalibratedSurvey by the scanner's name.
     """
 
     survey: Survey
-    calibration: Calibration
-    matched_control: Matched
-    matched_check: Matched
-    missing: list[TargetRow] = field(default_factory=list)
+    by_scanner: dict[str, CalibratedSurvey]
 
     def write(
         self,
@@ -115,19 +115,14 @@ class CalibratedSurvey:
         overwrite: bool = False,
         progress: Callable | None = None,
     ) -> dict:
-        """Write calibration.json, and survey.toml with the calibrated mounting, into a folder.
+        """Write calibration.json, and survey.toml with all calibrated mountings, into a folder.
 
         Parameters
         ----------
-        out : path
-            The folder, which appears whole or not at all.
+        out, clouds, overwrite, progress
+            As of ``CalibratedSurvey.write``.
         with_drift : bool
-            Estimate the POS error along with the mounting, and write trajectory.csv.
-        clouds : bool
-            Write the clouds as the calibrated mounting (and trajectory) puts them; survey.toml
-            then names these.
-        overwrite : bool
-        progress : function, optional
+            Can't be: each scanner gives a trajectory of its own.
 
         Returns
         -------
@@ -137,109 +132,29 @@ class CalibratedSurvey:
         Raises
         ------
         ValueError, OSError
-            As ``CorrectedSurvey.write`` does.
+            As ``CalibratedSurvey.write`` does.
         """
-        calibration = self.calibration
-        drift = calibration.correction_with_drift if with_drift else None
-        names = [file.path.name for file in self.survey.clouds]
+        if with_drift:
+            raise ValueError(
+                f"Each of the {len(self.by_scanner)} scanners of {self.survey.path} would give a "
+                "trajectory of its own. Calibrate without --with-drift, and run mlscorr correct "
+                "with the survey.toml that is written: it finds one drift by all of them."
+            )
+        content = document("calibration", self.report())
+        parts = list(self.by_scanner.values())
         with output_folder(out, self.survey.inputs, overwrite) as folder:
-            content = document("calibration", self.report(drift))
             write_json(folder / "calibration.json", content)
-            if with_drift:
-                write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
             if clouds:
                 done = (progress or silent)("Writing the cloud", self.survey.points)
-                correction = drift or calibration.correction()
-                write_clouds(self.survey, folder, correction, lambda times: done(len(times)))
-            write_survey_copy(
-                self.survey.path,
-                folder / FILE_NAME,
-                out,
-                calibration.lsc.mounting,
-                names if clouds else None,
-                "trajectory.csv" if clouds and with_drift else None,
-            )
+                for part in parts:
+                    part.write_clouds(folder, done)
+            write_calibrated_survey(folder, out, parts, clouds)
         return content
 
-    def report(self, drift: Correction | None = None) -> dict[str, object]:
-        """The content of calibration.json.
-
-        Parameters
-        ----------
-        drift : Correction, optional
-            Of mounting and POS error.
-        """
-        calibration = self.calibration
-        content = {
-            "name": self.survey.name,
-            "mounting": {
-                "recorded": _mounting(self.survey.mounting),
-                "calibrated": _mounting(calibration.lsc.mounting),
-            },
-            **{method: self._method(method) for method in ("lsc", "ls")},
-            "determined": calibration.determined.tolist(),
-            "parameters": _parameters(calibration.parameters),
-            "outliers": [vars(outlier) for outlier in calibration.outliers],
-            "targets": self._targets(calibration.correction()),
-            "ties": misfit_section(calibration.ties),
-            "warnings": list(calibration.warnings),
-            "notes": list(self.survey.notes),
-        }
-        if drift is not None:
-            change = drift.corrected.position - drift.recorded.position
-            content["with_drift"] = {
-                "control": self._statistics("control", drift),
-                "check": self._statistics("check", drift),
-                "position_rms": np.sqrt(np.mean(change**2, axis=0)).tolist(),
-                "position_largest": np.abs(change).max(axis=0).tolist(),
-            }
-        return content
-
-    def _method(self, method):
-        estimate = getattr(self.calibration, method)
-        correction = self.calibration.correction(method)
-        turn, sigma = np.degrees([estimate.correction[3:], estimate.sigma[3:]])
-        return {
-            "lever_arm": {
-                "correction": estimate.correction[:3].tolist(),
-                "sigma": estimate.sigma[:3].tolist(),
-            },
-            "boresight": {"correction": turn.tolist(), "sigma": sigma.tolist()},
-            "correlation": estimate.correlation.tolist(),
-            "sigma0": estimate.sigma0,
-            "control": self._statistics("control", correction),
-            "check": self._statistics("check", correction),
-        }
-
-    def _statistics(self, role, correction):
-        if role == "check":
-            return score(self.matched_check, correction).document()
-        used = self.matched_control[self.calibration.used]
-        return score(used, correction).document()
-
-    def _targets(self, correction):
-        """Rows of every surveyed point and pass, as in report.json."""
-        points = self.matched_control, self.matched_check
-        rows = surveyed_rows(*points, correction, self.calibration.outliers)
-        return [row.document() for row in rows + self.missing]
-
-
-def _mounting(mounting):
-    return dict(zip(("lever_arm", "boresight"), mounting_values(mounting), strict=True))
-
-
-def _parameters(weighed):
-    """The POS error's parameters on average, and the probability of each covariance family."""
-    names = {"position_scale": "drift_scale", "position_time": "drift_time"}
-    names |= {name: name for name in ("attitude_scale", "attitude_time")}
-    mean = {
-        title: np.exp(sum(p * np.log(getattr(parameters, name)) for parameters, p in weighed))
-        for title, name in names.items()
-    }
-    families = {}
-    for parameters, probability in weighed:
-        families[parameters.family] = families.get(parameters.family, 0.0) + probability
-    return {**{name: float(value) for name, value in mean.items()}, "families": families}
+    def report(self) -> dict[str, object]:
+        """The content of calibration.json: by scanner what it is of one."""
+        scanners = {name: part.report() for name, part in self.by_scanner.items()}
+        return {"name": self.survey.name, "scanners": scanners}
 
 
 def warn_of_scanners(survey: Survey) -> None:
@@ -259,8 +174,8 @@ def warn_of_scanners(survey: Survey) -> None:
         if overlap > SETTINGS.tile_overlap * min(end - start, last - first):
             warnings.warn(
                 f"{name} and {other} were measured at the same time for {overlap:.1f} s. If two "
-                "scanners did so, calibrate each with a survey.toml of its own, which names its "
-                "files and its mounting: all files here are taken to be of the one mounting.",
-                stacklevel=3,
+                "scanners did so, name them as [[scanner]], each with its files and its mounting: "
+                "these files are taken to be of one.",
+                stacklevel=4,
             )
             return

@@ -16,7 +16,7 @@ def write_clouds(
     folder: Path,
     correction: Correcting,
     watch: Callable[[np.ndarray], object],
-    sigma: PointSigma | None = None,
+    sigma: Callable[[Survey], PointSigma] | None = None,
 ) -> list[tuple[Path, int, int]]:
     """Write a survey's clouds into a folder, under their names.
 
@@ -27,16 +27,19 @@ def write_clouds(
     correction : anything with ``apply(cloud) -> cloud``
     watch : function of gps_time (n,)
         Is told the times of the points that were just written.
-    sigma : PointSigma, optional
-        Gives each point three fields more.
+    sigma : function, optional
+        ``sigma(survey)`` of a scanner gives PointSigma; each point gets three fields more.
 
     Returns
     -------
     list of (path, points, points outside the trajectory)
-        The latter stay as they were.
+        Scanner by scanner; the latter stay as they were.
     """
-    paths = [folder / file.path.name for file in survey.clouds]
-    return [
-        (path, file.points, write_corrected(file, path, correction, watch, sigma))
-        for file, path in zip(survey.clouds, paths, strict=True)
-    ]
+    written = []
+    for part in survey.by_scanner.values():
+        sigmas = sigma and sigma(part)
+        for file in part.clouds:
+            path = folder / file.path.name
+            outside = write_corrected(file, path, correction, watch, sigmas)
+            written.append((path, file.points, outside))
+    return written

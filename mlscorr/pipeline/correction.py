@@ -222,11 +222,16 @@ class CorrectedSurvey:
         """Where one more control point each would help most, the best first."""
         return place_control(self.estimate)
 
-    @property
-    def point_sigma(self) -> PointSigma:
-        """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m."""
-        correction = self.estimate.correction
-        return PointSigma.of(correction, self.survey.scanner, self.survey.mounting)
+    def point_sigma(self, survey: Survey | None = None) -> PointSigma:
+        """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m.
+
+        Parameters
+        ----------
+        survey : Survey, optional
+            One of ``survey.by_scanner``, where there are several scanners.
+        """
+        survey = survey or self.survey
+        return PointSigma.of(self.estimate.correction, survey.scanner, survey.mounting)
 
     def _write_clouds(self, folder, progress, sigma):
         """Write the clouds: (path, points, outside) of each, and points outside of control and

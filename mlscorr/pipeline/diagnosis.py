@@ -89,6 +89,7 @@ def diagnose(
     'time_offset'
     """
     rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
+    survey.check_one_scanner("a diagnosis")
     library = known_effects() if library is None else library
     progress = progress or silent
     simulator = beliefs_of(survey) if simulator is None else simulator

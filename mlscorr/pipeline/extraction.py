@@ -74,7 +74,7 @@ def extract(
     def searched(file):
         """The chunks of a file, each searched as it passes."""
         of_file = objects.setdefault(len(objects), [])
-        for chunk, targets in search_targets(read_chunks(file), survey, shapes, rng):
+        for chunk, targets in search_targets(read_chunks(file), survey.of(file), shapes, rng):
             present[chunk.intensity] = True
             of_file += targets
             yield chunk

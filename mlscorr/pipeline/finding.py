@@ -184,7 +184,7 @@ def fit_while_reading(
             near.add(cloud)
             generator = np.random.default_rng(seed)  # whatever was looked at before
             part = Candidates(cloud, segment, NO_POINTS, {})
-            targets = fit_near_control(part, survey, generator)
+            targets = fit_near_control(part, survey.of(survey.clouds[file]), generator)
         fitted.extend((file, *target) for target in targets)
         if settle is not None:
             settle([target for _, target in targets], since)

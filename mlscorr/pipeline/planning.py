@@ -44,6 +44,7 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> "Plan
     ValueError
         Without a mounting, or when nothing will be seen.
     """
+    survey.check_one_scanner("a plan")
     rows = planned_rows(survey)
     library = known_effects() if library is None else library
     signs, left_out = signatures(rows, survey, library)

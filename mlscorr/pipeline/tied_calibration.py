@@ -111,12 +111,12 @@ def tie_mounting(
     features : TieFeatures
     """
     correction, mounting = calibration.correction_with_drift, calibration.lsc.mounting
-    sigma = placed_sigma(correction, survey.scanner, mounting, features)
+    sigma = placed_sigma(correction, replace(survey, mounting=mounting), features)
     radius = min(widest_gate(sigma), survey.search_radius)
     recorded, trajectory = calibration.recorded, calibration.trajectory
     moved = remounted(features, trajectory, recorded, mounting)
-    known = replace(mounting, covariance=None)
-    sigma = placed_sigma(correction, survey.scanner, known, features)
+    known = replace(survey, mounting=replace(mounting, covariance=None))
+    sigma = placed_sigma(correction, known, features)
     start = coarse_mounting(moved, trajectory, mounting, sigma, radius)
     correction = replace(correction, corrected_mounting=start)
     sigma = np.hypot(sigma, SETTINGS.roughest)

@@ -19,7 +19,7 @@ from mlscorr.estimate import (
 )
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_check, find_control
-from mlscorr.survey import Matched, Mounting, Scanner, Survey, TieFeatures, Ties
+from mlscorr.survey import Matched, Survey, TieFeatures, Ties
 from mlscorr.ties import (
     NORMAL_SCATTER,
     SETTINGS,
@@ -126,7 +126,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     features : TieFeatures
     """
     correction = estimate.correction
-    sigma = placed_sigma(correction, survey.scanner, survey.mounting, features)
+    sigma = placed_sigma(correction, survey, features)
     radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
     moved = _moved(correction, features)
     moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
@@ -142,21 +142,21 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
         radius = max(radius / 2, limit)
 
 
-def placed_sigma(
-    correction: Correction, scanner: Scanner, mounting: Mounting | None, features: TieFeatures
-) -> np.ndarray:
+def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) -> np.ndarray:
     """One sigma (n,) of the places of features along any axis, after a correction. Units: m.
 
     Parameters
     ----------
     correction : Correction
-    scanner : Scanner
-    mounting : Mounting or None
-        With the covariance of what is open in it.
+    survey : Survey
+        Its mountings with the covariance of what is open in them.
     features : TieFeatures
     """
-    sigma = PointSigma.of(correction, scanner, mounting)
-    return sigma.at(features.centre, features.gps_time).max(axis=1)
+    sigma = np.empty(len(features))
+    for part, rows in survey.rows_by_scanner(features.source):
+        of_part = PointSigma.of(correction, part.scanner, part.mounting)
+        sigma[rows] = of_part.at(features.centre[rows], features.gps_time[rows]).max(axis=1)
+    return sigma
 
 
 def widest_gate(sigma: np.ndarray) -> float:

@@ -35,11 +35,12 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
     else:
         sigma = "its own at each epoch"
     pairs.append(("Stated sigma of the trajectory's position", sigma))
-    arm = survey.mounting
-    text = "not given (not needed: it cancels where only the trajectory is corrected)"
-    if arm is not None:
-        text = f"right, forward, up {', '.join(f'{v:g}' for v in arm.lever_arm)} m"
-    return [*pairs, ("Lever arm of the scanner", text)]
+    for name, part in survey.by_scanner.items():
+        text = "not given (not needed: it cancels where only the trajectory is corrected)"
+        if part.mounting is not None:
+            text = f"right, forward, up {', '.join(f'{v:g}' for v in part.mounting.lever_arm)} m"
+        pairs.append((f"Lever arm of {f'scanner {name}' if name else 'the scanner'}", text))
+    return pairs
 
 
 def _time(cloud):

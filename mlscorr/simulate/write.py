@@ -153,19 +153,16 @@ def _control_csv(survey):
 
 
 def _survey_toml(survey):
-    """survey.toml, with the first scanner's mounting and what is believed of scanner and POS."""
-    scenario, scanner = survey.scenario, survey.scenario.scanner[0]
-    noise = {"range_noise": scanner.range_noise, "angle_noise": scanner.angle_noise}
+    """survey.toml, with the recorded mountings and what is believed of scanners and POS."""
+    scenario = survey.scenario
     position, attitude = _pos_sigmas(survey.trajectory)
     sections = {
         "name": scenario.name,
         "crs": scenario.crs,
         "cloud": {"files": list(survey.files), "gps_time": "week"},
         "trajectory": {"file": "trajectory.csv"},
-        "mounting": _mounting_section(survey.mountings),
+        **_scanner_sections(survey),
         "control": {"file": "control.csv"},
-        "scanner": {name: sigma for name, sigma in noise.items() if sigma > 0}
-        | {"lines_per_second": scanner.lines_per_second},
         "pos": {
             "position_sigma": position,
             "attitude_sigma": attitude,
@@ -177,13 +174,25 @@ def _survey_toml(survey):
     return tomlkit.dumps(sections)
 
 
-def _mounting_section(mountings):
-    """The first scanner's mounting, and in comments those of the others."""
-    section = tomlkit.item(_mounting(mountings[0]))
-    for k, other in enumerate(map(_mounting, mountings[1:]), start=2):
-        values = ", ".join(f"{key} = {value}" for key, value in other.items())
-        section.add(tomlkit.comment(f"pass-N-scanner-{k}.laz: {values}"))
-    return section
+def _scanner_sections(survey):
+    """The scanner and its mounting, or each of several with its files and mounting."""
+    scanners, mountings = survey.scenario.scanner, [_mounting(m) for m in survey.mountings]
+    beliefs = []
+    for scanner in scanners:
+        noise = {"range_noise": scanner.range_noise, "angle_noise": scanner.angle_noise}
+        believed = {name: sigma for name, sigma in noise.items() if sigma > 0}
+        beliefs.append(believed | {"lines_per_second": scanner.lines_per_second})
+    if len(scanners) == 1:
+        return {"mounting": mountings[0], "scanner": beliefs[0]}
+    files = [survey.files[k :: len(scanners)] for k in range(len(scanners))]
+    return {
+        "scanner": [
+            {"name": str(k), "files": list(of), **believed, "mounting": mounting}
+            for k, (of, believed, mounting) in enumerate(
+                zip(files, beliefs, mountings, strict=True), start=1
+            )
+        ]
+    }
 
 
 def _pos_sigmas(trajectory):

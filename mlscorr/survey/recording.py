@@ -1,6 +1,9 @@
 """A survey as it was recorded."""
 
-from dataclasses import dataclass, field
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -31,6 +34,25 @@ class InputFile:
 
 
 @dataclass(frozen=True)
+class MountedScanner:
+    """One of several scanners on a vehicle.
+
+    Parameters
+    ----------
+    name : str
+    scanner : Scanner
+    mounting : Mounting or None
+    clouds : tuple of CloudFile
+        Those that it wrote.
+    """
+
+    name: str
+    scanner: Scanner
+    mounting: Mounting | None
+    clouds: tuple[CloudFile, ...]
+
+
+@dataclass(frozen=True)
 class Survey:
     """One mobile survey as it was recorded: cloud files, trajectory, mounting, control, beliefs.
 
@@ -43,9 +65,11 @@ class Survey:
     clouds : tuple of CloudFile
     trajectory : Trajectory
     mounting : Mounting or None
+        Of the one scanner; None where there are several.
     control, check : ControlPoints
         Those that take part in an estimate, and those that never do.
     scanner : Scanner
+        Of the one; whatever it says where there are several.
     pos : Pos
     reference : Path, optional
         A reference surface in the cloud's coordinates.
@@ -57,6 +81,8 @@ class Survey:
         What the readers worked out, for the report.
     inputs : tuple of InputFile
         survey.toml and every file that it names.
+    scanners : tuple of MountedScanner
+        Where there are several; each cloud file is of one of them.
     """
 
     name: str
@@ -74,6 +100,7 @@ class Survey:
     use_ties: bool = True
     notes: tuple[str, ...] = ()
     inputs: tuple[InputFile, ...] = ()
+    scanners: tuple[MountedScanner, ...] = ()
 
     @cached_property
     def surveyed(self) -> ControlPoints:
@@ -89,3 +116,69 @@ class Survey:
     def lever_arm(self) -> np.ndarray:
         """The scanner (3,) in body axes; zero where no mounting is known. Units: m."""
         return np.zeros(3) if self.mounting is None else self.mounting.lever_arm
+
+    @cached_property
+    def by_scanner(self) -> dict[str, Survey]:
+        """The survey of each scanner by its name: its files, its mounting, what is believed of it.
+
+        The survey itself, without a name, where there is one scanner.
+        """
+        parts = {
+            mounted.name: replace(
+                self,
+                clouds=mounted.clouds,
+                mounting=mounted.mounting,
+                scanner=mounted.scanner,
+                scanners=(),
+            )
+            for mounted in self.scanners
+        }
+        return parts or {"": self}
+
+    def of(self, file: CloudFile) -> Survey:
+        """The survey of the scanner that wrote a file.
+
+        Parameters
+        ----------
+        file : CloudFile
+        """
+        parts = self.by_scanner.values()
+        return next((part for part in parts if file in part.clouds), self)
+
+    def rows_by_scanner(self, source: np.ndarray) -> Iterator[tuple[Survey, np.ndarray | slice]]:
+        """The survey of each scanner, and which rows it saw.
+
+        Parameters
+        ----------
+        source : (n,) int array
+            Number of the cloud file of each row, from 0.
+
+        Yields
+        ------
+        survey : Survey
+        rows : (n,) bool array, or a slice of all
+        """
+        for part in self.by_scanner.values():
+            numbers = [self.clouds.index(file) for file in part.clouds]
+            yield part, np.isin(source, numbers) if self.scanners else slice(None)
+
+    def check_one_scanner(self, verb: str) -> None:
+        """Refuse several scanners, for what rests on one mounting.
+
+        Parameters
+        ----------
+        verb : str
+            What does.
+
+        Raises
+        ------
+        ValueError
+            Names them, and the way out.
+        """
+        if self.scanners:
+            names = ", ".join(mounted.name for mounted in self.scanners)
+            raise ValueError(
+                f"{self.path} has {len(self.scanners)} scanners ({names}), and {verb} rests on one "
+                "mounting. Give it a survey.toml of each scanner: its files under [cloud], its "
+                "[mounting] and its [scanner]."
+            )

@@ -148,12 +148,17 @@ class Mounting:
     boresight : Rotation
         R_L^P.
     covariance : (6, 6) array, optional
-        Of the lever arm (m) and of a small rotation of the boresight about the body axes (rad).
+        Of the lever arm (m) and of a small rotation of the boresight about the body axes (rad), as
+        a calibration left it.
+    measured : (6,) array, optional
+        One sigma of both where either was measured without a calibration; NaN for the other. Units:
+        m, rad.
     """
 
     lever_arm: np.ndarray
     boresight: Rotation
     covariance: np.ndarray | None = None
+    measured: np.ndarray | None = None
 
 
 def control_epochs(gps_time: np.ndarray) -> np.ndarray:

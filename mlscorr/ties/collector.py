@@ -52,7 +52,7 @@ class TieCollector:
 
     def _close(self, rows):
         """Keep the features of cells (count,), and of all so far so many as may stay."""
-        self._kept.append(find_shapes(self._survey, *self._cells.of(rows)))
+        self._kept.append(self._shapes(rows))
         self._cells.remove(rows)
         self._loose += len(self._kept[-1])
         if self._loose > max(self._held_cells, self._kept_in_order):
@@ -60,9 +60,18 @@ class TieCollector:
             self._kept = [features[thin(features, self._origin)]]
             self._kept_in_order, self._loose = len(self._kept[0]), 0
 
+    def _shapes(self, rows):
+        """Features of cells (count,), each seen from the scanner of its file."""
+        cells = self._cells.of(rows)
+        source = cells[2] // len(self._segments)
+        return TieFeatures.concatenate(
+            find_shapes(part, *(column[inside] for column in cells))
+            for part, inside in self._survey.rows_by_scanner(source)
+        )
+
     def features(self) -> TieFeatures:
         """Features of all chunks so far, in order of pass and time; chunks may still follow."""
-        rest = find_shapes(self._survey, *self._cells.of(np.ones(self._cells.count, bool)))
+        rest = self._shapes(np.ones(self._cells.count, bool))
         features = TieFeatures.concatenate([*self._kept, rest])
         features = features[thin(features, self._origin)]
         number = np.empty(self._starts.size, int)

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.estimate import estimate_mounting
+from mlscorr.estimate.mounting import georeferenced_anew, prior_sigma
 from mlscorr.evaluate.scores import misclosures
 from mlscorr.frames import attitude_from_angles, georeference, mounting_partials, to_scanner
 from mlscorr.io.survey_copy import write_survey_copy
@@ -324,7 +325,7 @@ def test_a_copied_survey_file_keeps_all_but_the_mounting(tmp_path):
     new.mkdir(parents=True)
     (old / "survey.toml").write_text(SURVEY)
     mounting = replace(RECORDED, boresight=Rotation.from_rotvec([0, 0, 0.01]) * RECORDED.boresight)
-    write_survey_copy(old / "survey.toml", new / "survey.toml", new, mounting)
+    write_survey_copy(old / "survey.toml", new / "survey.toml", new, [mounting])
     text = (new / "survey.toml").read_text()
     for comment in ("# of a survey", "# the first", "# from the drawing", "# the end"):
         assert comment in text
@@ -339,7 +340,10 @@ def test_a_copied_survey_file_keeps_all_but_the_mounting(tmp_path):
 @pytest.mark.parametrize(
     "keys, fault",
     [
-        ("lever_arm_sigma = [0.1, 0.1, 0.1]", "are needed both, or neither"),
+        (
+            f"lever_arm_sigma = [0.1, 0.1, 0.1]\ncorrelation = {np.eye(6).tolist()}",
+            "correlation needs both",
+        ),
         (
             "lever_arm_sigma = [1.0, 1.0, 1.0]\nboresight_sigma = [1.0, 1.0, 1.0]\n"
             f"correlation = {(2 * np.eye(6)[::-1] - np.ones((6, 6))).tolist()}",
@@ -347,8 +351,8 @@ def test_a_copied_survey_file_keeps_all_but_the_mounting(tmp_path):
         ),
     ],
 )
-def test_a_mounting_with_half_a_covariance_is_refused(keys, fault, tmp_path):
-    "Sigmas come together, and correlations must be possible"
+def test_a_mounting_with_an_impossible_covariance_is_refused(keys, fault, tmp_path):
+    "Correlations need the sigmas of both, and must be possible"
     path = tmp_path / "survey.toml"
     path.write_text(SURVEY.replace("# the end", keys))
     with pytest.raises(ValueError, match=fault):
@@ -467,3 +471,21 @@ def test_the_example_makes_its_picture(street, tmp_path):
     command = [sys.executable, script, street, "--picture", picture]
     assert "lever_arm lacks" in subprocess.check_output(command, text=True)
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_measured_lever_arm_is_a_prior():
+    "To a millimetre by tape: the calibration keeps it, and the boresight is told better too"
+    site = Site(5, passes=1, swing=0.0)
+    free = site.calibrate()
+    true = RECORDED.lever_arm + LACKS[:3]
+    tape = np.append(np.full(3, 1e-3), np.full(3, np.nan))
+    measured = replace(RECORDED, lever_arm=true, measured=tape)
+    assert np.array_equal(prior_sigma(measured)[3:], prior_sigma(RECORDED)[3:])
+    moved = georeferenced_anew(
+        site.recorded, (RECORDED, measured), site.observations.position, site.observations.gps_time
+    )
+    matched = Matched.by_name(replace(site.observations, position=moved), site.control)
+    calibration = estimate_mounting(site.recorded, measured, matched)
+    assert np.abs(calibration.lsc.correction[:3]).max() < 3e-3  # m
+    assert (calibration.lsc.sigma[:3] <= 1.01e-3).all()
+    assert (calibration.lsc.sigma < free.lsc.sigma).all()

@@ -461,3 +461,91 @@ def test_an_sbet_survey_says_what_was_assumed(folder):
     assert "taken as WGS 84, the datum of WGS 84 / UTM zone 11N" in survey.notes[1]
     assert "ellipsoidal heights were kept" in survey.notes[2]
     assert "meridian convergence" in survey.notes[3]
+
+
+# ---- several scanners
+
+MOUNTED = """
+[[scanner]]
+name = "left"
+files = ["pass-1.*"]
+range_noise = 0.01
+[scanner.mounting]
+lever_arm = [0.1, -0.6, 0.4]
+boresight = [90.0, 0.0, 35.0]
+lever_arm_sigma = [0.01, 0.02, 0.03]
+
+[[scanner]]
+files = ["./pass-2.las"]
+"""
+
+
+@pytest.fixture
+def mounted(folder):
+    "The survey with a scanner for each of its files"
+    (folder / "survey.toml").write_text(TOML + MOUNTED)
+    return folder
+
+
+def test_each_of_several_scanners_has_its_files_and_mounting(mounted):
+    "Patterns and names find files of [cloud]; one without a name has its number, and no mounting"
+    survey = read_survey(mounted)
+    left, other = survey.scanners
+    assert (left.name, other.name, survey.mounting) == ("left", "2", None)
+    assert [file.path.name for file in left.clouds] == ["pass-1.las"]
+    assert [file.path.name for file in other.clouds] == ["pass-2.las"]
+    assert left.mounting.lever_arm.tolist() == [0.1, -0.6, 0.4]
+    assert (left.scanner.range_noise, other.scanner, other.mounting) == (0.01, Scanner(), None)
+    assert any("left wrote pass-1.las; 2 wrote pass-2.las" in note for note in survey.notes)
+
+
+def test_one_in_the_list_is_one_scanner(mounted):
+    "[[scanner]] once, for all files, is the same as [scanner] and [mounting]"
+    text = MOUNTED[: MOUNTED.rindex("[[scanner]]")].replace("pass-1.*", "pass-*")
+    (mounted / "survey.toml").write_text(TOML + text)
+    survey = read_survey(mounted)
+    assert survey.scanners == () and survey.scanner.range_noise == 0.01
+    assert survey.mounting.lever_arm.tolist() == [0.1, -0.6, 0.4]
+
+
+def test_a_measured_lever_arm_needs_no_boresight_sigma(mounted):
+    "Its sigmas alone are those of a measurement; with both they are a calibration's covariance"
+    lever_arm = read_survey(mounted).scanners[0].mounting
+    assert lever_arm.covariance is None
+    assert lever_arm.measured[:3].tolist() == [0.01, 0.02, 0.03]
+    assert np.isnan(lever_arm.measured[3:]).all()
+    toml(mounted, "lever_arm_sigma = [0.01, 0.02, 0.03]", "boresight_sigma = [1.0, 1.0, 2.0]")
+    assert np.degrees(read_survey(mounted).scanners[0].mounting.measured[5]) == pytest.approx(2.0)
+    toml(mounted, "boresight_sigma", "lever_arm_sigma = [0.1, 0.1, 0.1]\nboresight_sigma")
+    both = read_survey(mounted).scanners[0].mounting
+    assert both.measured is None and both.covariance.shape == (6, 6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("./pass-2.las", "pass-1.las", r"2 of the 2 .* one .*pass-1.las \(2, left\), .* none"),
+        ('["./pass-2.las"]', '["trajectory.csv"]', r"trajectory.csv of scanner 2 is none of the 2"),
+        ("./pass-2.las", "drive-*", r"scanner\.files of .*: no file is like .*drive-\*"),
+        ('"left"', '"2"', r"names of their own, and these are 2, 2 \(without"),
+        ('files = ["./pass-2.las"]', "", r"scanner\.1\.files is missing"),
+        ('files = ["./pass-2.las"]', "point_source_ids = [2]", r"\.1: .*split each cloud file"),
+        ("range_noise", "range_nose", r"scanner\.0\.range_nose .* scanner\.range_noise"),
+        ("[control]", "[mounting]\nlever_arm = [0, 0, 0]\nboresight = [0, 0, 0]\n[control]",
+         r"\[mounting\] is that of one scanner"),
+    ],
+)  # fmt: skip
+def test_scanners_that_do_not_part_the_files_are_refused(mounted, old, new, message):
+    "Files of none or of two, patterns of none, doubled names, keys of one scanner: a sentence each"
+    toml(mounted, old, new)
+    with pytest.raises((ValueError, FileNotFoundError), match=message):
+        read_survey(mounted)
+
+
+def test_keys_of_one_of_several_do_not_stand_in_a_single_section(folder):
+    "Who writes [scanner] with files hears of [[scanner]]"
+    (folder / "survey.toml").write_text(TOML + '[scanner]\nfiles = ["pass-1.las"]\n')
+    with pytest.raises(
+        ValueError, match=r"scanner.files .* write \[\[scanner\]\], not \[scanner\]"
+    ):
+        read_survey(folder)

@@ -4,8 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from mlscorr.survey import CloudFile, Survey
+from mlscorr.survey import CloudFile, MountedScanner, Scanner, Survey
 from tests.beds.drives import MOUNTING, drive
 from tests.survey.test_targets import surveyed
 
@@ -29,3 +30,42 @@ def test_without_a_mounting_the_scanner_stands_at_the_pos():
     "The lever arm of an unknown mounting is zero"
     assert np.array_equal(SURVEY.lever_arm, MOUNTING.lever_arm)
     assert not replace(SURVEY, mounting=None).lever_arm.any()  # m
+
+
+def with_scanners():
+    "The street with a left scanner that wrote the second file, and a right one without a mounting"
+    arm = replace(MOUNTING, lever_arm=np.ones(3))
+    left = MountedScanner("left", Scanner(range_noise=0.02), arm, CLOUDS[1:])
+    right = MountedScanner("right", Scanner(), None, CLOUDS[:1])
+    return replace(SURVEY, mounting=None, scanners=(left, right))
+
+
+def test_a_file_is_seen_by_the_scanner_that_wrote_it():
+    "Mounting, beliefs and files are those of its scanner; the same survey where there is one"
+    survey = with_scanners()
+    left = survey.scanners[0]
+    assert survey.of(CLOUDS[1]).mounting is left.mounting
+    assert survey.of(CLOUDS[1]).scanner is left.scanner
+    assert survey.of(CLOUDS[0]).clouds == CLOUDS[:1]
+    assert survey.of(CLOUDS[0]).mounting is None
+    assert list(survey.by_scanner) == ["left", "right"]
+    assert SURVEY.of(CLOUDS[0]) is SURVEY.by_scanner[""] is SURVEY
+
+
+def test_rows_are_parted_by_the_scanner_of_their_file():
+    "What files 0, 1, 1 saw is one row of the right scanner and two of the left one"
+    source = np.array([0, 1, 1])
+    (_, left), (_, right) = with_scanners().rows_by_scanner(source)
+    assert left.tolist() == [False, True, True]
+    assert right.tolist() == [True, False, False]
+    ((survey, rows),) = SURVEY.rows_by_scanner(source)
+    assert survey is SURVEY and len(source[rows]) == 3
+
+
+def test_what_rests_on_one_mounting_refuses_several_scanners():
+    "The sentence names them and the way out; one scanner is let through"
+    SURVEY.check_one_scanner("a plan")
+    with pytest.raises(
+        ValueError, match=r"2 scanners \(left, right\), and a plan .*of each scanner"
+    ):
+        with_scanners().check_one_scanner("a plan")

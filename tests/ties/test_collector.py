@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from mlscorr.survey import PointCloud
+from mlscorr.survey import MountedScanner, Mounting, PointCloud, Scanner
 from mlscorr.ties import TieCollector
 from tests.beds import tie_streets as street
 
@@ -85,3 +86,26 @@ def test_a_wall_knows_when_each_end_was_seen():
     for number, sign in ((1, 1.0), (2, -1.0)):
         along = np.median(walls.sweep[walls.pass_number == number, 0])
         assert abs(along - sign / street.SPEED) < 0.01  # s/m
+
+
+def test_each_file_is_seen_from_its_own_scanner():
+    "Two scanners with lever arms and noises of their own: what each finds alone, in one survey"
+    survey, parts, straight = street.survey(), street.clouds(), Rotation.identity()
+    mounted = [
+        MountedScanner(
+            str(x),
+            Scanner(range_noise=0.01 + 0.001 * x),
+            Mounting(np.array([0.0, 0.0, x]), straight),
+            (file,),
+        )
+        for x, file in zip((2.0, -1.0), survey.clouds, strict=True)
+    ]
+    features = street.collect(replace(survey, scanners=tuple(mounted)), parts)
+    for number, scanner in enumerate(mounted):
+        alone = replace(survey, mounting=scanner.mounting, scanner=scanner.scanner)
+        other = street.collect(alone, parts)
+        inside, same = features.source == number, other.source == number
+        np.testing.assert_array_equal(features.centre[inside], other.centre[same])
+        np.testing.assert_array_equal(features.variance[inside], other.variance[same])
+    from_one = street.collect(replace(survey, mounting=mounted[0].mounting), parts)
+    assert not np.array_equal(features.centre, from_one.centre)  # a post lies behind what is seen

@@ -1,0 +1,214 @@
+"""What a calibration gives of one scanner, and its files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.correction import Correction
+from mlscorr.estimate import Calibration
+from mlscorr.evaluate.rows import TargetRow
+from mlscorr.evaluate.scores import score
+from mlscorr.evaluate.target_rows import surveyed_rows
+from mlscorr.evaluate.ties import misfit_section
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.survey_copy import mounting_values, write_survey_copy
+from mlscorr.io.survey_file import FILE_NAME
+from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.finding import silent
+from mlscorr.survey import Matched, Survey
+
+
+@dataclass(frozen=True)
+class CalibratedSurvey:
+    """A calibrated survey: the calibration, the targets, and ``write``.
+
+    Parameters
+    ----------
+    survey : Survey
+    calibration : Calibration
+    matched_control, matched_check : Matched
+    missing : list of TargetRow
+        Surveyed points without an observation.
+    """
+
+    survey: Survey
+    calibration: Calibration
+    matched_control: Matched
+    matched_check: Matched
+    missing: list[TargetRow] = field(default_factory=list)
+
+    def write(
+        self,
+        out: str | Path,
+        with_drift: bool = False,
+        clouds: bool = False,
+        overwrite: bool = False,
+        progress: Callable | None = None,
+    ) -> dict:
+        """Write calibration.json, and survey.toml with the calibrated mounting, into a folder.
+
+        Parameters
+        ----------
+        out : path
+            The folder, which appears whole or not at all.
+        with_drift : bool
+            Estimate the POS error along with the mounting, and write trajectory.csv.
+        clouds : bool
+            Write the clouds as the calibrated mounting (and trajectory) puts them; survey.toml
+            then names these.
+        overwrite : bool
+        progress : function, optional
+
+        Returns
+        -------
+        dict
+            The document of calibration.json.
+
+        Raises
+        ------
+        ValueError, OSError
+            As ``CorrectedSurvey.write`` does.
+        """
+        drift = self.calibration.correction_with_drift if with_drift else None
+        content = document("calibration", self.report(drift))
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
+            write_json(folder / "calibration.json", content)
+            if with_drift:
+                write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
+            if clouds:
+                done = (progress or silent)("Writing the cloud", self.survey.points)
+                self.write_clouds(folder, done, drift)
+            trajectory = "trajectory.csv" if clouds and with_drift else None
+            write_calibrated_survey(folder, out, [self], clouds, trajectory)
+        return content
+
+    def write_clouds(self, folder: Path, done: Callable, drift: Correction | None = None) -> None:
+        """Write the clouds as the calibrated mounting puts them.
+
+        Parameters
+        ----------
+        folder : Path
+        done : function
+            Of the number of points just done.
+        drift : Correction, optional
+            Of mounting and POS error.
+        """
+        correction = drift or self.calibration.correction()
+        write_clouds(self.survey, folder, correction, lambda times: done(len(times)))
+
+    def report(self, drift: Correction | None = None) -> dict[str, object]:
+        """The content of calibration.json.
+
+        Parameters
+        ----------
+        drift : Correction, optional
+            Of mounting and POS error.
+        """
+        calibration = self.calibration
+        content = {
+            "name": self.survey.name,
+            "mounting": {
+                "recorded": _mounting(self.survey.mounting),
+                "calibrated": _mounting(calibration.lsc.mounting),
+            },
+            **{method: self._method(method) for method in ("lsc", "ls")},
+            "determined": calibration.determined.tolist(),
+            "parameters": _parameters(calibration.parameters),
+            "outliers": [vars(outlier) for outlier in calibration.outliers],
+            "targets": self._targets(calibration.correction()),
+            "ties": misfit_section(calibration.ties),
+            "warnings": list(calibration.warnings),
+            "notes": list(self.survey.notes),
+        }
+        if drift is not None:
+            change = drift.corrected.position - drift.recorded.position
+            content["with_drift"] = {
+                "control": self._statistics("control", drift),
+                "check": self._statistics("check", drift),
+                "position_rms": np.sqrt(np.mean(change**2, axis=0)).tolist(),
+                "position_largest": np.abs(change).max(axis=0).tolist(),
+            }
+        return content
+
+    def _method(self, method):
+        estimate = getattr(self.calibration, method)
+        correction = self.calibration.correction(method)
+        turn, sigma = np.degrees([estimate.correction[3:], estimate.sigma[3:]])
+        return {
+            "lever_arm": {
+                "correction": estimate.correction[:3].tolist(),
+                "sigma": estimate.sigma[:3].tolist(),
+            },
+            "boresight": {"correction": turn.tolist(), "sigma": sigma.tolist()},
+            "correlation": estimate.correlation.tolist(),
+            "sigma0": estimate.sigma0,
+            "control": self._statistics("control", correction),
+            "check": self._statistics("check", correction),
+        }
+
+    def _statistics(self, role, correction):
+        if role == "check":
+            return score(self.matched_check, correction).document()
+        used = self.matched_control[self.calibration.used]
+        return score(used, correction).document()
+
+    def _targets(self, correction):
+        """Rows of every surveyed point and pass, as in report.json."""
+        points = self.matched_control, self.matched_check
+        rows = surveyed_rows(*points, correction, self.calibration.outliers)
+        return [row.document() for row in rows + self.missing]
+
+
+def write_calibrated_survey(
+    folder: Path,
+    out: str | Path,
+    scanners: Sequence[CalibratedSurvey],
+    clouds: bool,
+    trajectory: str | None = None,
+) -> None:
+    """Write survey.toml with the calibrated mountings of its scanners.
+
+    Parameters
+    ----------
+    folder : Path
+    out : path
+        Where the folder will stand in the end.
+    scanners : sequence of CalibratedSurvey
+        In the order of survey.toml.
+    clouds : bool
+        Whether it shall name the clouds in the folder.
+    trajectory : str, optional
+        New trajectory in the folder.
+    """
+    files = [[file.path.name for file in part.survey.clouds] for part in scanners]
+    write_survey_copy(
+        scanners[0].survey.path,
+        folder / FILE_NAME,
+        out,
+        [part.calibration.lsc.mounting for part in scanners],
+        files if clouds else (),
+        trajectory,
+    )
+
+
+def _mounting(mounting):
+    return dict(zip(("lever_arm", "boresight"), mounting_values(mounting), strict=True))
+
+
+def _parameters(weighed):
+    """The POS error's parameters on average, and the probability of each covariance family."""
+    names = {"position_scale": "drift_scale", "position_time": "drift_time"}
+    names |= {name: name for name in ("attitude_scale", "attitude_time")}
+    mean = {
+        title: np.exp(sum(p * np.log(getattr(parameters, name)) for parameters, p in weighed))
+        for title, name in names.items()
+    }
+    families = {}
+    for parameters, probability in weighed:
+        families[parameters.family] = families.get(parameters.family, 0.0) + probability
+    return {**{name: float(value) for name, value in mean.items()}, "families": families}

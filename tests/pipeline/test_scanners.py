@@ -1,0 +1,171 @@
+"""A survey of two scanners with mountings of their own: files in, corrected and calibrated out."""
+
+import json
+import tomllib
+import warnings
+from dataclasses import replace
+
+import laspy
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import mlscorr
+from mlscorr.cli import app
+from mlscorr.correction import PointSigma
+from mlscorr.estimate.mounting import corrected_mounting
+from mlscorr.evaluate.beams import BeamCheck
+from mlscorr.io.las import read_chunks
+from mlscorr.pipeline.calibration import CalibratedScanners
+from mlscorr.report.provenance import systems
+from mlscorr.simulate import Scenario, simulate
+
+LACKS = np.array(  # right, forward, up: m and deg, of each scanner's recorded mounting
+    [[0.03, -0.02, 0.0, 0.3, -0.3, 0.4], [-0.02, 0.0, 0.0, -0.4, 0.2, -0.3]]
+)
+
+
+def wrong(mounting, lacks):
+    "A mounting that lacks as much"
+    return corrected_mounting(mounting, -np.append(lacks[:3], np.radians(lacks[3:])))
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    "Folder of a street driven there and back with a left and a right scanner, both mounted wrong"
+    line = {"lines_per_second": 50, "points_per_line": 300}
+    scenario = Scenario(
+        drive={"duration": 10.0, "speed": 6.0, "passes": [{}, {"direction": "back"}]},
+        targets={"control": 5, "check": 1, "hidden": 0.0},
+        scanner=[
+            {"lever_arm": [-0.3, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0], **line},
+            {"lever_arm": [0.3, -0.6, 0.4], "boresight": [90.0, 0.0, -35.0], **line},
+        ],
+        pos={"grade": "tactical"},
+    )
+    simulated = simulate(scenario, np.random.default_rng(3))
+    mountings = tuple(map(wrong, simulated.mountings, LACKS))
+    folder = tmp_path_factory.mktemp("two scanners")
+    replace(simulated, mountings=mountings).write(folder)
+    with (folder / "survey.toml").open("a") as described:
+        described.write("[matching]\nsearch_radius = 1.5\n")  # m, for speed
+    return folder
+
+
+@pytest.fixture(scope="module")
+def survey(site):
+    "That street as it is read"
+    return mlscorr.read_survey(site)
+
+
+@pytest.fixture(scope="module")
+def commanded(site, tmp_path_factory):
+    "The command on that street, its control points alone: the folder that it writes, what it says"
+    out = tmp_path_factory.mktemp("calibrated") / "out"
+    with warnings.catch_warnings(action="ignore"):  # a short site tells little
+        command = ["calibrate", str(site), "-o", str(out), "--clouds", "--no-ties"]
+        done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    return out, done.output
+
+
+@pytest.fixture(scope="module")
+def corrected(commanded, tmp_path_factory):
+    "The corrected survey of calibrated scanners, and the folder with its clouds and their sigmas"
+    out = tmp_path_factory.mktemp("corrected")
+    with warnings.catch_warnings(action="ignore"):  # four points near each other tell little
+        result = mlscorr.correct(mlscorr.read_survey(commanded[0]), ties="off")
+        result.write(out, sigma=True, page=False)
+    return result, out
+
+
+def test_each_scanner_is_calibrated_by_what_it_saw(commanded):
+    "Two boresights and lever arms are found within 3 sigmas, each in a line and in the document"
+    out, said = commanded
+    content = json.loads((out / "calibration.json").read_text())
+    assert list(content["scanners"]) == ["1", "2"]
+    for (name, part), lacks in zip(content["scanners"].items(), LACKS, strict=True):
+        lsc = part["lsc"]
+        for key, truth in (("lever_arm", lacks[:3]), ("boresight", lacks[3:])):
+            error = np.array(lsc[key]["correction"]) - truth
+            assert (np.abs(error) < 3 * np.array(lsc[key]["sigma"])).all()
+            assert max(lsc[key]["sigma"]) < (0.05 if key == "lever_arm" else 0.5)  # m, deg
+        assert {"lsc", "ls", "determined", "targets", "mounting"} <= set(part)
+        assert f"Scanner {name} lacks" in said
+
+
+def test_the_written_survey_has_each_calibrated_mounting(survey, commanded, corrected):
+    "Every file lies anew under its own scanner, with the mounting of that and its sigmas"
+    written = tomllib.loads((commanded[0] / "survey.toml").read_text())
+    assert "mounting" not in written
+    calibrated = corrected[0].survey
+    for new, old, lacks in zip(calibrated.scanners, survey.scanners, LACKS, strict=True):
+        assert [f.path for f in new.clouds] == [commanded[0] / f.path.name for f in old.clouds]
+        change = new.mounting.lever_arm - old.mounting.lever_arm
+        assert np.abs(change - lacks[:3]).max() < 0.05  # m
+        assert new.mounting.covariance is not None
+
+
+def test_clouds_of_both_scanners_come_to_where_things_are(site, survey, corrected):
+    "After calibration and correction points of every file lie within centimetres of the truth"
+    result, out = corrected
+    truth, first = np.load(site / "truth.npz")["point_xyz"], 0
+    for file in survey.clouds:
+        las = laspy.read(out / file.path.name)
+        apart = np.median(np.linalg.norm(las.xyz - truth[first : first + len(las)], axis=1))
+        assert apart < 0.05  # m
+        first += len(las)
+    assert max(result.check["after"]["rmse"]) < 0.03  # m
+
+
+def test_sigmas_of_points_are_those_of_their_scanner(corrected):
+    "Each file has the sigmas by the mounting and the noise of the scanner that wrote it"
+    result, out = corrected
+    for scanner in result.survey.scanners:
+        sigma = PointSigma.of(result.estimate.correction, scanner.scanner, scanner.mounting)
+        file = scanner.clouds[0]
+        las = laspy.read(out / file.path.name)
+        known = sigma.at(las.xyz, np.array(las.gps_time) + file.time_constant)
+        assert np.allclose(
+            las.sigma_easting, known[:, 0], rtol=0, atol=6e-5
+        )  # m, the file's rounding
+
+
+def test_the_report_names_the_lever_arm_of_each_scanner(survey):
+    "Two rows, and a note which files each scanner wrote"
+    pairs = dict(systems(survey))
+    assert pairs["Lever arm of scanner 1"].startswith("right, forward, up -0.33, -0.58, 0.4 m")
+    assert pairs["Lever arm of scanner 2"].startswith("right, forward, up 0.32, -0.6, 0.4 m")
+    assert any("1 wrote pass-1.laz, pass-2.laz; 2 wrote" in note for note in survey.notes)
+
+
+def test_beams_are_judged_by_the_mounting_of_their_file(survey, corrected):
+    "Each cloud lies in the scan plane of its own scanner, and not in that of the other"
+    assert not any("scan plane" in sentence for sentence in corrected[0].warnings)
+    first, second = survey.scanners
+    exchanged = replace(first, mounting=second.mounting), replace(second, mounting=first.mounting)
+    check = BeamCheck(replace(survey, scanners=exchanged))
+    for file in survey.clouds[:2]:
+        for _ in check.watched(read_chunks)(file):
+            pass
+    assert all("off the scan plane" in sentence for sentence in check.warnings())
+    assert len(list(check.warnings())) == 2
+
+
+def test_what_takes_one_scanner_says_so(survey):
+    "Diagnosis, plan and a drift for each scanner refuse several, with the way out"
+    for command, verb in ((mlscorr.diagnose, "a diagnosis"), (mlscorr.plan, "a plan")):
+        with pytest.raises(ValueError, match=rf"2 scanners \(1, 2\), and {verb} rests on one"):
+            command(survey)
+    calibrated = CalibratedScanners(survey, {"1": None, "2": None})
+    with pytest.raises(
+        ValueError, match=r"Calibrate without --with-drift, and run mlscorr correct"
+    ):
+        calibrated.write("nowhere", with_drift=True)
+
+
+def test_a_scanner_without_a_mounting_is_named(survey):
+    "Calibration says which scanner lacks its mounting"
+    bare = replace(survey.scanners[0], mounting=None)
+    with pytest.raises(ValueError, match=r"Scanner 1: .* has no \[mounting\]"):
+        mlscorr.calibrate(replace(survey, scanners=(bare, survey.scanners[1])))
