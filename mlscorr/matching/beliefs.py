@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 
 from mlscorr.matching.pairs import CandidatePairs
-from mlscorr.matching.settings import SETTINGS, settings_tuple
+from mlscorr.matching.settings import COMPILED, SETTINGS, settings_tuple
 from mlscorr.pos import StatedSigma
 from mlscorr.survey import ControlPoints, Pos, TargetObservations, Trajectory
 
@@ -66,7 +66,7 @@ class Chain(NamedTuple):
     settings: Any
 
 
-@njit(cache=True, nogil=True)
+@njit(**COMPILED)
 def transition(chain: Chain, start: int, end: int) -> np.ndarray:
     """Transitions F of c, s and its rate from one observation to another, later or earlier.
 
@@ -84,10 +84,12 @@ def transition(chain: Chain, start: int, end: int) -> np.ndarray:
     matrix : (m + 1, 3, 3) array
         Of each belief, and at last of a drift that starts anew.
     """
-    turned = 1.0 - chain.forward[start] @ chain.forward[end]
+    forward, settings = chain.forward, chain.settings
+    turned = 1.0 - forward[start, 0] * forward[end, 0] - forward[start, 1] * forward[end, 1]
+    share = (settings.turning_sigma / settings.constant_sigma) ** 2
     matrix = np.zeros((len(chain.rate) + 1, 3, 3))
-    share = (chain.settings.turning_sigma / chain.settings.constant_sigma) ** 2
-    matrix[:, 0, 0] = 1.0 - share * turned
+    for m in range(len(matrix)):
+        matrix[m, 0, 0] = 1.0 - share * turned
     if chain.segment[start] == chain.segment[end]:
         for m, rate in enumerate(chain.rate):
             step = rate * (chain.gps_time[end] - chain.gps_time[start])

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from mlscorr.matching.beliefs import Chain, transition
+from mlscorr.matching.settings import COMPILED, INNER
 
 
 class Hypotheses(NamedTuple):
@@ -42,22 +43,45 @@ class Hypotheses(NamedTuple):
     history: np.ndarray
 
 
-@njit(cache=True, nogil=True)
-def select(now: Hypotheses, rows: np.ndarray) -> Hypotheses:
+@njit(inline="always", error_model="numpy")
+def _empty(b, window, h):
+    """B hypotheses to be filled in, with histories of h pairs."""
+    belief, weight = np.empty(b, np.int64), np.empty(b)
+    mean, covariance = np.empty((b, 3, 3)), np.empty((b, 3, 3, 3))
+    used, history = np.empty((b, len(window)), np.int64), np.empty((b, h), np.int64)
+    return Hypotheses(belief, weight, mean, covariance, used, window, history)
+
+
+@njit(**COMPILED)
+def select(now: Hypotheses, rows: np.ndarray, kept: int, w: int) -> Hypotheses:
     """Some of the hypotheses.
 
     Parameters
     ----------
     now : Hypotheses
     rows : (r,) int array
+    kept, w : int
+        So many observations, the last ones, stay in the window of w; others are to be filled in.
     """
-    mean, covariance, used = now.mean[rows], now.covariance[rows], now.used[rows]
-    return Hypotheses(
-        now.belief[rows], now.weight[rows], mean, covariance, used, now.window, now.history[rows]
-    )
+    old, h = len(now.window) - kept, now.history.shape[1]
+    after = _empty(len(rows), np.empty(w, np.int64), h)
+    for column in range(kept):
+        after.window[column] = now.window[old + column]
+    for hypothesis, row in enumerate(rows):
+        after.belief[hypothesis], after.weight[hypothesis] = now.belief[row], now.weight[row]
+        for axis in range(3):
+            for i in range(3):
+                after.mean[hypothesis, axis, i] = now.mean[row, axis, i]
+                for j in range(3):
+                    after.covariance[hypothesis, axis, i, j] = now.covariance[row, axis, i, j]
+        for column in range(kept):
+            after.used[hypothesis, column] = now.used[row, old + column]
+        for column in range(h):
+            after.history[hypothesis, column] = now.history[row, column]
+    return after
 
 
-@njit(cache=True, nogil=True)
+@njit(**COMPILED)
 def start(chain: Chain) -> Hypotheses:
     """One hypothesis of each belief, before any observation.
 
@@ -65,47 +89,57 @@ def start(chain: Chain) -> Hypotheses:
     ----------
     chain : Chain
     """
-    m = len(chain.rate)
-    covariance = np.zeros((m, 3, 3, 3)) + np.eye(3)
-    belief, weight, mean = np.arange(m), np.zeros(m), np.zeros((m, 3, 3))
-    used, window = np.empty((m, 0), np.int64), np.empty(0, np.int64)
-    history = np.full((m, chain.settings.memory), -1)
-    return Hypotheses(belief, weight, mean, covariance, used, window, history)
+    now = _empty(len(chain.rate), np.empty(0, np.int64), chain.settings.memory)
+    for belief in range(len(chain.rate)):
+        now.belief[belief], now.weight[belief] = belief, 0.0
+        for axis in range(3):
+            for i in range(3):
+                now.mean[belief, axis, i] = 0.0
+                for j in range(3):
+                    now.covariance[belief, axis, i, j] = 1.0 if i == j else 0.0
+        for column in range(chain.settings.memory):
+            now.history[belief, column] = -1
+    return now
 
 
-@njit(cache=True, nogil=True)
+@njit(**COMPILED)
 def predict(now: Hypotheses, chain: Chain, last: int, row: int) -> Hypotheses:
     """The hypotheses at the next observation: the drift went on, or started anew in any belief.
 
     Parameters
     ----------
     now : Hypotheses
-        After the last observation.
+        After the last observation, the heaviest first.
     chain : Chain
     last, row : int
         Rows of the last observation and the next one, later or earlier.
     """
-    time = abs(chain.gps_time[row] - chain.gps_time[last]) / chain.settings.restart_time
-    stays = np.exp(-max(time, np.exp(chain.settings.smallest_weight)))
-    best = np.argsort(-now.weight, kind="mergesort")[: chain.settings.joined_hypotheses // 4]
+    time, settings = chain.gps_time, chain.settings
+    gap = abs(time[row] - time[last]) / settings.restart_time
+    stays = np.exp(-max(gap, np.exp(settings.smallest_weight)))
     b, m = len(now.weight), len(chain.rate)
-    after = select(now, np.append(np.arange(b), np.repeat(best, m)))
-    after.weight[:b] += np.log(stays)
-    after.weight[b:] += np.log((1.0 - stays) / m)
-    after.history[b:] = -2  # as of no other hypothesis
+    parent = np.empty(b + min(b, settings.joined_hypotheses // 4) * m, np.int64)
+    for hypothesis in range(len(parent)):
+        parent[hypothesis] = hypothesis if hypothesis < b else (hypothesis - b) // m
+    kept = len(now.window)
+    while kept > 0 and abs(time[now.window[-kept]] - time[row]) > settings.pause:
+        kept -= 1
+    after = select(now, parent, kept, kept)
     matrix = transition(chain, last, row)
-    for hypothesis in range(len(after.weight)):
-        _carry(matrix[after.belief[hypothesis] if hypothesis < b else m], after, hypothesis)
-        if hypothesis >= b:
+    for hypothesis in range(len(parent)):
+        if hypothesis < b:
+            after.weight[hypothesis] += np.log(stays)
+            _carry(matrix[after.belief[hypothesis]], after, hypothesis)
+        else:
             after.belief[hypothesis] = (hypothesis - b) % m
-    recent = np.abs(chain.gps_time[now.window] - chain.gps_time[row]) <= chain.settings.pause
-    kept = np.flatnonzero(recent)
-    mean, covariance, used = after.mean, after.covariance, after.used[:, kept]
-    window = now.window[kept]
-    return Hypotheses(after.belief, after.weight, mean, covariance, used, window, after.history)
+            after.weight[hypothesis] += np.log((1.0 - stays) / m)
+            for column in range(settings.memory):
+                after.history[hypothesis, column] = -2  # as of no other hypothesis
+            _carry(matrix[m], after, hypothesis)
+    return after
 
 
-@njit(cache=True, nogil=True)
+@njit(**INNER)
 def _carry(f, now, hypothesis):
     """Kalman prediction, in place: x = F x, P = I + F (P - I) F^T per axis."""
     half = np.empty((3, 3))  # F (P - I)
@@ -124,7 +158,7 @@ def _carry(f, now, hypothesis):
             p[i, i] += 1.0
 
 
-@njit(cache=True, nogil=True)
+@njit(**COMPILED)
 def log_likelihoods(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
     """Log densities (b, 2 k + 1) of what an observation is, by the misclosures of its k pairs.
 
@@ -134,34 +168,35 @@ def log_likelihoods(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
     Parameters
     ----------
     now : Hypotheses
+        Their weights are a part of the densities.
     chain : Chain
     row : int
     """
-    first, k = chain.pairs.first[row], chain.pairs.first[row + 1] - chain.pairs.first[row]
+    pairs, exchanged = chain.pairs, chain.settings.exchanged_share
+    first, k = pairs.first[row], pairs.first[row + 1] - pairs.first[row]
     density = np.full((len(now.weight), 2 * k + 1), -np.inf)
-    density[:, 2 * k] = chain.otherwise[row]
     value, variance = displacement(now, chain, row)
-    used, exchanged = in_use(now, chain, row), chain.settings.exchanged_share
     square, spread = np.empty(3), np.empty(3)
     for hypothesis in range(len(now.weight)):
+        density[hypothesis, 2 * k] = now.weight[hypothesis] + chain.otherwise[row]
         for choice in range(k):
-            if used[hypothesis, choice]:
-                continue
             pair = first + choice
+            if _in_use(now, hypothesis, chain, row, pair):
+                continue
             for axis in range(3):
                 spread[axis] = variance[hypothesis, axis] + chain.pair_variance[pair, axis]
-                square[axis] = (chain.pairs.misclosure[pair, axis] - value[hypothesis, axis]) ** 2
-            moved = chain.moved_share[pair]
-            same = chain.pairs.same[pair]
+                square[axis] = (pairs.misclosure[pair, axis] - value[hypothesis, axis]) ** 2
+            moved, same = chain.moved_share[pair], pairs.same[pair]
             share = (1.0 - moved) * (1.0 - exchanged) if same else exchanged
-            density[hypothesis, choice] = _log_normal(square, spread, 0.0) + np.log(share)
+            normal = _log_normal(square, spread, 0.0)
+            density[hypothesis, choice] = now.weight[hypothesis] + normal + np.log(share)
             if same:
-                elsewhere = _log_normal(square, spread, chain.settings.moved_sigma**2)
-                density[hypothesis, k + choice] = elsewhere + np.log(moved)
+                normal = _log_normal(square, spread, chain.settings.moved_sigma**2)
+                density[hypothesis, k + choice] = now.weight[hypothesis] + normal + np.log(moved)
     return density
 
 
-@njit(cache=True, nogil=True)
+@njit(**COMPILED)
 def displacement(now: Hypotheses, chain: Chain, row: int) -> tuple[np.ndarray, np.ndarray]:
     """Misclosure (b, 3) by the states, and its variance without survey's. Units: m, m^2.
 
@@ -171,32 +206,30 @@ def displacement(now: Hypotheses, chain: Chain, row: int) -> tuple[np.ndarray, n
     chain : Chain
     row : int
     """
-    sigma, p = chain.settings.constant_sigma, now.covariance
-    gain, noise = chain.gain[:, row][now.belief], chain.noise[:, row][now.belief]
-    value = sigma * now.mean[..., 0] + gain * now.mean[..., 1]
-    variance = sigma**2 * p[..., 0, 0] + 2.0 * sigma * gain * p[..., 0, 1]
-    return value, variance + gain**2 * p[..., 1, 1] + noise
+    b, sigma = len(now.weight), chain.settings.constant_sigma
+    value, variance = np.empty((b, 3)), np.empty((b, 3))
+    for hypothesis in range(b):
+        belief = now.belief[hypothesis]
+        for axis in range(3):
+            gain, noise = chain.gain[belief, row, axis], chain.noise[belief, row, axis]
+            x, p = now.mean[hypothesis, axis], now.covariance[hypothesis, axis]
+            value[hypothesis, axis] = sigma * x[0] + gain * x[1]
+            state = sigma**2 * p[0, 0] + 2.0 * sigma * gain * p[0, 1] + gain**2 * p[1, 1]
+            variance[hypothesis, axis] = state + noise
+    return value, variance
 
 
-@njit(cache=True, nogil=True)
-def in_use(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
-    """Which pairs of an observation name a point that its hypothesis uses already: (b, k).
-
-    Parameters
-    ----------
-    now : Hypotheses
-    chain : Chain
-    row : int
-    """
-    control = chain.pairs.control[chain.pairs.first[row] : chain.pairs.first[row + 1]]
-    used = np.zeros((len(now.weight), len(control)), np.bool_)
-    for place, other in enumerate(now.window):
-        if chain.pass_number[other] == chain.pass_number[row]:
-            used |= control == now.used[:, place].copy().reshape(-1, 1)
-    return used
+@njit(inline="always", error_model="numpy")
+def _in_use(now, hypothesis, chain, row, pair):
+    """Whether the pair names a point that the hypothesis uses already in this pass."""
+    in_use = False
+    for column, other in enumerate(now.window):
+        if now.used[hypothesis, column] == chain.pairs.control[pair]:
+            in_use = in_use or chain.pass_number[other] == chain.pass_number[row]
+    return in_use
 
 
-@njit(cache=True, nogil=True)
+@njit(inline="always", error_model="numpy")
 def _log_normal(square, variance, extra):
     total, size = 0.0, 1.0
     for axis in range(3):

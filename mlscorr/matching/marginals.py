@@ -12,7 +12,15 @@ from numba import njit
 
 from mlscorr.matching.beliefs import Chain
 from mlscorr.matching.branching import heaviest, use
-from mlscorr.matching.hypotheses import Hypotheses, displacement, log_likelihoods, predict, start
+from mlscorr.matching.hypotheses import (
+    Hypotheses,
+    displacement,
+    log_likelihoods,
+    predict,
+    select,
+    start,
+)
+from mlscorr.matching.settings import COMPILED, INNER
 
 
 class Marginals(NamedTuple):
@@ -50,7 +58,7 @@ def marginals(chain: Chain) -> Marginals:
     return result
 
 
-@njit(cache=True, nogil=True)
+@njit(**COMPILED)
 def _smooth(chain, result):
     """Fill in the marginals of all observations.
 
@@ -76,31 +84,48 @@ def _smooth(chain, result):
         for row in range(last, first - 1, -1):
             if row + 1 < n:
                 future = predict(use(future, chain, row + 1), chain, row + 1, row)
-            _fill(past[row - first], heaviest(future, chain), chain, row, result)
+            _fill(join(past[row - first], heaviest(future, chain), chain), chain, row, result)
 
 
-@njit(cache=True, nogil=True)
-def _fill(before, after, chain, row, result):
+@njit(**INNER)
+def _fill(both, chain, row, result):
     """Fill in the marginals of an observation."""
-    both = join(before, after, chain)
     if len(both.weight) == 0:
         return  # past and future agree in no belief: nothing is said
     density = log_likelihoods(both, chain, row)
-    k = density.shape[1] // 2
-    weight = both.weight.reshape(-1, 1) + density
-    probability = np.exp(weight - weight.max())
-    probability /= probability.sum()
-    first = chain.pairs.first[row]
-    result.sound[first : first + k] = probability[:, :k].sum(axis=0)
-    result.moved[first : first + k] = probability[:, k : 2 * k].sum(axis=0)
-    share = np.exp(both.weight - both.weight.max())
-    share /= share.sum()
+    k, first = density.shape[1] // 2, chain.pairs.first[row]
+    _normalize(density.reshape(-1))
+    for hypothesis in range(len(density)):
+        for choice in range(k):
+            result.sound[first + choice] += density[hypothesis, choice]
+            result.moved[first + choice] += density[hypothesis, k + choice]
+    share = both.weight
+    _normalize(share)
     value, variance = displacement(both, chain, row)
-    result.expected[row] = share @ value
-    result.sigma[row] = np.sqrt(share @ (variance + (value - result.expected[row]) ** 2))
+    for axis in range(3):
+        expected, square = 0.0, 0.0
+        for hypothesis in range(len(share)):
+            expected += share[hypothesis] * value[hypothesis, axis]
+        for hypothesis in range(len(share)):
+            away = value[hypothesis, axis] - expected
+            square += share[hypothesis] * (variance[hypothesis, axis] + away**2)
+        result.expected[row, axis], result.sigma[row, axis] = expected, np.sqrt(square)
 
 
-@njit(cache=True, nogil=True)
+@njit(**INNER)
+def _normalize(weight):
+    """Make probabilities of logarithmic weights, in place."""
+    largest, total = -np.inf, 0.0
+    for row in range(len(weight)):
+        largest = max(largest, weight[row])
+    for row in range(len(weight)):
+        weight[row] = np.exp(weight[row] - largest)
+        total += weight[row]
+    for row in range(len(weight)):
+        weight[row] /= total
+
+
+@njit(**COMPILED)
 def join(before: Hypotheses, after: Hypotheses, chain: Chain) -> Hypotheses:
     """Pairs (past, future) of hypotheses of one belief, joined; their prior counts once.
 
@@ -113,34 +138,59 @@ def join(before: Hypotheses, after: Hypotheses, chain: Chain) -> Hypotheses:
         At an observation, by those before it and by those after it.
     chain : Chain
     """
-    past, future = np.nonzero(before.belief.reshape(-1, 1) == after.belief)
+    rows, others = _of_one_belief(before, after)
+    w = len(before.window)
+    both = select(before, rows, w, w + len(after.window))
     precisions, vectors, weights = _information(before)
     later_precisions, later_vectors, later_weights = _information(after)
-    weights = (before.weight + weights).reshape(-1, 1) + after.weight + later_weights
-    weights += 2.0 * chain.settings.smallest_weight * _clash(before, after, chain)
-    weight, mean = np.empty(len(past)), np.empty((len(past), 3, 3))
-    covariance = np.empty((len(past), 3, 3, 3))
-    for pair, (i, j) in enumerate(zip(past, future)):  # noqa: B905 - numba knows no strict
-        weight[pair] = weights[i, j]
+    precision, vector = np.empty((3, 3)), np.empty(3)
+    for column, row in enumerate(after.window):
+        both.window[w + column] = row
+    for pair, (i, j) in enumerate(zip(rows, others)):  # noqa: B905 - numba knows no strict
+        for column in range(len(after.window)):
+            both.used[pair, w + column] = after.used[j, column]
+        weight = before.weight[i] + weights[i] + after.weight[j] + later_weights[j]
+        weight += 2.0 * chain.settings.smallest_weight * _clash(before, i, after, j, chain)
         for axis in range(3):
-            x, p = mean[pair, axis], covariance[pair, axis]
-            precision = precisions[i, axis] + later_precisions[j, axis] - np.eye(3)
-            vector = vectors[i, axis] + later_vectors[j, axis]
+            for row in range(3):
+                vector[row] = vectors[i, axis, row] + later_vectors[j, axis, row]
+                for column in range(3):
+                    known = (
+                        precisions[i, axis, row, column] + later_precisions[j, axis, row, column]
+                    )
+                    precision[row, column] = known - (row == column)
+            x, p = both.mean[pair, axis], both.covariance[pair, axis]
             determinant, square = _invert(precision, p), 0.0
             for row in range(3):
                 x[row] = p[row, 0] * vector[0] + p[row, 1] * vector[1] + p[row, 2] * vector[2]
                 square += vector[row] * x[row]
-            weight[pair] += 0.5 * (square - np.log(determinant))
-    used = np.column_stack((before.used[past], after.used[future]))
-    window, history = np.append(before.window, after.window), before.history[past]
-    return Hypotheses(before.belief[past], weight, mean, covariance, used, window, history)
+            weight += 0.5 * (square - np.log(determinant))
+        both.weight[pair] = weight
+    return both
 
 
-@njit(cache=True, nogil=True)
+@njit(inline="always", error_model="numpy")
+def _of_one_belief(before, after):
+    """Rows of past and future, of each pair that agrees in its belief."""
+    size = 0
+    for belief in before.belief:
+        for other in after.belief:
+            size += belief == other
+    rows, others, pair = np.empty(size, np.int64), np.empty(size, np.int64), 0
+    for i, belief in enumerate(before.belief):
+        for j, other in enumerate(after.belief):
+            if belief == other:
+                rows[pair], others[pair] = i, j
+                pair += 1
+    return rows, others
+
+
+@njit(**INNER)
 def _information(now):
     """Precisions L, vectors L m and weights (log |L| - m L m) / 2, over all axes."""
-    precision, vector = np.empty(now.covariance.shape), np.zeros(now.mean.shape)
-    weight = np.zeros(len(now.weight))
+    b = len(now.weight)
+    precision, vector = np.empty((b, 3, 3, 3)), np.zeros((b, 3, 3))
+    weight = np.zeros(b)
     for hypothesis in range(len(weight)):
         for axis in range(3):
             matrix, x = precision[hypothesis, axis], now.mean[hypothesis, axis]
@@ -153,7 +203,7 @@ def _information(now):
     return precision, vector, weight
 
 
-@njit(cache=True, nogil=True)
+@njit(**INNER)
 def _invert(matrix, out):
     """Inverse of a symmetric 3 x 3 matrix by its cofactors, and its determinant."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
@@ -163,18 +213,21 @@ def _invert(matrix, out):
     out[0, 2] = out[2, 0] = b * e - c * d
     out[1, 2] = out[2, 1] = b * c - a * e
     determinant = a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
-    out /= determinant
+    for i in range(3):
+        for j in range(3):
+            out[i, j] /= determinant
     return determinant
 
 
-@njit(cache=True, nogil=True)
-def _clash(before, after, chain):
-    """Which hypotheses of past and future (b, a) use one control point twice in one visit."""
-    clash = np.zeros((len(before.weight), len(after.weight)), np.bool_)
-    for i, row in enumerate(before.window):
-        for j, other in enumerate(after.window):
-            near = abs(chain.gps_time[row] - chain.gps_time[other]) <= chain.settings.pause
-            if near and chain.pass_number[row] == chain.pass_number[other]:
-                control = before.used[:, i].copy().reshape(-1, 1)
-                clash |= (control == after.used[:, j]) & (control >= 0)
-    return clash
+@njit(inline="always", error_model="numpy")
+def _clash(before, i, after, j, chain):
+    """Whether hypotheses of past and future use one control point twice in one visit."""
+    for column, row in enumerate(before.window):
+        control = before.used[i, column]
+        for place, other in enumerate(after.window):
+            if control >= 0 and control == after.used[j, place]:
+                apart = abs(chain.gps_time[row] - chain.gps_time[other])
+                same_pass = chain.pass_number[row] == chain.pass_number[other]
+                if same_pass and apart <= chain.settings.pause:
+                    return True
+    return False

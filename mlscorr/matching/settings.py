@@ -44,6 +44,8 @@ class Settings:
     smallest_rival: float = 0.001  # probability; from which a rival is named
 
 
+COMPILED: Any = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+INNER: Any = {**COMPILED, "no_cpython_wrapper": True}  # called by compiled functions alone
 SETTINGS = Settings()
 _Tuple = namedtuple("_Tuple", [field.name for field in fields(Settings)])  # type: ignore[misc]
 

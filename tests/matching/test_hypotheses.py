@@ -8,7 +8,6 @@ from mlscorr.matching import SETTINGS
 from mlscorr.matching.branching import use
 from mlscorr.matching.hypotheses import (
     displacement,
-    in_use,
     log_likelihoods,
     predict,
     select,
@@ -53,7 +52,7 @@ def test_what_was_used_is_forgotten_after_two_seconds(chain):
 def test_selected_hypotheses_keep_all_that_belongs_to_them(chain):
     "Two of them, in the order asked for"
     now = predict(use(start(chain), chain, 0), chain, 0, 1)
-    both = select(now, np.array([2, 0]))
+    both = select(now, np.array([2, 0]), len(now.window), len(now.window))
     assert both.weight.tolist() == now.weight[[2, 0]].tolist()
     assert np.array_equal(both.covariance, now.covariance[[2, 0]])
 
@@ -90,7 +89,8 @@ def test_a_point_in_use_is_no_pair_of_the_next_observation():
     "A second later the hypothesis that used point 4 can't use it again"
     chain = small_chain(np.random.default_rng(1))
     now = predict(use(start(chain), chain, 2), chain, 2, 3)
-    used = in_use(now, chain, 3)
-    assert used[:, 0].tolist() == (now.used[:, 0] == 4).tolist()
-    assert used.any() and not used[:, 1].any()
-    assert np.isneginf(log_likelihoods(now, chain, 3)[used[:, 0], 0]).all()
+    used = now.used[:, 0] == 4
+    density = log_likelihoods(now, chain, 3)
+    assert used.any() and not used.all()
+    assert np.isneginf(density[:, 0]).tolist() == used.tolist()
+    assert np.isfinite(density[:, 1]).all()
