@@ -1,7 +1,5 @@
 """Trajectories in: CSV and SBET, synthetic and real; and out: CSV."""
 
-import time
-
 import laspy
 import numpy as np
 import pytest
@@ -447,16 +445,3 @@ def test_frames_and_signs_of_simulated_beams(name):
     recorded = np.asarray(cloud.scan_angle) * 0.006  # LAS 1.4: units of 0.006 deg
     misfit = np.mod(np.degrees(np.arctan2(y, x)) - recorded + 180, 360) - 180
     assert np.sqrt(np.mean(misfit**2)) < 0.005
-
-
-def test_long_trajectories_are_read_in_seconds(tmp_path):
-    "200 Hz for 17 minutes: the columns are parsed in one go, not cell by cell"
-    table = np.tile(table_of(drive(500, sigmas=False)), (400, 1))
-    table[:, 0] = 413_200 + 0.005 * np.arange(len(table))
-    table[:, 1:3] = [532_000.0, 3_374_000.0]
-    path = tmp_path / "t.csv"
-    rows = "".join(",".join(f"{x:.6f}" for x in r) + "\n" for r in table)
-    path.write_text(f"{HEADER}\n{rows}")
-    start = time.perf_counter()
-    assert len(read_trajectory(path)) == 200_000
-    assert time.perf_counter() - start < 3.0

@@ -1,7 +1,6 @@
 """The report: one page a surveyor can read offline."""
 
 import re
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -133,12 +132,9 @@ def test_a_correction_of_zero_still_has_a_page(tmp_path):
     page(tmp_path, survey, Correction(correction.recorded, correction.recorded), report)
 
 
-def test_a_long_drive_makes_a_small_page_quickly(tmp_path):
-    "24 targets on 250 s at 50 Hz: under 3 MB and a few seconds"
-    parts = fabricate(drive(250.0), 24)
-    start = time.perf_counter()
-    html = page(tmp_path, *parts)
-    assert time.perf_counter() - start < 15.0  # about 2 s; the rest is for a busy machine
+def test_a_long_drive_makes_a_small_page(tmp_path):
+    "24 targets on 250 s at 50 Hz: under 3 MB"
+    html = page(tmp_path, *fabricate(drive(250.0), 24))
     assert len(html.encode()) < 3e6
 
 

@@ -147,7 +147,7 @@ def opened(commanded, tmp_path_factory):
         "--dump-dom",
         (folder / "wrapper.html").as_uri(),
     ]
-    process = subprocess.run(command, capture_output=True, text=True, timeout=180)
+    process = subprocess.run(command, capture_output=True, text=True, timeout=600)
     text = re.search(r'<pre id="result">(.*?)</pre>', process.stdout, re.S)
     assert text, process.stderr[-2000:]
     text = unescape(text[1])

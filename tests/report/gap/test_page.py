@@ -220,7 +220,7 @@ def opened(pages, tmp_path_factory):
         "--window-size=1700,1000", "--virtual-time-budget=20000", "--enable-logging=stderr",
         "--dump-dom", wrapper.as_uri(),
     ]  # fmt: skip
-    process = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    process = subprocess.run(command, capture_output=True, text=True, timeout=600)
     text = unescape(re.search(r'<pre id="result">(.*?)</pre>', process.stdout, re.S)[1])
     assert text.startswith("{"), text
     return json.loads(text), [line for line in process.stderr.splitlines() if "CONSOLE" in line]

@@ -11,22 +11,22 @@ from tests.beds.street_of_points import SIZE
 
 
 @pytest.mark.parametrize(
-    "program, words",
+    "program, words, limit",  # s
     [
-        ("import os; os.abort()", "exit code -6"),
-        ("import time; time.sleep(60)", "no picture within"),
-        ("raise ImportError('libGL.so.1')", "libGL.so.1"),
-        ("pass", "without a picture"),
+        ("import os; os.abort()", "exit code -6", 600.0),
+        ("import time; time.sleep(600)", "no picture within", 1.0),
+        ("raise ImportError('libGL.so.1')", "libGL.so.1", 600.0),
+        ("pass", "without a picture", 600.0),
     ],
 )
 def test_a_broken_driver_costs_a_warning_and_no_picture(
-    survey, estimated, drawn, program, words, tmp_path, monkeypatch
+    survey, estimated, drawn, program, words, limit, tmp_path, monkeypatch
 ):
     "Where the child aborts, hangs or lacks a library the z-buffer draws the same picture"
     child = tmp_path / "child.py"
     child.write_text(program)
     monkeypatch.setattr(open3d_engine, "CHILD", child)
-    hurried = partial(open3d_engine.draw_pair, timeout=1.0)
+    hurried = partial(open3d_engine.draw_pair, timeout=limit)
     monkeypatch.setattr(sheet, "draw_pair", hurried)
     with pytest.warns(UserWarning, match=words):
         (picture,) = draw(survey, *estimated, PictureOptions(SIZE), ["overview"], "open3d")
