@@ -70,13 +70,13 @@ def random_survey(
     *streams, tails = np.random.SeedSequence(entropy).spawn(MIX.attempts + 1)
     for number, stream in enumerate(streams):
         choice, world = stream.spawn(2)
-        scenario = random_scenario(np.random.default_rng(choice), name)
         seed = world.generate_state(4)  # a SeedSequence would go on where the first survey stopped
         try:
+            scenario = random_scenario(np.random.default_rng(choice), name)
             with warnings.catch_warnings(action="error"):
                 made = simulate(scenario, np.random.default_rng(seed))
             break
-        except (ValueError, UserWarning):  # targets that find no place beside this way
+        except (ValueError, UserWarning):  # no place for a target, or a span beyond the way
             if number == MIX.attempts - 1:
                 raise
     more = _heavier(made, np.random.default_rng(tails))
