@@ -7,6 +7,19 @@ SINGULAR = 1e-15  # share of an observation's prior variance below which nothing
 
 
 @njit(cache=True, nogil=True)
+def assign(out: np.ndarray, values: np.ndarray) -> None:
+    """Put values in the place of a matrix; by slices the words of an error take long to compile.
+
+    Parameters
+    ----------
+    out, values : (i, j) array
+    """
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = values[i, j]
+
+
+@njit(cache=True, nogil=True)
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """A b. Plain loops: on matrices this small they are as fast as BLAS, and quick to compile.
 

@@ -23,6 +23,7 @@ import numpy as np
 from numba import njit
 
 from mlscorr.collocation.matrices import (
+    assign,
     make_symmetric,
     multiply,
     multiply_transposed,
@@ -112,13 +113,13 @@ def filter_covariance(
             for other in range(r):
                 innovation[m, other] += noise[i, m, other]
         white = whitening_root(innovation, prior)
-        whiteners[i] = white
+        assign(whiteners[i], white)
         if np.isnan(white[0, 0]):
             break
         gain = multiply_transposed(white, multiply(white, observed))  # K^T
         p = _joseph(layout.first, mixing[i], noise[i], p, gain, observed)
-        gains[i] = gain
-        covariances[i] = p
+        assign(gains[i], gain)
+        assign(covariances[i], p)
     return transitions, gains, whiteners, covariances
 
 
@@ -163,12 +164,12 @@ def filter_columns(
         for m in range(r):
             for b in range(c):
                 innovation[m, b] = columns[i, m, b] - innovation[m, b]
-        whitened[i] = multiply(whiteners[i], innovation)
+        assign(whitened[i], multiply(whiteners[i], innovation))
         step = multiply_transposed(gains[i], innovation)
         for a in range(x.shape[0]):
             for b in range(c):
                 x[a, b] += step[a, b]
-        states[i] = x
+        assign(states[i], x)
     return whitened, states
 
 
@@ -197,10 +198,10 @@ def smooth_columns(
     adjoints = np.zeros((n, gains.shape[2], c))
     weights = np.zeros((n, r, c))
     for i in range(n - 1, -1, -1):
-        adjoints[i] = a
+        assign(adjoints[i], a)
         u = multiply_transposed(whiteners[i], whitened[i])
         subtract_product(u, gains[i], a.T.copy())
-        weights[i] = u
+        assign(weights[i], u)
         send_back(layout.first, mixing[i], u, a)
         if i > 0:
             carry(layout, transitions[i], a, True)
@@ -240,11 +241,11 @@ def smooth_covariance(
     spread = np.zeros((layout.states.size, 3, 3))
     information = np.zeros((size, size))
     for i in range(n - 1, -1, -1):
-        future[i] = multiply(gains[i], information)
+        assign(future[i], multiply(gains[i], information))
         weight = multiply_transposed(whiteners[i], whiteners[i])  # S^-1
-        blocks[i] = weight
+        assign(blocks[i], weight)
         subtract_product(blocks[i], -future[i], gains[i])
-        same[i] = covariances[i]
+        assign(same[i], covariances[i])
         subtract_product(same[i], multiply(covariances[i], information), covariances[i])
         if i == 0:
             break
@@ -261,7 +262,7 @@ def smooth_covariance(
         forward = covariances[i - 1].copy()
         carry(layout, transitions[i], forward, False)
         forward = forward.T.copy()  # P F^T
-        following[i - 1] = forward
+        assign(following[i - 1], forward)
         subtract_product(following[i - 1], multiply(forward, information), predicted)
         information = carry_square(layout, transitions[i], information, True)
     return blocks, future, same, following

@@ -15,7 +15,7 @@ from numba import njit
 
 from mlscorr.collocation.knots import Knots, knot_gains
 from mlscorr.collocation.markov import check_finite
-from mlscorr.collocation.matrices import whitening_root
+from mlscorr.collocation.matrices import assign, whitening_root
 from mlscorr.collocation.model import NOT_POSITIVE, Noise, Signal, signal_clocks
 from mlscorr.collocation.states import Layout
 
@@ -172,5 +172,5 @@ def whiteners(
                     for other in range(total.shape[0]):
                         weight = mixing[i, e, m, j] * mixing[i, e, other, j]
                         total[m, other] += variance * weight
-        white[i] = whitening_root(total, np.diag(total))
+        assign(white[i], whitening_root(total, np.diag(total)))
     return white
