@@ -92,12 +92,9 @@ def interpolate(
     while begin < epochs.gps_time.size:
         cell = np.searchsorted(nodes, epochs.gps_time[begin], side="right")
         end = run_end(nodes, cell, epochs.gps_time, begin)
-        about.before.fill(-np.inf)
-        about.after.fill(np.inf)
-        if cell > 0:
-            about.before[:] = clocks[cell - 1]
-        if cell < n:
-            about.after[:] = clocks[cell]
+        for signal in range(clocks.shape[1]):  # assigning arrays would take seconds to compile
+            about.before[signal] = clocks[cell - 1, signal] if cell > 0 else -np.inf
+            about.after[signal] = clocks[cell, signal] if cell < n else np.inf
         fill_spans(layout, about)
         _gather(layout, cell - 1, states, same, following, about.columns, about.joint)
         predict_between(layout, about, epochs, begin, end)
