@@ -95,7 +95,7 @@ def _place(out):
         ) from None
     finally:  # wherever an interruption left it
         for folder in (probe, inside):
-            with suppress(FileNotFoundError):
+            with suppress(FileNotFoundError, NotADirectoryError):
                 folder.rmdir()
     return out.resolve().parent
 
