@@ -135,6 +135,8 @@ def _variance_ratio(equations, parameters, corrected):
 
 def _global_test(equations, parameters):
     """GlobalTest by w' N w of w = P l, whose covariance is P; None without redundancy."""
+    if len(equations.target_rows) == 0:
+        return None
     moments = np.zeros(3)  # what it is, its expectation and its variance
     for block in Objective.of(equations).blocks:
         solved, rows = block.solve(parameters), np.arange(3 * len(block.names))
