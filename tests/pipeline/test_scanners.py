@@ -17,8 +17,10 @@ from mlscorr.estimate.mounting import corrected_mounting
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.calibration import CalibratedScanners
+from mlscorr.pipeline.tying import of_one_scanner
 from mlscorr.report.provenance import systems
 from mlscorr.simulate import Scenario, simulate
+from mlscorr.ties import TieCollector, pair_features
 
 LACKS = np.array(  # right, forward, up: m and deg, of each scanner's recorded mounting
     [[0.03, -0.02, 0.0, 0.3, -0.3, 0.4], [-0.02, 0.0, 0.0, -0.4, 0.2, -0.3]]
@@ -150,6 +152,22 @@ def test_beams_are_judged_by_the_mounting_of_their_file(survey, corrected):
             pass
     assert all("off the scan plane" in sentence for sentence in check.warnings())
     assert len(list(check.warnings())) == 2
+
+
+def test_ties_are_views_of_one_scanner(survey):
+    "Of all pairs of two passes those of two scanners are left out: they tell of both mountings"
+    collector = TieCollector(survey)
+    for file in survey.clouds:
+        for chunk in read_chunks(file):
+            collector.add(file, chunk)
+    features = collector.features()
+    still, sigma = np.zeros((len(features), 3)), np.full(len(features), 0.5)
+    ties = pair_features(features, still, sigma, 1.5)
+    kept = of_one_scanner(survey, features, ties)
+    files = np.array([file.path.name for file in survey.clouds])[features.source[ties.feature]]
+    is_second = np.char.find(files, "scanner-2") > 0
+    np.testing.assert_array_equal(kept, is_second[:, 0] == is_second[:, 1])
+    assert 0 < kept.sum() < len(ties)
 
 
 def test_what_takes_one_scanner_says_so(survey):
