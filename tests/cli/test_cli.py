@@ -441,16 +441,27 @@ def test_few_control_points_lower_the_order_with_a_warning(kept, order, survey):
 def interrupt(survey, number, wait):
     "Start a correction, send it a signal after waiting for something, and see it end"
     command = [MLSCORR, "correct", survey, "-o", survey.parent / "out"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    wait(survey.parent, process)
-    process.send_signal(number)
-    _, stderr = process.communicate(timeout=600)
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            wait(survey.parent, process)
+            process.send_signal(number)
+            _, stderr = process.communicate(timeout=600)
+        finally:
+            process.kill()  # no harm to what has ended
     return process.returncode, stderr
+
+
+def is_written(folder):
+    "Whether something of the corrected cloud lies beside the output folder"
+    try:
+        return any(folder.glob(".out.*.part/*"))
+    except FileNotFoundError:  # a folder that was made to try the place, and removed meanwhile
+        return False
 
 
 def writing_has_begun(folder, process):
     "Wait until something of the corrected cloud lies beside the output folder"
-    while not any(folder.glob(".out.*.part/*")):
+    while not is_written(folder):
         assert process.poll() is None
         time.sleep(0.002)
 
