@@ -68,11 +68,10 @@ def _fitted(cloud, shape, survey, expected, bright, rng):
     spares looking at all else.
     """
     kind, size = shape
-    lever_arm = np.zeros(3) if survey.mounting is None else survey.mounting.lever_arm
     apart = np.linalg.norm(cloud.xyz - expected, axis=1)
     if (apart <= SETTINGS.same * size).sum() < TARGETS.smallest_count:
         return None
-    sight = cloud.xyz - scanner_path(cloud.gps_time, survey.trajectory, lever_arm)
+    sight = cloud.xyz - scanner_path(cloud.gps_time, survey.trajectory, survey.lever_arm)
     beside = cloud.intensity[apart > SETTINGS.background * size]
     dark = np.percentile(beside, 90) if len(beside) else 0.0
     spot = BrightRegion(expected, SETTINGS.extent * diameter(kind, size), (bright + dark) / 2)
