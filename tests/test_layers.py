@@ -32,6 +32,7 @@ GAP_FLOORS = (  # of the rooms within gap, likewise
 GAP_FLOOR = {room: number for number, rooms in enumerate(GAP_FLOORS) for room in rooms}
 ROOMS_OF = {
     "laspy": {"io"},
+    "openpyxl": {"io"},
     "open3d": {"baselines", "simulate", "report"},
     "sklearn": {"baselines", "gap"},
 }
@@ -147,7 +148,12 @@ def loaded_by(statement):
 def test_the_package_loads_nothing_until_it_is_used():
     "import mlscorr loads no library at all"
     loaded = loaded_by("import mlscorr")
-    assert loaded.isdisjoint({"numpy", "scipy", "laspy", "open3d", "sklearn", "numba"})
+    assert loaded.isdisjoint({"numpy", "scipy", "laspy", "open3d", "sklearn", "numba", "openpyxl"})
+
+
+def test_workbooks_load_openpyxl_alone():
+    "Reading tables does not load openpyxl: a survey without .xlsx never pays for it"
+    assert "openpyxl" not in loaded_by("import mlscorr.io.survey_file")
 
 
 def test_the_simulator_does_not_know_the_estimator():

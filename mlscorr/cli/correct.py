@@ -60,6 +60,8 @@ def correct(
             raise ValueError("--no-ties and --ties-only leave nothing to correct with: give one.")
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
+        for sentence in recorded.layouts:
+            say(sentence)
         ties = "off" if no_ties else "only" if ties_only else None
         result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
         report = result.write(out, overwrite, progress, sigma, page=not no_report)

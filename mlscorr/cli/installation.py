@@ -19,6 +19,7 @@ PACKAGES = (
     "numba",
     "pyproj",
     "tomlkit",
+    "openpyxl",
     "typer",
     "rich",
     "pydantic",

@@ -1,20 +1,54 @@
-"""Surveyed targets from control.csv."""
+"""Surveyed targets from control.csv, and from lists as others write them."""
 
+import re
 import warnings
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from mlscorr.io.column_names import CONTROL_NAMES
+from mlscorr.io.control_lists import (
+    SIGMAS,
+    check_unused,
+    complete,
+    lacking,
+    placed,
+    sentence_on,
+    unnamed_columns,
+    with_check_points,
+)
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.tables import find_columns, read_header, read_rows
+from mlscorr.io.sheets import SUFFIX
+from mlscorr.io.survey_sections import ControlSection
+from mlscorr.io.table_rows import read_rows
+from mlscorr.io.tables import read_layout
 from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
-from mlscorr.survey import KINDS, ControlPoints
+from mlscorr.survey import KINDS, ControlPoints, Trajectory
 
 POSITION = ("easting", "northing", "height")
-COLUMNS = ("name", *POSITION, "sigma_horizontal", "sigma_vertical", "kind", "size", "role")
+COLUMNS = ("name", *POSITION, *SIGMAS, "kind", "size", "role")
 NORMAL = ("normal_e", "normal_n", "normal_h")
 ROLES = ("control", "check")
+NOTHING_GIVEN = ControlSection(file="")
+
+
+@dataclass(frozen=True)
+class ControlList:
+    """The points of a file, and what was understood of it.
+
+    Parameters
+    ----------
+    control, check : ControlPoints
+        Either may be empty.
+    layout : str or None
+        A sentence; None for a file in our own columns, of which nothing had to be understood.
+    """
+
+    control: ControlPoints
+    check: ControlPoints
+    layout: str | None = None
 
 
 def read_control(path: str | Path) -> tuple[ControlPoints, ControlPoints]:
@@ -39,11 +73,43 @@ def read_control(path: str | Path) -> tuple[ControlPoints, ControlPoints]:
     UserWarning
         Of a sigma with which a point hardly counts.
     """
-    header, lines = read_header(path)
-    columns = find_columns(path, header, COLUMNS, (NORMAL,))
+    points = read_control_list(path)
+    return points.control, points.check
+
+
+def read_control_list(
+    path: str | Path,
+    section: ControlSection = NOTHING_GIVEN,
+    trajectory: Trajectory | None = None,
+) -> ControlList:
+    """Points of control.csv, or of a list as total stations and offices write it.
+
+    Parameters
+    ----------
+    path : path
+        Text with any separator, or .xlsx.
+    section : ControlSection, optional
+        What survey.toml says of all points, and of columns.
+    trajectory : Trajectory, optional
+        Tells which of X and Y is easting.
+
+    Returns
+    -------
+    ControlList
+
+    Raises
+    ------
+    ValueError, UserWarning
+        As read_control; also for what can be understood in two ways.
+    """
+    layout = read_layout(
+        path, COLUMNS, (NORMAL,), CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns
+    )
+    layout, given = (layout, {}) if layout.is_own else complete(layout, section, NORMAL)
+    lines = list(read_rows(layout, exact=True))
     rows = [
-        {name: _value(line, name, cells[i]) for name, i in columns.items()}
-        for line, cells in read_rows(path, lines, columns.values(), len(header), exact=True)
+        {name: _value(layout, line, name, cells[i]) for name, i in layout.columns.items()} | given
+        for line, cells in lines
     ]
     if not rows:
         raise ValueError(f"{path} has a header but no points.")
@@ -53,11 +119,17 @@ def read_control(path: str | Path) -> tuple[ControlPoints, ControlPoints]:
             f"{path} names {shown(', '.join(doubled))} more than once; every control or check "
             "point needs a name of its own."
         )
+    if not layout.is_own:
+        check_unused(layout, [cells for _, cells in lines], {"role": ROLES, "kind": KINDS})
+    layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
     for row in rows:
         _check(path, row)
     control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
-    warn_of_cut(path)
-    return control, check
+    if layout.sheet is None and layout.encoding != "utf-16":
+        warn_of_cut(path)
+    return ControlList(
+        control, check, None if layout.is_own else sentence_on(layout, given, section.check)
+    )
 
 
 def holds_points(path: str | Path) -> bool:
@@ -71,12 +143,15 @@ def holds_points(path: str | Path) -> bool:
     -------
     bool
     """
+    if Path(path).suffix.lower() == SUFFIX:
+        return True
     with Path(path).open(encoding=ENCODING, errors="replace") as file:
         lines = (line for line in file if line.strip(" \t\r\n,;"))
-        return sum(1 for _ in zip(lines, range(2), strict=False)) > 1
+        first = [*zip(range(2), lines, strict=False)]
+    return len(first) > 1 or any(len(re.findall(r"\d+[.,]\d", line)) > 1 for _, line in first)
 
 
-def _value(line, name, cell):
+def _value(layout, line, name, cell):
     """Value of a cell: text, or the number of a column that holds numbers."""
     if name in ("kind", "role"):
         return cell.casefold()
@@ -87,7 +162,7 @@ def _value(line, name, cell):
     if name in NORMAL and not cell:
         return np.nan
     try:
-        number = float(cell)
+        number = layout.number(cell) * layout.factors.get(name, 1.0)
     except ValueError:
         raise ValueError(f"{line} has the {name} '{shown(cell)}', which is not a number.") from None
     if not np.isfinite(number) and name not in NORMAL:
@@ -100,10 +175,10 @@ def _check(path, row):
     who, (smallest, largest) = f"{shown(row['name'])} of {path}", SETTINGS.target_size
     for key, known in (("kind", KINDS), ("role", ROLES)):
         if row[key] not in known:
+            near = nearest(row[key], known)
             raise ValueError(
                 f"{who} has the unknown {key} '{shown(row[key])}'; known are "
-                f"{', '.join(known[:-1])} and {known[-1]}. "
-                f"Is {nearest(row[key], known)} meant?"
+                f"{', '.join(known[:-1])} and {known[-1]}." + (f" Is {near} meant?" if near else "")
             )
     if not smallest <= row["size"] <= largest:
         raise ValueError(

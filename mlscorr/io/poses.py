@@ -12,9 +12,12 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from mlscorr.io.layouts import TableLayout
 from mlscorr.io.sbet import SBET_FIELDS
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.tables import ENCODING, check_finite, check_increasing, read_header, read_numbers
+from mlscorr.io.table_rows import read_numbers
+from mlscorr.io.tables import check_finite, check_increasing, read_header
+from mlscorr.io.text_files import ENCODING
 from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
 
 POS_COLUMNS = ("time", "latitude", "longitude", "height")  # then sigmas, of a .pos
@@ -72,9 +75,9 @@ def read_poses(path: str | Path) -> Poses:
         header, lines = read_header(path)
         for layout in LAYOUTS:
             if set(layout) <= set(header):
-                columns = [header.index(name) for name in layout]
-                seconds = {columns[0]: _seconds}
-                return _checked(path, read_numbers(path, lines, columns, len(header), seconds))
+                columns = {name: header.index(name) for name in layout}
+                table = TableLayout(path, tuple(header), lines, columns, is_own=True)
+                return _checked(path, read_numbers(table, {columns[layout[0]]: _seconds}))
     elif suffix not in SBET_SUFFIXES:
         raise ValueError(
             f"{path} has the unknown suffix '{path.suffix}'; a path is .csv, .pos or SBET "

@@ -26,6 +26,7 @@ class Settings:
 
     # ---- tables
     longest_line: int = 10_000  # characters; no table has columns for that
+    sampled_lines: int = 200  # in which a header stands, below what a program says of itself
 
     # ---- trajectories
     moving: float = 1.0  # m/s, below which the course over ground says nothing of the heading

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from mlscorr.io.control import NO_POINTS, holds_points, read_control
+from mlscorr.io.control import NO_POINTS, holds_points, read_control_list
 from mlscorr.io.inputs import input_file
 from mlscorr.io.las import sample_gps_times
+from mlscorr.io.nearness import check_together
 from mlscorr.io.sbet import check_area, check_crs, describe_projection
-from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_paths import files_of
 from mlscorr.io.survey_scanners import mounted_scanners, scanner_notes
 from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
@@ -51,10 +51,12 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     clouds, trajectory_file, accuracy, control_file, reference = files = files_of(path, settings)
     inputs = tuple(input_file(*named) for named in _named(path, files))
     trajectory = read_trajectory(trajectory_file, settings.crs, accuracy)
-    control = check = NO_POINTS
+    control, check, layouts = NO_POINTS, NO_POINTS, []
     if control_file is not None and holds_points(control_file):
-        control, check = read_control(control_file)
-        _check_together(control_file, control + check, trajectory)
+        points = read_control_list(control_file, settings.control, trajectory)
+        control, check = points.control, points.check
+        check_together(control_file, control + check, trajectory)
+        layouts += filter(None, [points.layout])
     is_geographic = trajectory_file.suffix.lower() in SBET_SUFFIXES
     notes = _crs_notes(settings.crs, trajectory, is_geographic)
     system = settings.cloud.gps_time if settings.cloud else "auto"
@@ -62,7 +64,7 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     cloud_files = tuple(file for file, _ in read)
     scanners = mounted_scanners(path, settings, cloud_files)
     is_one = len(scanners) == 1
-    notes += [*(note for _, note in read), *scanner_notes(scanners)]
+    notes += [*(note for _, note in read), *scanner_notes(scanners), *layouts]
     if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
         notes.append(UNKNOWN_POS)
     return Survey(
@@ -80,6 +82,7 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
         search_radius=settings.matching.search_radius,
         use_ties=settings.ties.use == "auto",
         notes=tuple(notes),
+        layouts=tuple(layouts),
         inputs=inputs,
         scanners=() if is_one else scanners,
     )
@@ -167,28 +170,3 @@ def _cloud_file(path, trajectory, setting):
     match = match_times(path.name, times, is_standard, trajectory, setting)
     file = CloudFile(path, points, match.constant, match.cloud_system)
     return file, f"gps_time of {path.name}: {match}."
-
-
-def _check_together(path, points, trajectory):
-    """Refuse control that lies kilometres from the trajectory, as it stands or swapped."""
-    distance = _distance(points.position[:, :2], trajectory)
-    swapped = _distance(points.position[:, 1::-1], trajectory)
-    if distance > SETTINGS.near and swapped < SETTINGS.near:
-        raise ValueError(
-            f"Easting and northing seem to be swapped in {path}: its nearest point lies "
-            f"{distance / 1e3:.0f} km from the trajectory as it stands, {swapped:.0f} m when "
-            "they are exchanged. Exchange the two columns."
-        )
-    if distance > SETTINGS.far:
-        raise ValueError(
-            f"The control nearest to the trajectory lies {distance / 1e3:.1f} km from it "
-            f"(limit {SETTINGS.far / 1e3:.0f} km): {path} and the trajectory may be in different "
-            "CRS or zones. Bring both into the crs of survey.toml."
-        )
-
-
-def _distance(position, trajectory):
-    """Least horizontal distance of points (n, 2) from the trajectory's epochs. Units: m."""
-    from scipy.spatial import cKDTree
-
-    return cKDTree(trajectory.position[:, :2]).query(position)[0].min()

@@ -15,7 +15,23 @@ Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
 Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
 Three = Field(min_length=3, max_length=3)
 Six = Field(min_length=6, max_length=6)
+Column = Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=1)] | None
 Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
+
+
+class ColumnsSection(TomlSection):
+    """Our names of columns with those in a table, or with their numbers from 1."""
+
+    @model_validator(mode="after")
+    def _are_of_one_kind(self) -> Self:
+        if len({type(column) for column in self.chosen.values()}) > 1:
+            raise ValueError("give names of columns or numbers of columns, not both")
+        return self
+
+    @property
+    def chosen(self) -> dict[str, str | int]:
+        """Those that are given."""
+        return {name: column for name, column in self if column is not None}
 
 
 class CloudSection(TomlSection):
@@ -73,10 +89,30 @@ class CalibratedMountingSection(MountingSection):
         return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
 
 
+class ControlColumns(ColumnsSection):
+    """Which column of a control list is what."""
+
+    name: Column = None
+    easting: Column = None
+    northing: Column = None
+    height: Column = None
+    sigma: Column = None
+    sigma_horizontal: Column = None
+    sigma_vertical: Column = None
+    kind: Column = None
+    size: Column = None
+    role: Column = None
+
+
 class ControlSection(TomlSection):
-    """The file of the surveyed points."""
+    """The file of the surveyed points, and what all of them are where it does not say so."""
 
     file: str
+    kind: str | None = None
+    size: Positive | None = None  # m
+    sigma: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None  # m: E/N, H
+    check: list[str] = Field(default_factory=list)  # names of check points, or patterns
+    columns: ControlColumns = ControlColumns()
 
 
 class ScannerSection(TomlSection):

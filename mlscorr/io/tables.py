@@ -1,14 +1,15 @@
-"""Tables in text files: their header, their rows, their numbers, and what is wrong in them."""
+"""Tables: their header, what their columns are, and what is wrong in them."""
 
-import csv
-import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from mlscorr.io.column_names import find_meanings
+from mlscorr.io.layout_search import find_layout, likely_header
+from mlscorr.io.layouts import TableLayout, not_text
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.sheets import SUFFIX
 from mlscorr.io.text_files import ENCODING, nearest, shown
 
 
@@ -41,7 +42,7 @@ def read_header(path: str | Path) -> tuple[list[str], int]:
                 if line.strip():
                     return [cell.strip().strip('"').casefold() for cell in line.split(",")], number
     except UnicodeDecodeError:
-        raise ValueError(_not_text(path)) from None
+        raise ValueError(not_text(path)) from None
     raise ValueError(f"{path} is empty.")
 
 
@@ -73,7 +74,7 @@ def find_columns(
     """
     missing = [name for name in required if name not in header]
     if missing:
-        raise ValueError(_missing(path, header, missing))
+        raise ValueError(missing_sentence(path, header, missing))
     names = list(required)
     for group in groups:
         present = [name for name in group if name in header]
@@ -90,121 +91,55 @@ def find_columns(
     return {name: header.index(name) for name in names}
 
 
-def read_rows(
-    path: str | Path, lines: int, columns: Collection[int], width: int, exact: bool = False
-) -> Iterator[tuple[str, list[str]]]:
-    """Rows of a CSV file behind its header, blank ones left out.
-
-    Parameters
-    ----------
-    path : path
-    lines : int
-        Number of lines down to the header.
-    columns : collection of int
-        Those that every row needs.
-    width : int
-        Number of columns of the header.
-    exact : bool
-        Whether each row has to have that many.
-
-    Yields
-    ------
-    line : str
-        Which line it is of what file, for messages.
-    cells : list of str
-
-    Raises
-    ------
-    ValueError
-        For a row that is too short, and a file that is not text.
-    """
-    with Path(path).open(encoding=ENCODING, newline="") as file:
-        try:
-            for _ in range(lines):
-                next(file)
-            reader = csv.reader(file, skipinitialspace=True)
-            for row in reader:
-                cells = [cell.strip() for cell in row]
-                if not any(cells):
-                    continue
-                line = f"Line {lines + reader.line_num} of {path}"
-                if len(cells) <= max(columns) or (exact and len(cells) != width):
-                    raise ValueError(
-                        f"{line} has {len(cells)} columns where the header has {width}: "
-                        "the file may have been cut off, or a comma may be missing."
-                    )
-                yield line, cells
-        except UnicodeDecodeError:
-            raise ValueError(_not_text(path)) from None
-        except csv.Error as error:
-            raise ValueError(
-                f"{path} has a cell in line {lines + reader.line_num} or behind it that never ends "
-                f"({error}): a quotation mark may be missing."
-            ) from None
-
-
-def read_numbers(
+def read_layout(
     path: str | Path,
-    lines: int,
-    columns: Collection[int],
-    width: int,
-    converters: Mapping[int, Callable[[str], float]] | None = None,
-) -> np.ndarray:
-    """The wanted columns of a CSV file of numbers.
+    required: Sequence[str],
+    groups: Sequence[Sequence[str]],
+    names: Mapping[str, str],
+    lacking: Callable[[Collection[str]], list[str]],
+    chosen: Mapping[str, str | int] | None = None,
+    unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
+) -> TableLayout:
+    """The layout of a table in our own columns, or of one as others write them.
 
     Parameters
     ----------
     path : path
-    lines : int
-        Number of lines down to the header.
-    columns : collection of int
-        Positions of the wanted columns.
-    width : int
-        Number of columns of the header.
-    converters : dict, optional
-        Position of a column to the function that reads its cells, float for others.
+    required, groups : sequence
+        See find_columns: a table with all required names in a first line with commas is our own.
+    names, lacking, chosen, unnamed
+        See find_layout.
 
     Returns
     -------
-    (n, k) array
+    TableLayout
 
     Raises
     ------
     ValueError
-        Names the first line that is no row of numbers; also for a file without rows.
+        For a table whose columns are missing or can be understood in two ways, and for no text.
     """
-    columns = tuple(columns)
-    _check_width(path, lines, width)
-    read: Any = dict(converters or {})
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=".*input contained no data")
+    path, refusal = Path(path), None
+    if path.suffix.lower() != SUFFIX:
         try:
-            table = np.loadtxt(
-                path,
-                delimiter=",",
-                skiprows=lines,
-                usecols=columns,
-                encoding=ENCODING,
-                ndmin=2,
-                converters=read,
-            )
-        except ValueError:
-            rows = read_rows(path, lines, columns, width)
-            raise ValueError(_first_bad(path, rows, columns, converters or {})) from None
-    if not len(table):
-        raise ValueError(f"{path} has a header but no epochs.")
-    return table
-
-
-def _check_width(path, lines, width):
-    """Refuse rows with more cells than the header, as decimal commas make them."""
-    with Path(path).open("rb") as file:
-        for number, line in enumerate(file, start=1):
-            if line.count(b",") >= width and number > lines and not line.startswith(b"#"):
-                raise ValueError(
-                    f"Line {number} of {path} has {line.count(b',') + 1} columns where the header "
-                    f"has {width}: decimals must be separated by points, not by commas."
-                )
+            header, lines = read_header(path)
+        except ValueError as error:
+            header, refusal = [], error
+        if not chosen and set(required) <= set(header):
+            columns = find_columns(path, header, required, groups)
+            return TableLayout(path, tuple(header), lines, columns, is_own=True)
+    layout = find_layout(path, names, lacking, chosen, unnamed)
+    if layout is not None and refusal and set(required) <= set(map(str.casefold, layout.header)):
+        raise refusal
+    if layout is None:
+        header = likely_header(path, names)
+        meanings = find_meanings(header, names, chosen)
+        used = {header[i] for positions in meanings.values() for i in positions}
+        missing = lacking(meanings)
+        is_geographic = "latitude" in meanings and "easting" in missing
+        way_out = " Latitude and longitude must be projected first." * is_geographic
+        raise refusal or ValueError(missing_sentence(path, header, missing, used) + way_out)
+    return layout
 
 
 def check_finite(path: str | Path, table: np.ndarray, row: str) -> None:
@@ -255,35 +190,24 @@ def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
         )
 
 
-def _not_text(path):
-    return (
-        f"{path} is not a text file in UTF-8. Save it anew as comma-separated values in UTF-8; "
-        "letters such as umlauts are the likely cause."
-    )
+def missing_sentence(
+    path: str | Path, header: Sequence[str], missing: Sequence[str], used: Collection[str] = ()
+) -> str:
+    """A sentence on columns that are missing, and on the one that may be meant.
 
-
-def _first_bad(path, rows, columns, converters):
-    """A sentence on the first row that is none of numbers."""
-    for line, cells in rows:
-        if cells[0].startswith("#"):
-            continue
-        for column in columns:
-            cell = cells[column].split("#")[0].strip()
-            try:
-                converters.get(column, float)(cell)
-            except ValueError:
-                return f"{line} has '{shown(cell)}' where a number belongs (column {column + 1})."
-    return f"{path} is not a table of numbers."
-
-
-def _missing(path, header, missing):
-    if len(header) == 1 and any(mark in header[0] for mark in ";\t "):
-        return (
-            f"{path} seems to be separated by semicolons, tabs or blanks; "
-            "columns must be separated by commas, decimals by points."
-        )
-    others = [name for name in header if name]
-    hint = (
-        f" {missing[0]} may be meant by '{shown(nearest(missing[0], others))}'." if others else ""
-    )
-    return f"{path} has no column {', '.join(missing)}; it has {shown(', '.join(header))}.{hint}"
+    Parameters
+    ----------
+    path : path
+    header : sequence of str
+    missing : sequence of str
+        Our names.
+    used : collection of str
+        Names in the header that mean something else.
+    """
+    others = [cell for cell in header if cell and cell not in used]
+    near = nearest(missing[0], others)
+    hint = f" {missing[0]} may be meant by '{shown(near)}'." if near else ""
+    if {"easting", "northing", "height"} <= set(missing):
+        hint += " It holds no coordinates: is another file meant?"
+    names = shown(", ".join(header)) or "no header"
+    return f"{path} has no column {', '.join(missing)}; it has {names}.{hint}"

@@ -9,8 +9,8 @@ from pathlib import Path
 ENCODING = "utf-8-sig"  # UTF-8, with or without a byte order mark
 
 
-def nearest(name: str, known: Collection[str]) -> str:
-    """The known name that is spelt most like a name.
+def nearest(name: str, known: Collection[str]) -> str | None:
+    """The known name that is spelt most like a name; None where none is spelt much like it.
 
     Parameters
     ----------
@@ -19,14 +19,15 @@ def nearest(name: str, known: Collection[str]) -> str:
 
     Returns
     -------
-    str
+    str or None
 
     Examples
     --------
     >>> nearest("sigma_vert", ["sigma_horizontal", "sigma_vertical"])
     'sigma_vertical'
+    >>> nearest("name", ["use", "easting"])
     """
-    return get_close_matches(name, list(known), n=1, cutoff=0.0)[0]
+    return next(iter(get_close_matches(name, list(known), n=1)), None)  # difflib's own likeness
 
 
 def shown(text: str) -> str:

@@ -76,10 +76,15 @@ def _sentence(item, model):
     key = ".".join(filter(str.strip, map(str, item["loc"])))
     if item["type"] == "extra_forbidden":
         name = ".".join(part for part in item["loc"] if isinstance(part, str) and part.strip())
-        near = nearest(name, _keys(model))
+        keys = _keys(model)
+        near = nearest(name, keys)
         if near == name:
             section = name.split(".")[0]
             return f"{key} is a key of one of several: write [[{section}]], not [{section}]."
+        if near is None:  # nothing is like it: what stands beside it
+            path = name.rpartition(".")[0]
+            known = [k.rpartition(".")[2] for k in keys if k.rpartition(".")[0] == path]
+            return f"{shown(key)} is an unknown key; known are {', '.join(known)}."
         return f"{shown(key)} is an unknown key; the nearest known one is {near}."
     if item["type"] == "missing":
         return f"{key} is missing."

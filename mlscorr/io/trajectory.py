@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
+from mlscorr.io.layouts import TableLayout
 from mlscorr.io.output import output_file
 from mlscorr.io.sbet import read_sbet
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.tables import find_columns, read_header, read_numbers
+from mlscorr.io.table_rows import read_numbers
+from mlscorr.io.tables import find_columns, read_header
 from mlscorr.io.text_files import warn_of_cut
 from mlscorr.survey import Trajectory
 
@@ -102,7 +104,7 @@ def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
 def _read_csv(path):
     header, lines = read_header(path)
     columns = find_columns(path, header, COLUMNS, (POSITION_SIGMAS, ATTITUDE_SIGMAS))
-    numbers = read_numbers(path, lines, columns.values(), len(header))
+    numbers = read_numbers(TableLayout(Path(path), tuple(header), lines, columns, is_own=True))
     table = dict(zip(columns, numbers.T, strict=True))
     _check_values(path, table)
     angles = np.column_stack([table[name] for name in COLUMNS[4:]])

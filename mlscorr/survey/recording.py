@@ -79,6 +79,8 @@ class Survey:
         Whether a correction may use what two passes both saw.
     notes : tuple of str
         What the readers worked out, for the report.
+    layouts : tuple of str
+        Those of the notes that say how tables of others were understood.
     inputs : tuple of InputFile
         survey.toml and every file that it names.
     scanners : tuple of MountedScanner
@@ -99,6 +101,7 @@ class Survey:
     search_radius: float = SEARCH_RADIUS
     use_ties: bool = True
     notes: tuple[str, ...] = ()
+    layouts: tuple[str, ...] = ()
     inputs: tuple[InputFile, ...] = ()
     scanners: tuple[MountedScanner, ...] = ()
 

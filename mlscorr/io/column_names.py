@@ -1,0 +1,145 @@
+"""Names and units of columns as surveyors, total stations, GNSS receivers and POS software write
+them, in English, German, French, Spanish and Chinese.
+
+Sources: point exports of Leica Infinity, Trimble Access and Emlid Flow; coordinate files of German
+surveying offices (Punkt, Rechtswert, Hochwert, Hoehe); text exports of NovAtel Inertial Explorer
+(GPSTime, H-Ell, SDEast, HdngSD). X and Y are no easting and northing: in German, Chinese and many
+other surveys X points north.
+"""
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
+
+PLACE_NAMES = {
+    "easting": "e east ecoord ecoordinate rechtswert rechts ost ostwert este est "
+    "东坐标 东 东向 东距 横坐标 e坐标",
+    "northing": "n north ncoord ncoordinate hochwert hoch nord nordwert norte "
+    "北坐标 北 北向 北距 纵坐标 n坐标",
+    "x": "x xcoord xcoordinate coordx xkoordinate xwert coordenadax x坐标",
+    "y": "y ycoord ycoordinate coordy ykoordinate ywert coordenaday y坐标",
+    "latitude": "lat breite latitud 纬度",
+    "longitude": "lon long lng länge longitud 经度",
+    "height": "h z elev elevation alt altitude hell ellipsoidalheight ellipsoidheight hortho "
+    "orthometricheight orthoheight hmsl höhe hoehe hnn hnhn rl zcoord zcoordinate coordz "
+    "zkoordinate zwert altura cota elevación elevacion coordenadaz 高程 高度 高 大地高 正常高 海拔 "
+    "h坐标 z坐标",
+}
+CONTROL_NAMES = PLACE_NAMES | {
+    "name": "id no nr n° num number point pointid pointname pointno pointnr pointnumber pt ptid "
+    "ptname ptno ptnr pnt station punkt punktnr punktnummer punktname punktid pkt pktnr pktname "
+    "pnr bezeichnung nummer nom numéro numero matricule punto nombre 点号 点名 点 编号 名称",
+    "sigma": "σ std stdev sd accuracy genauigkeit standardabweichung écarttype ecarttype "
+    "precision précision precisión 中误差 精度",
+    "sigma_horizontal": "sigmahz sigmaxy sigmaen sigmalage cq2d 2dcq hrms hprec hacc lateralrms "
+    "horizontalprecision horizontalaccuracy lagegenauigkeit 平面精度 平面中误差",
+    "sigma_vertical": "sigmaz sigmahöhe cq1d 1dcq vrms vprec vacc elevationrms verticalprecision "
+    "verticalaccuracy höhengenauigkeit 高程精度 高程中误差",
+    "kind": "shape targetkind targettype zielart art forme forma 形状 标靶类型",
+    "size": "diameter größe groesse durchmesser kantenlänge taille diamètre tamaño diámetro "
+    "尺寸 大小 直径 边长",
+    "role": "use usage rolle verwendung rôle rol uso 角色 用途",
+    "normal_e": "",
+    "normal_n": "",
+    "normal_h": "",
+}
+TRAJECTORY_NAMES = PLACE_NAMES | {
+    "gps_time": "time t sow tow gpssow gpstow secondsofweek gpsseconds zeit gpszeit temps tiempo "
+    "时间 gps时间 周秒",
+    "roll": "rollwinkel roulis alabeo 横滚 横滚角 翻滚角",
+    "pitch": "nick nickwinkel tangage cabeceo 俯仰 俯仰角",
+    "heading": "hdg hdng azimuth azimut cap rumbo kurs 航向 航向角",
+    "sigma_easting": "sdeast sigmae sde stdeast",
+    "sigma_northing": "sdnorth sigman sdn stdnorth",
+    "sigma_height": "sdheight sigmah sdh stdheight sdup",
+    "sigma_roll": "rollsd sdroll stdroll",
+    "sigma_pitch": "pitchsd sdpitch stdpitch",
+    "sigma_heading": "hdngsd headingsd sdheading stdheading",
+}
+UNITS = {  # to m, deg and s
+    **dict.fromkeys(("m", "meter", "metre", "meters", "metres", "mètres", "metros", "米"), 1.0),
+    **dict.fromkeys(("s", "sec", "seconds", "秒", "deg", "degree", "degrees", "°", "度"), 1.0),
+    **{"cm": 0.01, "mm": 0.001, "rad": 57.29577951308232, "gon": 0.9},
+}
+FOREIGN_UNITS = ("ft", "feet", "usft", "us-ft", "ftus", "sft", "in", "yd", "km", "dms", "hms")
+
+
+def plain(name: str) -> str:
+    """A name without case, width, brackets with a unit, blanks and punctuation.
+
+    Parameters
+    ----------
+    name : str
+
+    Examples
+    --------
+    >>> plain("Pkt.-Nr."), plain("Höhe [m]"), plain("H-Ell"), plain("Height (ellipsoidal)")
+    ('pktnr', 'höhe', 'hell', 'height(ellipsoidal)')
+    """
+    words = unicodedata.normalize("NFKC", name).casefold().strip()
+    if unit_of(words) is not None:
+        words = words[: max(words.rfind("["), words.rfind("("))]
+    return re.sub(r"[\s_.\-/:,'\"]+", "", words)
+
+
+def unit_of(name: str) -> str | None:
+    """The unit in brackets at the end of a name, known or foreign; None without one.
+
+    Parameters
+    ----------
+    name : str
+
+    Examples
+    --------
+    >>> unit_of("东坐标(m)"), unit_of("Elev [ft]"), unit_of("Height (ellipsoidal)")
+    ('m', 'ft', None)
+    """
+    words = unicodedata.normalize("NFKC", name).casefold().strip()
+    match = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]$", words)
+    return match[1] if match and (match[1] in UNITS or match[1] in FOREIGN_UNITS) else None
+
+
+def find_meanings(
+    cells: Sequence[str],
+    names: Mapping[str, str],
+    chosen: Mapping[str, str | int] | None = None,
+) -> dict[str, list[int]]:
+    """Positions of the columns that each of our names may mean.
+
+    A column under our own name goes before others, and one that the user chose before all.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        A header.
+    names : mapping
+        Our name to the names of others, plain and separated by blanks.
+    chosen : mapping, optional
+        Our name to the one in the header.
+
+    Returns
+    -------
+    dict
+        Without those that no column may mean.
+
+    Examples
+    --------
+    >>> find_meanings(["Pkt", "X", "Y", "Elev", "H-Ell"], CONTROL_NAMES)
+    {'x': [1], 'y': [2], 'height': [3, 4], 'name': [0]}
+    """
+    known = [plain(cell) for cell in cells]
+    exact = [cell.strip().casefold() for cell in cells]
+    meanings = {}
+    for name, others in names.items():
+        column = (chosen or {}).get(name)
+        if column is not None:
+            positions = [
+                i for i, cell in enumerate(exact) if cell == str(column).strip().casefold()
+            ]
+        elif plain(name) in known:
+            positions = [i for i, cell in enumerate(known) if cell == plain(name)]
+        else:
+            positions = [i for i, cell in enumerate(known) if cell and cell in others.split()]
+        if positions:
+            meanings[name] = positions
+    return meanings

@@ -1,0 +1,216 @@
+"""Control lists of others: what they lack, which axis is which, and what was understood."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mlscorr.io.layout_search import NUMBER
+from mlscorr.io.layouts import TableLayout
+from mlscorr.io.nearness import AXES, distance_of
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.survey_sections import ControlSection
+from mlscorr.io.tables import missing_sentence
+from mlscorr.io.text_files import shown
+from mlscorr.survey import Trajectory
+
+SIGMAS = ("sigma_horizontal", "sigma_vertical")
+UNNAMED_AXES = ("x", "y")  # either may point east
+
+
+def lacking(names: Collection[str]) -> list[str]:
+    """What names of columns leave missing of a point's name and place.
+
+    Parameters
+    ----------
+    names : collection of str
+    """
+    place = AXES[2:] if set(UNNAMED_AXES) <= set(names) else AXES
+    return [name for name in ("name", *place) if name not in names]
+
+
+def unnamed_columns(cells: Sequence[str]) -> dict[str, int]:
+    """Columns of a list without a header: name and three numbers, as total stations write them.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Of its first row.
+
+    Returns
+    -------
+    dict
+        Empty where they are something else.
+    """
+    if len(cells) < 4 or not cells[0] or not all(map(NUMBER.fullmatch, cells[1:4])):
+        return {}
+    return dict(zip(("name", *UNNAMED_AXES, "height"), range(4), strict=True))
+
+
+def complete(
+    layout: TableLayout, section: ControlSection, group: Sequence[str]
+) -> tuple[TableLayout, dict[str, Any]]:
+    """The columns of a list that are used, and what survey.toml gives of all points instead.
+
+    Without a column of roles all points are control points.
+
+    Parameters
+    ----------
+    layout : TableLayout
+    section : ControlSection
+    group : sequence of str
+        Names of columns that are used together or not.
+
+    Returns
+    -------
+    layout : TableLayout
+    given : dict
+        Name of a column to the value of all points.
+
+    Raises
+    ------
+    ValueError
+        For what neither gives.
+    """
+    columns, header = layout.columns, layout.header
+    needless = set() if set(group) <= set(columns) else set(group)
+    if {"easting", "northing"} <= set(columns):
+        needless.update(UNNAMED_AXES)
+    columns = {name: i for name, i in columns.items() if name not in needless}
+    horizontal, vertical = section.sigma or (None, None)
+    given = {"sigma_horizontal": horizontal, "sigma_vertical": vertical, "kind": section.kind}
+    given |= {"size": section.size, "role": "control"}
+    present = set(columns) | (set(SIGMAS) if "sigma" in columns else set())
+    given = {name: value for name, value in given.items() if name not in present}
+    missing = [name for name, value in given.items() if value is None]
+    if missing:
+        used = {header[i] for i in columns.values()} if header else set()
+        raise ValueError(
+            f"{missing_sentence(layout.path, header, missing, used)} A value for all points may "
+            'stand under [control] in survey.toml: kind = "circle", size = 0.6, sigma = [0.003, '
+            "0.004] (m; horizontal, vertical)."
+        )
+    return replace(layout, columns=columns), given
+
+
+def check_unused(
+    layout: TableLayout, rows: Sequence[Sequence[str]], words: Mapping[str, Collection[str]]
+) -> None:
+    """Refuse a column that isn't used but holds what another name promises.
+
+    Parameters
+    ----------
+    layout : TableLayout
+    rows : sequence of sequences of str
+        All cells.
+    words : mapping
+        Name of a column to the only words that stand in it.
+
+    Raises
+    ------
+    ValueError
+        Names column and name.
+    """
+    for name in set(words) - set(layout.columns):
+        for i in set(range(len(layout.header))) - set(layout.columns.values()):
+            cells = {row[i].casefold() for row in rows if i < len(row)}
+            if cells and cells <= set(words[name]):
+                raise ValueError(
+                    f"The column {shown(layout.header[i])} of {layout.path} seems to be the "
+                    f"{name}, for it holds {', '.join(sorted(cells))}: name it {name}, or say so "
+                    "under [control.columns] in survey.toml."
+                )
+
+
+def with_check_points(
+    path: str | Path, rows: Sequence[dict[str, Any]], patterns: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Rows in which those points are check points that survey.toml names.
+
+    Parameters
+    ----------
+    path : path
+    rows : sequence of dict
+    patterns : sequence of str
+        Names, or patterns of names.
+
+    Raises
+    ------
+    ValueError
+        For a pattern that fits no point.
+    """
+    for pattern in patterns:
+        if not any(fnmatchcase(row["name"], pattern) for row in rows):
+            raise ValueError(f"control.check names '{shown(pattern)}', no point of {path}.")
+    return [
+        row | {"role": "check"} if any(fnmatchcase(row["name"], p) for p in patterns) else row
+        for row in rows
+    ]
+
+
+def placed(
+    layout: TableLayout, rows: list[dict[str, Any]], trajectory: Trajectory | None
+) -> tuple[TableLayout, list[dict[str, Any]]]:
+    """A list whose columns X and Y are easting and northing by the trajectory, and its sigmas two.
+
+    Parameters
+    ----------
+    layout : TableLayout
+    rows : list of dict
+    trajectory : Trajectory or None
+
+    Returns
+    -------
+    layout : TableLayout
+    rows : list of dict
+
+    Raises
+    ------
+    ValueError
+        Where the trajectory does not tell.
+    """
+    columns, sources = dict(layout.columns), {}
+    if "x" in columns:
+        order = _axes_east_and_north(layout, rows, trajectory)
+        sources = dict(zip(AXES, order, strict=False))
+        columns |= {name: columns.pop(axis) for name, axis in sources.items()}
+    if "sigma" in columns:
+        sources |= dict.fromkeys(SIGMAS, "sigma")
+    rows = [row | {name: row[source] for name, source in sources.items()} for row in rows]
+    return replace(layout, columns=columns), rows
+
+
+def _axes_east_and_north(layout, rows, trajectory):
+    """X and Y in the order in which they are easting and northing."""
+    position = np.array([[row[axis] for axis in UNNAMED_AXES] for row in rows])
+    near = [
+        trajectory is not None and distance_of(places, trajectory) < SETTINGS.near
+        for places in (position, position[:, ::-1])
+    ]
+    if near[0] != near[1]:
+        return UNNAMED_AXES if near[0] else UNNAMED_AXES[::-1]
+    x, y = (layout.name_of(axis) for axis in UNNAMED_AXES)
+    raise ValueError(
+        f"{layout.path} does not say which of {x} and {y} is easting, for X points east here and "
+        f"north there, and {'both orders lie' if near[0] else 'neither order lies'} within "
+        f"{SETTINGS.near / 1e3:g} km of the trajectory. Name them easting and northing, or say "
+        "which is which under [control.columns] in survey.toml."
+    )
+
+
+def sentence_on(layout: TableLayout, given: Mapping[str, Any], patterns: Sequence[str]) -> str:
+    """What was understood of a list, and what survey.toml says of all points.
+
+    Parameters
+    ----------
+    layout : TableLayout
+    given : mapping
+    patterns : sequence of str
+        Of check points.
+    """
+    values = [f"{k} {shown(v) if isinstance(v, str) else f'{v:g} m'}" for k, v in given.items()]
+    values += [f"but check for {shown(', '.join(patterns))}"] * bool(patterns)
+    return f"{layout}{'; of all points: ' + ', '.join(values) if values else ''}."

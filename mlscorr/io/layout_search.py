@@ -1,0 +1,214 @@
+"""The layout of tables as others write them.
+
+Nothing is guessed in silence: what was understood is a sentence of its own, and what can be
+understood in two ways is refused.
+"""
+
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from mlscorr.io.column_names import FOREIGN_UNITS, UNITS, find_meanings, unit_of
+from mlscorr.io.layouts import (
+    COMMENT_MARKS,
+    ENCODINGS,
+    SEPARATORS,
+    TableLayout,
+    head,
+    is_comment,
+    split,
+)
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.sheets import SUFFIX, read_sheets
+from mlscorr.io.text_files import shown
+
+WORDS = ("name", "kind", "role")  # columns that hold no numbers
+NUMBER = re.compile(r"[+-]?\d+([.,]\d*)?(e[+-]?\d+)?", re.IGNORECASE)
+
+
+def find_layout(
+    path: str | Path,
+    names: Mapping[str, str],
+    lacking: Callable[[Collection[str]], list[str]],
+    chosen: Mapping[str, str | int] | None = None,
+    unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
+) -> TableLayout | None:
+    """The layout of a table of others.
+
+    Parameters
+    ----------
+    path : path
+    names : mapping
+        Our names of columns to those of others.
+    lacking : function
+        Names that these names leave missing.
+    chosen : mapping, optional
+        Our name to the name of a column, or to its number from 1.
+    unnamed : function, optional
+        The columns that the cells of a first row without a header mean, if any.
+
+    Returns
+    -------
+    TableLayout or None
+        None where no line names all that is needed.
+
+    Raises
+    ------
+    ValueError
+        For columns that stand for the same, units that are not metric, thousands marks, and two
+        sheets that hold a table.
+    """
+    path, chosen = Path(path), dict(chosen or {})
+    if chosen and all(isinstance(column, int) for column in chosen.values()):
+        positions = {name: int(number) - 1 for name, number in chosen.items()}
+        if missing := lacking(positions):
+            raise ValueError(
+                f"{path} has numbers of columns in survey.toml, but none for {', '.join(missing)}: "
+                "number all that are needed, or none."
+            )
+        unnamed = _numbered(positions)
+    for encoding in (None,) if path.suffix.lower() == SUFFIX else _encodings(path):
+        layouts = []
+        for start, rows in _candidates(path, encoding):
+            layout = _layout_of(replace(start, path=path), rows, names, lacking, chosen)
+            layout = layout or _unnamed_layout(start, rows, chosen, unnamed)
+            if layout is not None:
+                layouts.append(layout)
+                if layout.sheet is None:
+                    break  # the surest separator
+        if len({layout.sheet for layout in layouts}) > 1:
+            sheets = ", ".join(shown(layout.sheet) for layout in layouts)
+            raise ValueError(
+                f"{path} has a table in {len(layouts)} sheets ({sheets}): keep one of them."
+            )
+        for layout in layouts[:1]:
+            letters = "".join(layout.header)
+            if encoding != "gb18030" or not letters.isascii():  # else nothing tells it from others
+                return layout
+    return None
+
+
+def _numbered(positions):
+    """A function that gives these columns where the cells of a row there are numbers."""
+
+    def columns(cells):
+        numbers = [i for name, i in positions.items() if name not in WORDS]
+        is_row = max(positions.values()) < len(cells)
+        return positions if is_row and all(NUMBER.fullmatch(cells[i]) for i in numbers) else {}
+
+    return columns
+
+
+def _encodings(path):
+    with path.open("rb") as file:
+        return ("utf-16",) if file.read(2) in (b"\xff\xfe", b"\xfe\xff") else tuple(
+            name for name in ENCODINGS if name != "utf-16"
+        )  # fmt: skip
+
+
+def _candidates(path, encoding):
+    """Pairs of a TableLayout without columns, and the first rows parted in its way."""
+    if encoding is None:
+        for sheet, rows in read_sheets(path):
+            yield TableLayout(path, (), 0, {}, sheet=sheet), rows[: SETTINGS.sampled_lines]
+        return
+    lines = head(path, encoding)
+    for separator in SEPARATORS if lines else ():
+        layout = TableLayout(path, (), 0, {}, separator, encoding=encoding)
+        yield layout, [(number, split(line, separator)) for number, line in lines]
+
+
+def _layout_of(start, rows, names, lacking, chosen):
+    """The layout by the first row that names all that is needed; None without one."""
+    for place, (number, raw) in enumerate(rows):
+        cells = _uncommented(raw)
+        meanings = find_meanings(cells, names, chosen)
+        if lacking(meanings):
+            continue
+        for name, positions in meanings.items():
+            if len(positions) > 1:
+                doubled = [shown(cells[i]) for i in positions]
+                raise ValueError(
+                    f"{start.path} has {len(doubled)} columns that may be the {name} "
+                    f'({", ".join(doubled)}): choose, as {name} = "{doubled[0]}" under '
+                    "[control.columns] or [trajectory.columns] in survey.toml."
+                )
+        columns = {name: positions[0] for name, positions in meanings.items()}
+        layout = replace(start, header=tuple(cells), lines=number, columns=columns)
+        below = [row for row in rows[place + 1 :] if not is_comment(row[1])]
+        units = [unit_of(cell) for cell in cells]
+        if below and _holds_units(below[0][1], columns):
+            layout = replace(layout, lines=below[0][0])
+            units = [unit_of(f"({cell.strip('()[]')})") for cell in below.pop(0)[1]]
+        return _with_numbers(layout, units, [row for _, row in below])
+    return None
+
+
+def _unnamed_layout(start, rows, chosen, unnamed):
+    """The layout of a table without a header: its first row, or the first with what was chosen."""
+    rows = [row for row in rows if not (row[1] and row[1][0].startswith(COMMENT_MARKS))]
+    for place, (number, cells) in enumerate(rows if chosen else rows[:1]):
+        columns = unnamed(cells)
+        if columns:
+            layout = replace(start, lines=number - 1, columns=dict(columns))
+            return _with_numbers(layout, [], [row for _, row in rows[place:]])
+    return None
+
+
+def _uncommented(cells):
+    """Cells of a header that may stand behind a comment mark."""
+    if cells and cells[0].startswith(COMMENT_MARKS):
+        first = cells[0].lstrip("".join(COMMENT_MARKS)).strip()
+        return [first, *cells[1:]] if first else cells[1:]
+    return cells
+
+
+def _holds_units(cells, columns):
+    """Whether the row below a header has units in place of values."""
+    texts = [cells[i].strip("()[] ").casefold() for i in columns.values() if i < len(cells)]
+    known = {*UNITS, *FOREIGN_UNITS, ""}
+    return any(texts) and all(text in known for text in texts)
+
+
+def _with_numbers(layout, units, rows):
+    """The layout with its decimal sign and the factors of its units."""
+    path, factors = layout.path, {}
+    for name, i in layout.columns.items():
+        unit = units[i] if i < len(units) else None
+        if unit in FOREIGN_UNITS:
+            raise ValueError(
+                f"{path} has the {name} in '{unit}', where m, mm, deg, rad or s belong: "
+                "convert this column."
+            )
+        if unit is not None and UNITS[unit] != 1.0:
+            factors[name] = UNITS[unit]
+    places = [i for name, i in layout.columns.items() if name not in WORDS]
+    cells = [row[i] for row in rows for i in places if i < len(row)]
+    numbers = [cell for cell in cells if NUMBER.fullmatch(cell.replace(".", "").replace(",", ""))]
+    commas, points = ([cell for cell in numbers if mark in cell] for mark in ",.")
+    if commas and points:
+        raise ValueError(
+            f"{path} has numbers with commas ('{shown(commas[0])}') and with points "
+            f"('{shown(points[0])}'): write decimals in one way, and leave out thousands marks."
+        )
+    return replace(layout, factors=factors, decimal="," if commas else ".")
+
+
+def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
+    """The row among the first ones that holds the most names of columns; the first where none does.
+
+    Parameters
+    ----------
+    path : path
+    names : mapping
+        See find_layout.
+
+    Returns
+    -------
+    list of str
+    """
+    path = Path(path)
+    encoding = None if path.suffix.lower() == SUFFIX else _encodings(path)[0]
+    rows = [cells for _, rows in _candidates(path, encoding) for _, cells in rows]
+    return max(rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[])

@@ -1,0 +1,61 @@
+"""Whether control and trajectory lie together."""
+
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.settings import SETTINGS
+from mlscorr.survey import ControlPoints, Trajectory
+
+AXES = ("easting", "northing", "height")
+
+
+def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) -> None:
+    """Refuse control that lies kilometres from the trajectory, as it stands or swapped.
+
+    Parameters
+    ----------
+    path : Path
+        Of the control, for messages.
+    points : ControlPoints
+    trajectory : Trajectory
+
+    Raises
+    ------
+    ValueError
+        Names the columns that are exchanged, or the distance.
+    """
+    distance = distance_of(points.position[:, :2], trajectory)
+    orders = [(1, 0, 2), *permutations(range(3))]  # the usual exchange first
+    for order in orders if distance > SETTINGS.near else ():
+        swapped = distance_of(points.position[:, order[:2]], trajectory)
+        if swapped < SETTINGS.near:
+            under = [f"{AXES[i]} under {AXES[column]}" for i, column in enumerate(order)]
+            what = "Easting and northing" if order == orders[0] else f"Columns ({', '.join(under)})"
+            raise ValueError(
+                f"{what} seem to be swapped in {path}: its nearest point lies "
+                f"{distance / 1e3:.0f} km from the trajectory as it stands, {swapped:.0f} m when "
+                f"they are exchanged. Exchange the {'two ' * (order == orders[0])}columns, or say "
+                "which is which under [control.columns] in survey.toml."
+            )
+    if distance > SETTINGS.far:
+        raise ValueError(
+            f"The control nearest to the trajectory lies {distance / 1e3:.1f} km from it "
+            f"(limit {SETTINGS.far / 1e3:.0f} km): {path} and the trajectory may be in different "
+            "CRS or zones. Bring both into the crs of survey.toml."
+        )
+
+
+def distance_of(position: np.ndarray, trajectory: Trajectory) -> float:
+    """Least horizontal distance of points from the trajectory's epochs. Units: m.
+
+    Parameters
+    ----------
+    position : (n, 2) array
+        Easting and northing. Units: m.
+    trajectory : Trajectory
+    """
+    from scipy.spatial import cKDTree
+
+    return cKDTree(trajectory.position[:, :2]).query(position)[0].min()

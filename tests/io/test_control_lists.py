@@ -1,0 +1,202 @@
+"""Control lists as total stations, GNSS receivers and surveying offices write them."""
+
+import datetime
+
+import numpy as np
+import openpyxl
+import pytest
+
+from mlscorr.frames import attitude_from_angles
+from mlscorr.io.control import holds_points, read_control_list
+from mlscorr.io.survey_sections import ControlSection
+from mlscorr.io.toml_file import read_toml
+from mlscorr.survey import Trajectory
+
+ALL = {"kind": "circle", "size": 0.6, "sigma": [0.003, 0.004]}
+PLACES = [[532012.49, 3373991.48, 44.48], [532030.0, 3373978.17, 44.5]]
+
+
+@pytest.fixture(scope="module")
+def drive():
+    "Ten seconds to the east, past the points"
+    gps_time = 413200.0 + 0.5 * np.arange(20)
+    east = 532_000.0 + 5.0 * (gps_time - gps_time[0])
+    position = np.column_stack([east, np.full(20, 3_374_000.0), np.full(20, 42.0)])
+    return Trajectory(gps_time, position, attitude_from_angles(np.zeros(20), 0.0, np.pi / 2))
+
+
+def read(folder, content, drive=None, encoding="utf-8", **section):
+    path = folder / "list.txt"
+    path.write_text(content, encoding=encoding)
+    return read_control_list(path, ControlSection(file="", **{**ALL, **section}), drive)
+
+
+LISTS = {  # what writes such a file: content, its letters, and what is understood
+    "total station, blanks, no header": (
+        "P1   532012.49  3373991.48  44.48\nP2   532030.00  3373978.17  44.50\n",
+        "utf-8", "easting = column 2, northing = column 3, height = column 4 (blanks",
+    ),
+    "name, northing, easting, height, code": (
+        "P1,3373991.48,532012.49,44.48,GCP\nP2,3373978.17,532030.0,44.5,\n",
+        "utf-8", "northing = column 2, easting = column 3",
+    ),
+    "Leica, header behind a comment mark": (
+        "# Infinity 4.1\n# Point Id\tEasting\tNorthing\tOrthometric Height\n"
+        "P1\t532012.49\t3373991.48\t44.48\n# P9\t1\t2\t3\n\nP2\t532030.0\t3373978.17\t44.5\n",
+        "utf-8", "name = Point Id, easting = Easting",
+    ),
+    "Trimble, northing first": (
+        "\ufeffPoint ID,Northing,Easting,Elevation,Code\n"
+        "P1,3373991.48,532012.49,44.48,\nP2,3373978.17,532030.0,44.5,x\n",
+        "utf-8", "northing = Northing, easting = Easting, height = Elevation (commas",
+    ),
+    "German office, letters of Windows": (
+        "Punktnr.;Rechtswert;Hochwert;Höhe\nP1;532012,49;3373991,48;44,48\n"
+        "P2;532030;3373978,17;44,5\n",
+        "cp1252", "height = Höhe (semicolons, decimal comma, letters of Windows-1252)",
+    ),
+    "Gauss-Krueger habit, units in brackets": (
+        "Pkt X[m] Y[m] Z[m]\nP1 3373991,48 532012,49 44,48\nP2 3373978,17 532030,00 44,50\n",
+        "utf-8", "northing = X[m], easting = Y[m], height = Z[m] (blanks, decimal comma)",
+    ),
+    "French, units in a row": (
+        "N°;Est;Nord;Altitude\n;(m);(m);(m)\nP1;532012,49;3373991,48;44,48\n"
+        "P2;532030;3373978,17;44,5\n",
+        "utf-8", "name = N°, easting = Est, northing = Nord, height = Altitude",
+    ),
+    "Spanish, Excel's Unicode text": (
+        "Punto\tEste\tNorte\tCota\nP1\t532012,49\t3373991,48\t44,48\n"
+        "P2\t532030\t3373978,17\t44,5\n",
+        "utf-16", "height = Cota (tabs, decimal comma, letters of UTF-16)",
+    ),
+    "Chinese": (
+        "点号,东坐标(m),北坐标(m),高程(m)\nP1,532012.49,3373991.48,44.48\n"
+        "P2,532030,3373978.17,44.5\n",
+        "gb18030", "name = 点号, easting = 东坐标(m), northing = 北坐标(m)",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", LISTS)
+def test_lists_of_others_are_read_and_said(kind, drive, tmp_path):
+    "Two points to the last digit from each kind of list, and the sentence on what was understood"
+    content, encoding, sentence = LISTS[kind]
+    points = read(tmp_path, content, drive, encoding)
+    assert points.control.name == ("P1", "P2") and len(points.check) == 0
+    assert points.control.position.tolist() == PLACES
+    assert points.control.sigma.tolist() == [[0.003, 0.003, 0.004]] * 2
+    assert sentence in points.layout
+    assert "kind circle, size 0.6 m, role control" in points.layout
+    assert holds_points(tmp_path / "list.txt")
+
+
+def test_columns_of_the_list_go_before_what_is_said_of_all(drive, tmp_path):
+    "Kinds, sizes (mm), one sigma for all axes and roles that stand in the table are its own"
+    header = "Name;Kind;Size (mm);E;N;H;σ;Role;Remark\n"
+    content = header + "P1;square;500;532012,49;3373991,48;44,48;0,002;check;at the gate\n"
+    points = read(tmp_path, content, drive)
+    assert points.check.kind == ("square",) and points.check.size.tolist() == [0.5]
+    assert points.check.sigma.tolist() == [[0.002] * 3]
+    assert "of all points" not in points.layout
+
+
+def test_a_workbook_is_read_from_the_sheet_that_holds_the_table(drive, tmp_path):
+    "Title rows above, numbers as names, an empty sheet beside it; two tables are refused"
+    book = openpyxl.Workbook()
+    rows = [["Projekt"], [], ["Pkt-Nr", "Ostwert", "Nordwert", "Höhe"]]
+    for row in [*rows, [101, *PLACES[0]], ["P2", *PLACES[1]]]:
+        book.active.append(row)
+    book.create_sheet("leer").append([datetime.datetime(2026, 5, 1), None])
+    book.save(tmp_path / "list.xlsx")
+    section = ControlSection(file="", **ALL, check=["P*"])
+    points = read_control_list(tmp_path / "list.xlsx", section, drive)
+    assert points.control.name == ("101",) and points.check.name == ("P2",)
+    assert points.control.position.tolist() == PLACES[:1]
+    assert "(sheet Sheet, decimal point); " in points.layout
+    assert points.layout.endswith("role control, but check for P*.")
+    book.copy_worksheet(book.active)
+    book.save(tmp_path / "list.xlsx")
+    with pytest.raises(ValueError, match=r"a table in 2 sheets \(Sheet, Sheet Copy\)"):
+        read_control_list(tmp_path / "list.xlsx", section, drive)
+    (tmp_path / "list.xlsx").write_text("no zip")
+    with pytest.raises(ValueError, match="no workbook of Excel"):
+        read_control_list(tmp_path / "list.xlsx", section, drive)
+
+
+@pytest.mark.parametrize("columns", [{"height": "Elevation"}, {
+    "name": 1, "easting": 2, "northing": 3, "height": 4,
+}])  # fmt: skip
+def test_survey_toml_chooses_columns(columns, drive, tmp_path):
+    "By their names where two may be meant, or by their numbers"
+    content = (
+        "Name,Easting,Northing,Elevation,Ellipsoidal height\nP1,532012.49,3373991.48,44.48,20\n"
+    )
+    with pytest.raises(ValueError, match=r"may be the height \(Elevation, Ellipsoidal height\)"):
+        read(tmp_path, content, drive)
+    points = read(tmp_path, content, drive, columns=columns)
+    assert points.control.position.tolist() == PLACES[:1]
+
+
+P1 = "P1;532012,49;3373991,48;44,48\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("Punkt;X;Y;Z\nP1;1001;1002;3\n", "X and Y is easting, .* neither order lies within 1 km"),
+        ("P1 1001 1002 3\n", "column 2 and column 3 is easting"),
+        ("P1,532012,49,3373991,48,44,48\n", "neither order lies"),
+        ("Punkt;E;N;H\nP1;532.012,49;3.373.991,48;44,48\n", "commas .*'532.012,49'.* and .*points"),
+        ("name,easting,northing,elev (ft)\n" + P1.replace(";", ","), "height in 'ft'"),
+        ("time,temperature\n1,2\n", "no column name, .* holds no coordinates: is another file"),
+        ("name,lat,lon,h\nP1,30.4,114.4,20\n", "Latitude and longitude must be projected first"),
+        ("X;Y;Z\n1;2;3\n", "no column name; it has X, Y, Z"),
+        ("Punkt;E;N;H\nP1;532012,49;3373991,48\n", "Line 2 .* 3 columns where 4 belong"),
+        ("Punkt,E,N,H\nP1,532012,49,3373991,48,44,48\n", "7 columns .* decimals must be"),
+        ("Gate 1 532012,49 3373991,48 44,48\n" + P1.replace(";", " "), "Line 2 .*parted by blanks"),
+        ("Punkt;E;N;H;Was\n" + P1.replace("\n", ";check\n"), "Was of .* seems to be the role"),
+        ("Punkt;E;N;H\n" + P1.replace("44,48", "hoch"), "height 'hoch', which is not a number"),
+        ("Punkt;E;N;H\n" + P1 + P1, "names P1 more than once"),
+        ("Punkt;E;N;H\n", "header but no points"),
+    ],
+)  # fmt: skip
+def test_what_may_mean_two_things_or_nothing_is_refused(content, message, drive, tmp_path):
+    "Axes, decimals, units, shifted columns, roles under another name: named, with the way out"
+    with pytest.raises(ValueError, match=message):
+        read(tmp_path, content, drive)
+
+
+def test_axes_that_both_lie_near_are_not_guessed(drive, tmp_path):
+    "In a local grid with equal numbers X and Y stay open, and so they do without a trajectory"
+    local = Trajectory(drive.gps_time, drive.position - [532e3, 3374e3, 0], drive.attitude)
+    with pytest.raises(ValueError, match="both orders lie within 1 km"):
+        read(tmp_path, "P1 20 30 44\n", local)
+    with pytest.raises(ValueError, match="neither order lies"):
+        read(tmp_path, LISTS["name, northing, easting, height, code"][0])
+
+
+def test_what_the_list_lacks_is_asked_for_by_its_key(drive, tmp_path):
+    "Without columns and without a value in survey.toml: the sentence shows the lines to write"
+    with pytest.raises(ValueError, match=r"no column size; .*\[control\] in .*size = 0\.6"):
+        read(tmp_path, "Punkt;E;N;H\n" + P1, drive, size=None)
+    with pytest.raises(ValueError, match=r"control\.check names 'Q\*', no point of"):
+        read(tmp_path, "Punkt;E;N;H\n" + P1, drive, check=["Q*"])
+
+
+def test_names_and_numbers_of_columns_are_not_mixed(tmp_path):
+    "Numbers are for tables without names"
+    (tmp_path / "a.toml").write_text('file = "x"\n[columns]\nname = 1\nheight = "H"\n')
+    with pytest.raises(ValueError, match="names of columns or numbers of columns, not both"):
+        read_toml(tmp_path / "a.toml", ControlSection, "it")
+    with pytest.raises(ValueError, match="but none for name, northing, height: number all"):
+        read(tmp_path, P1, columns={"easting": 2})
+
+
+def test_no_name_is_suggested_that_is_not_alike(tmp_path):
+    "A missing name is not said to be meant by 'use'; unknown keys are set beside the known ones"
+    with pytest.raises(ValueError, match="has no column name") as error:
+        read(tmp_path, "use,easting,northing,height\na,1,2,3\n")
+    assert "meant by" not in str(error.value)
+    (tmp_path / "a.toml").write_text('file = "x"\nqqq = 1\n')
+    with pytest.raises(ValueError, match="qqq is an unknown key; known are file, kind, size, si"):
+        read_toml(tmp_path / "a.toml", ControlSection, "it")
