@@ -40,13 +40,32 @@ def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
         When the file is missing, not LAS, cut off, or without gps_time.
     """
     layout = read_layout(path)
-    places = np.unique(np.linspace(0, layout.points - 1, SETTINGS.sampled_points).astype(np.int64))
-    times = times_at(layout, places)
+    times = spread_times(layout)[1]
     return layout.points, layout.is_standard, times[np.isfinite(times)]
 
 
+def spread_times(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers and gps_time of points spread over a file, first and last among them, in file order.
+
+    Parameters
+    ----------
+    layout : LasLayout
+
+    Returns
+    -------
+    places : (65 or fewer,) int array
+    times : array of the same length
+        Units: s.
+    """
+    places = np.unique(np.linspace(0, layout.points - 1, SETTINGS.sampled_points).astype(np.int64))
+    return places, times_at(layout, places)
+
+
 def read_chunks(
-    cloud_file: CloudFile, chunk_size: int = SETTINGS.chunk_points
+    cloud_file: CloudFile,
+    chunk_size: int = SETTINGS.chunk_points,
+    first: int = 0,
+    end: int | None = None,
 ) -> Iterator[PointCloud]:
     """Points of a cloud file by chunks, in file order, withheld points among them.
 
@@ -57,6 +76,8 @@ def read_chunks(
     cloud_file : CloudFile
     chunk_size : int
         Points at a time.
+    first, end : int
+        Numbers of the points at which to start, and to end before.
 
     Yields
     ------
@@ -70,7 +91,7 @@ def read_chunks(
     """
     layout = read_layout(cloud_file.path)
     scale, offset = layout.scale, layout.offset
-    for records in read_records(layout, chunk_size):
+    for records in read_records(layout, chunk_size, first, end):
         xyz = np.empty((len(records), 3))
         for axis, name in enumerate("XYZ"):
             np.multiply(records[name], scale[axis], out=xyz[:, axis])
@@ -131,7 +152,9 @@ def times_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     return times
 
 
-def read_records(layout: LasLayout, chunk_size: int) -> Iterator[np.ndarray]:
+def read_records(
+    layout: LasLayout, chunk_size: int, first: int = 0, end: int | None = None
+) -> Iterator[np.ndarray]:
     """Records chunk by chunk, each in the memory of the one before.
 
     Parameters
@@ -139,6 +162,8 @@ def read_records(layout: LasLayout, chunk_size: int) -> Iterator[np.ndarray]:
     layout : LasLayout
     chunk_size : int
         Points at a time.
+    first, end : int
+        As of read_chunks.
 
     Yields
     ------
@@ -150,12 +175,15 @@ def read_records(layout: LasLayout, chunk_size: int) -> Iterator[np.ndarray]:
         For points that cannot be decoded.
     """
     length = layout.record_length
-    buffer = np.empty(min(chunk_size, layout.points) * length, np.uint8)
+    last = layout.points if end is None else end
+    buffer = np.empty(min(chunk_size, last - first) * length, np.uint8)
     with open(layout.path, "rb") as file:
         decoder = layout.decoder(file)
-        for first in range(0, layout.points, chunk_size):
-            end = min(first + chunk_size, layout.points)
-            raw = buffer[: (end - first) * length]
-            with _decoding(layout, first, end):
+        if first:
+            decoder.seek(first)
+        for start in range(first, last, chunk_size):
+            stop = min(start + chunk_size, last)
+            raw = buffer[: (stop - start) * length]
+            with _decoding(layout, start, stop):
                 decoder.decompress_many(raw)
             yield raw.view(layout.record)

@@ -8,6 +8,7 @@ import numpy as np
 from mlscorr.io.settings import SETTINGS
 from mlscorr.survey import ControlPoints, Trajectory
 
+FOOT = 0.3048  # m; the US survey foot is longer by 2 ppm
 AXES = ("easting", "northing", "height")
 
 
@@ -44,7 +45,20 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
             f"The control nearest to the trajectory lies {distance / 1e3:.1f} km from it "
             f"(limit {SETTINGS.far / 1e3:.0f} km): {path} and the trajectory may be in different "
             "CRS or zones. Bring both into the crs of survey.toml."
+            f"{_feet(points.position[:, :2], trajectory)}"
         )
+
+
+def _feet(position, trajectory):
+    """A sentence where points (n, 2) lie near the trajectory once feet are made metres."""
+    for factor, what in ((FOOT, "these points"), (1 / FOOT, "the trajectory")):
+        distance = distance_of(position * factor, trajectory) * min(1.0, 1.0 / factor)
+        if distance < SETTINGS.near:
+            return (
+                f" With {what} taken as feet it is {distance:.0f} m: multiply the coordinates by "
+                f"{FOOT} (by 1200/3937 where they are US survey feet)."
+            )
+    return ""
 
 
 def distance_of(position: np.ndarray, trajectory: Trajectory) -> float:
@@ -56,6 +70,23 @@ def distance_of(position: np.ndarray, trajectory: Trajectory) -> float:
         Easting and northing. Units: m.
     trajectory : Trajectory
     """
+    return nearest_epochs(position, trajectory)[0].min()
+
+
+def nearest_epochs(position: np.ndarray, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Horizontal distance (n,) of points from the nearest epochs in m, and these (n,).
+
+    Parameters
+    ----------
+    position : (n, 2) array
+        Easting and northing. Units: m.
+    trajectory : Trajectory
+
+    Returns
+    -------
+    distance : (n,) array
+    epoch : (n,) int array
+    """
     from scipy.spatial import cKDTree
 
-    return cKDTree(trajectory.position[:, :2]).query(position)[0].min()
+    return cKDTree(trajectory.position[:, :2]).query(position)

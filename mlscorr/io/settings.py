@@ -13,6 +13,7 @@ class Settings:
     # ---- clouds
     chunk_points: int = 1_000_000  # at a time: 125 MB with decoding, benchmarks/bench.py
     sampled_points: int = 65  # times per file, first and last among them, for its time system
+    close_places: int = 50_000  # points, LASzip's chunk: one is decoded to find a point in it
     largest_chunk: int = 10_000_000  # points; lazrs allocates whole LAZ chunks, aborts if it can't
     sigma_step: float = 1e-4  # m, of a point's sigma in 16 bits: up to 6.5 m
     copied_bytes: int = 1 << 20  # at a time, where bytes are copied as they are
@@ -23,6 +24,8 @@ class Settings:
     coarse_sigma: float = 0.5  # m, beyond which a surveyed point corrects nothing
     near: float = 1e3  # m, within which a survey's control and points lie of the trajectory
     far: float = 5e3  # m, beyond which control and trajectory can't belong together
+
+    same_place: float = 0.1  # m; realisations of one datum put a place so far apart in a few years
 
     # ---- tables
     longest_line: int = 10_000  # characters; no table has columns for that

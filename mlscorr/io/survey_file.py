@@ -1,10 +1,13 @@
 """survey.toml and the files it names, as one Survey."""
 
+import warnings
 from pathlib import Path
 
 from mlscorr.io.control import NO_POINTS, holds_points, read_control_list
 from mlscorr.io.inputs import input_file
-from mlscorr.io.las import sample_gps_times
+from mlscorr.io.las import spread_times
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
 from mlscorr.io.sbet import check_area, check_crs, describe_projection
 from mlscorr.io.survey_paths import files_of
@@ -13,7 +16,7 @@ from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
 from mlscorr.io.time_systems import match_times
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
-from mlscorr.survey import CloudFile, Pos, Scanner, Survey
+from mlscorr.survey import CloudFile, Pos, Scanner, Survey, Trajectory
 
 FILE_NAME = "survey.toml"
 UNKNOWN_POS = (
@@ -46,7 +49,7 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     FileNotFoundError
         For files that aren't there.
     """
-    path = _survey_toml(path)
+    path = survey_toml(path)
     settings = read_survey_file(path, planned)
     clouds, trajectory_file, accuracy, control_file, reference = files = files_of(path, settings)
     inputs = tuple(input_file(*named) for named in _named(path, files))
@@ -58,9 +61,9 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
         check_together(control_file, control + check, trajectory)
         layouts += filter(None, [points.layout])
     is_geographic = trajectory_file.suffix.lower() in SBET_SUFFIXES
-    notes = _crs_notes(settings.crs, trajectory, is_geographic)
+    notes = crs_notes(settings.crs, trajectory, is_geographic)
     system = settings.cloud.gps_time if settings.cloud else "auto"
-    read = [_cloud_file(cloud, trajectory, system) for cloud in clouds]
+    read = [cloud_file(cloud, trajectory, system, settings.crs) for cloud in clouds]
     cloud_files = tuple(file for file, _ in read)
     scanners = mounted_scanners(path, settings, cloud_files)
     is_one = len(scanners) == 1
@@ -88,8 +91,16 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     )
 
 
-def _crs_notes(crs, trajectory, is_geographic):
-    """Sentences on the CRS; warns where the trajectory lies outside its area."""
+def crs_notes(crs: str | None, trajectory: Trajectory, is_geographic: bool) -> list[str]:
+    """Sentences on the CRS; warns where the trajectory lies outside its area.
+
+    Parameters
+    ----------
+    crs : str or None
+    trajectory : Trajectory
+    is_geographic : bool
+        Whether its file has latitudes and longitudes.
+    """
     if crs is None:
         return ["No CRS was given."]
     projected = check_crs(crs)
@@ -118,7 +129,7 @@ def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFi
         Names the line of bad TOML, or every key that is unknown (with the nearest known one),
         missing, or of the wrong type.
     """
-    settings = read_toml(_survey_toml(path), PlannedSurveyFile if planned else SurveyFile, "it")
+    settings = read_toml(survey_toml(path), PlannedSurveyFile if planned else SurveyFile, "it")
     if settings.crs is not None:
         check_crs(settings.crs)
     return settings
@@ -143,7 +154,7 @@ def input_files(path: str | Path, planned: bool = False) -> list[Path]:
     FileNotFoundError
         For files that aren't there.
     """
-    path = _survey_toml(path)
+    path = survey_toml(path)
     return [file for _, file in _named(path, files_of(path, read_survey_file(path, planned)))]
 
 
@@ -155,7 +166,18 @@ def _named(path, files):
     return [(what, file) for what, file in named if file is not None]
 
 
-def _survey_toml(path):
+def survey_toml(path: str | Path) -> Path:
+    """Path of a survey.toml, or of that in a folder.
+
+    Parameters
+    ----------
+    path : path
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is none.
+    """
     path = Path(path)
     if path.is_dir():
         path = path / FILE_NAME
@@ -164,9 +186,34 @@ def _survey_toml(path):
     return path
 
 
-def _cloud_file(path, trajectory, setting):
-    """CloudFile of a path, and the sentence on its time system."""
-    points, is_standard, times = sample_gps_times(path)
-    match = match_times(path.name, times, is_standard, trajectory, setting)
-    file = CloudFile(path, points, match.constant, match.cloud_system)
+def cloud_file(
+    path: Path, trajectory: Trajectory, setting: str, crs: str | None
+) -> tuple[CloudFile, str]:
+    """CloudFile of a path, and the sentence on its time system.
+
+    Parameters
+    ----------
+    path : Path
+    trajectory : Trajectory
+    setting : str
+        cloud.gps_time of survey.toml.
+    crs : str or None
+        That of survey.toml, which can be used.
+
+    Raises
+    ------
+    ValueError
+        For a file that can't be read, or whose times are not the trajectory's.
+
+    Warns
+    -----
+    UserWarning
+        Where the file states another CRS.
+    """
+    layout = read_layout(path)
+    times = spread_times(layout)[1]
+    match = match_times(path.name, times, layout.is_standard, trajectory, setting)
+    if crs is not None and (conflict := crs_conflict(layout, crs)):
+        warnings.warn(conflict, stacklevel=3)
+    file = CloudFile(path, layout.points, match.constant, match.cloud_system)
     return file, f"gps_time of {path.name}: {match}."

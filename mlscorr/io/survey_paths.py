@@ -26,14 +26,25 @@ def files_of(path: Path, settings: PlannedSurveyFile) -> tuple:
     names = settings.cloud.files if settings.cloud else ()
     clouds = [cloud for name in names for cloud in matching(path, "cloud.files", name)]
     if clouds:
-        _check_distinct(path, clouds)
-    others = (
-        ("trajectory.file", settings.trajectory.file),
-        ("trajectory.accuracy", settings.trajectory.accuracy),
-        ("control.file", settings.control and settings.control.file),
-        ("scene.reference", settings.scene.reference),
-    )
-    return clouds, *(None if name is None else _existing(path, key, name) for key, name in others)
+        check_distinct(path, clouds)
+    others = single_files(settings).items()
+    return clouds, *(None if name is None else existing(path, key, name) for key, name in others)
+
+
+def single_files(settings: PlannedSurveyFile) -> dict[str, str | None]:
+    """Names of trajectory, accuracy, control and reference by the keys that hold them.
+
+    Parameters
+    ----------
+    settings : PlannedSurveyFile
+    """
+    control = None if settings.control is None else settings.control.file
+    return {
+        "trajectory.file": settings.trajectory.file,
+        "trajectory.accuracy": settings.trajectory.accuracy,
+        "control.file": control,
+        "scene.reference": settings.scene.reference,
+    }
 
 
 def matching(path: Path, key: str, name: str) -> list[Path]:
@@ -54,22 +65,48 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
     """
     folder = path.parent
     if not glob.has_magic(name) or (folder / name).exists():
-        return [_existing(path, key, name)]
+        return [existing(path, key, name)]
     matches = sorted(folder / match for match in glob.glob(name, root_dir=folder, recursive=True))
     if not matches:
         raise FileNotFoundError(f"{key} of {path}: no file is like {folder / name}.")
     return matches
 
 
-def _existing(path, key, name):
+def existing(path: Path, key: str, name: str) -> Path:
+    """Path of a file that a survey.toml names.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    key : str
+        That names it.
+    name : str
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is none.
+    """
     there = path.parent / name
     if not there.is_file():
         raise FileNotFoundError(f"{key} of {path} names {there}, which does not exist.")
     return there
 
 
-def _check_distinct(path, clouds):
-    """Refuse a cloud file that is named twice, and two of one name: outputs keep the names."""
+def check_distinct(path: Path, clouds: list[Path]) -> None:
+    """Refuse a cloud file that is named twice, and two of one name: outputs keep the names.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    clouds : list of Path
+
+    Raises
+    ------
+    ValueError
+    """
     for kind, values in (
         ("names the file", [str(cloud.resolve()) for cloud in clouds]),
         (

@@ -1,0 +1,68 @@
+"""Points of a cloud file that were measured within a few spans of time, without the others."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mlscorr.io.las import read_chunks, spread_times, times_at
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.las_layout import LasLayout
+from mlscorr.io.settings import SETTINGS
+from mlscorr.survey import CloudFile, PointCloud
+
+
+def read_windows(
+    file: CloudFile, spans: np.ndarray, limit: int = SETTINGS.chunk_points
+) -> Iterator[PointCloud]:
+    """Points of a file that were measured about some spans of time; all of a short file.
+
+    Of a span with many points those about its middle are read.
+
+    Parameters
+    ----------
+    file : CloudFile
+        Its points in order of time.
+    spans : (k, 2) array
+        Starts and ends in the trajectory's time. Units: s.
+    limit : int
+        Number of points up to which a file is short, and a span has not many.
+
+    Yields
+    ------
+    PointCloud
+
+    Raises
+    ------
+    ValueError
+        Where points of a long file are not in order of time, or can't be decoded.
+    """
+    layout = read_layout(file.path)
+    if layout.points <= limit:
+        yield from read_chunks(file)
+        return
+    places, times = spread_times(layout)
+    if not (np.diff(times) >= 0).all():
+        raise ValueError(
+            f"The points of {file.path.name} are not in order of time: where a time stands in it "
+            "is known only once all are read."
+        )
+    done = 0
+    for span in np.asarray(spans) - file.time_constant:
+        if span[1] < times[0] or span[0] > times[-1]:
+            continue
+        first = max(done, _place(layout, places, times, span[0], 0))
+        end = _place(layout, places, times, span[1], 1)
+        surplus = max(0, end - first - limit)
+        first, done = first + surplus // 2, end - surplus // 2
+        if first < done:
+            yield from read_chunks(file, first=first, end=done)
+
+
+def _place(layout: LasLayout, places, times, time, side):
+    """Number of a point before (side 0) or behind (1) those of a time, by bisection."""
+    k = int(np.clip(np.searchsorted(times, time), 1, len(times) - 1))
+    bounds = [int(places[k - 1]), int(places[k]) + 1]
+    while bounds[1] - bounds[0] > SETTINGS.close_places:
+        middle = sum(bounds) // 2
+        bounds[int(times_at(layout, [middle])[0] >= time)] = middle
+    return bounds[side]
