@@ -9,6 +9,7 @@ import typer
 
 from mlscorr.cli.blind import blind
 from mlscorr.cli.calibrate import calibrate
+from mlscorr.cli.check import check
 from mlscorr.cli.compare import compare
 from mlscorr.cli.correct import correct
 from mlscorr.cli.demo import demo
@@ -22,7 +23,7 @@ from mlscorr.cli.terminal import deafen, listen, warn
 from mlscorr.cli.ties import ties
 
 COMMANDS = (
-    *(correct, extract, ties, calibrate, compare, render, demo),
+    *(check, correct, extract, ties, calibrate, compare, render, demo),
     *(simulate, diagnose, plan, doctor),
 )
 

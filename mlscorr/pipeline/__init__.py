@@ -1,6 +1,7 @@
 """The story from files to files, one module a command."""
 
 from mlscorr.pipeline.calibration import CalibratedSurvey, calibrate
+from mlscorr.pipeline.checking import CheckedSurvey, check
 from mlscorr.pipeline.comparison import ComparedSurvey, compare
 from mlscorr.pipeline.correction import CorrectedSurvey, correct
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose

@@ -88,7 +88,7 @@ def _checked(survey, targets, candidates, near):
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=4)
     if len(targets) == 0:
-        raise ValueError(_nothing_found(survey, candidates, near))
+        raise ValueError(nothing_found(survey, candidates, near))
     finding = match_targets(targets, candidates, survey)
     if len(finding.matches.matched) == 0:
         reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
@@ -247,6 +247,30 @@ def find_control(
     ValueError
         As find_targets does, and when no control point was surveyed or found.
     """
+    check_control(survey)
+    finding = find_targets(survey, rng, progress, read)
+    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
+    is_control = np.isin(matched.name, survey.control.name)
+    control, check = matched[is_control], matched[~is_control]
+    if len(control) == 0:
+        raise ValueError(
+            f"None of the {len(survey.control)} control points was found in the cloud, only "
+            f"{len(check)} check points, which must not take part in the estimate."
+        )
+    return control, check, finding
+
+
+def check_control(survey: Survey) -> None:
+    """Refuse a survey without control points.
+
+    Parameters
+    ----------
+    survey : Survey
+
+    Raises
+    ------
+    ValueError
+    """
     if len(survey.surveyed) == 0:
         raise ValueError(
             f"{survey.path} gives no control points: it has no section [control], or the file "
@@ -258,16 +282,6 @@ def find_control(
             f"{survey.path} names {len(survey.check)} check points and no control point: check "
             "points never enter an estimate. Give some of them the role control."
         )
-    finding = find_targets(survey, rng, progress, read)
-    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
-    is_control = np.isin(matched.name, survey.control.name)
-    control, check = matched[is_control], matched[~is_control]
-    if len(control) == 0:
-        raise ValueError(
-            f"None of the {len(survey.control)} control points was found in the cloud, only "
-            f"{len(check)} check points, which must not take part in the estimate."
-        )
-    return control, check, finding
 
 
 def find_check(
@@ -344,8 +358,15 @@ def _other_heights(survey, radius):
     )
 
 
-def _nothing_found(survey, candidates, near):
-    """The sentence for a cloud in which no surveyed target was found."""
+def nothing_found(survey: Survey, candidates: Candidates, near: NearPoints) -> str:
+    """The sentence for a cloud in which no surveyed target was found.
+
+    Parameters
+    ----------
+    survey : Survey
+    candidates : Candidates
+    near : NearPoints
+    """
     surveyed = survey.surveyed
     radius = search_radius(survey, surveyed).max()
     if len(candidates.unplaced) > near.points:

@@ -15,6 +15,17 @@ class Settings:
     scanned_radius: float = 2.0  # m about a target; more than the board, less than a street is wide
     scanned_stride: int = 10  # points; balls of metres about targets hold hundreds
     tile_overlap: float = 0.1  # share of the shorter file's time; more: two scanners, not tiles
+    looked_points: int = 8  # surveyed points looked at before a run: seconds, and enough to tell
+    looked_seconds: float = (
+        8.0  # s, of which a look at fewer of them is made where targets are dense
+    )
+    looked_length: float = 15.0  # m, of the way to either side of one: beams may look 45 deg ahead
+    epoch_bytes: int = 137  # bytes, of a line of trajectory.csv with sigmas in a UTM zone
+    # What a correction took beside the fits of its targets, docs/results.md
+    decodings: float = 5.0  # times decoding the points once: reading, ties, copying, drawing
+    report_seconds: float = 10.0  # s; report.html and pictures
+    report_megabytes: float = 6.0  # MB; of these
+    memory: float = 0.8  # GB; chunks and libraries, whatever the size of the files
 
 
 SETTINGS = Settings()

@@ -275,6 +275,7 @@ BAD = [
         ["5 check points and no control point"],
     ),
 ]
+SEEN_IN_POINTS = ("no bright targets", "control 100 m off", "only check points")  # and costs time
 
 
 @pytest.mark.parametrize(("spoil", "code", "words"), [b[1:] for b in BAD], ids=[b[0] for b in BAD])
@@ -295,6 +296,18 @@ def test_bad_input_is_refused_in_a_sentence(spoil, code, words, survey):
     assert result.stdout == ""
     assert content(survey) == before
     assert list(survey.parent.iterdir()) == [survey]
+
+
+@pytest.mark.parametrize("bad", [b for b in BAD if b[0] not in SEEN_IN_POINTS], ids=lambda b: b[0])
+def test_a_check_refuses_what_a_correction_refuses(bad, survey):
+    "The same exit code for each, and the same words among all that it says; nothing changed"
+    _, spoil, code, words = bad
+    spoil(survey)
+    before = content(survey)
+    result = CliRunner().invoke(app, ["check", str(survey)])
+    assert result.exit_code == code, result.stderr
+    assert all(word in result.stderr for word in words), result.stderr
+    assert content(survey) == before
 
 
 @pytest.mark.parametrize("bad", [BAD[0], BAD[len(BAD) // 2], BAD[-1]], ids=lambda bad: bad[0])

@@ -1,0 +1,50 @@
+"""The command that tells what is wrong with a survey before it is corrected."""
+
+from collections.abc import Iterable
+
+import typer
+
+import mlscorr
+from mlscorr.cli.terminal import Exit, Quiet, SurveyArgument, exit_code, say, warn
+
+CODES = {"survey.toml": Exit.USAGE, "data": Exit.BAD_DATA, "system": Exit.READ_OR_WRITE}
+
+
+def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
+    """Tell in seconds all that is wrong with a survey, and what a correction of it will take."""
+    with exit_code(Exit.BAD_DATA):
+        checked = mlscorr.check(survey)
+    for title, amounts in (
+        ("Read", checked.read),
+        ("Written", checked.written),
+        ("Needed", checked.needed),
+    ):
+        _list(title, [_amount(amount) for amount in amounts])
+    _list("Worked out", checked.notes)
+    _list("Not checked", checked.unchecked)
+    for sentence in checked.warnings:
+        warn(f"Warning: {sentence}")
+    for fault in checked.faults:
+        warn(f"Error: {fault.sentence}")
+    if checked.faults:
+        warn(_count(checked.faults, "fault"))
+        raise typer.Exit(CODES[checked.faults[0].where])
+    say(f"No fault, {_count(checked.warnings, 'warning')}. Next: mlscorr correct {survey} -o OUT")
+
+
+def _list(title: str, lines: Iterable[str]) -> None:
+    """Say some lines below a title, where there are any."""
+    lines = list(lines)
+    if lines:
+        say("\n".join([title, *(f"  {line}" for line in lines)]))
+
+
+def _amount(amount):
+    """An Amount in one line."""
+    digits = 0 if amount.number >= 10 or amount.number == int(amount.number) else 1
+    number = f"{amount.number:,.{digits}f}".replace(",", " ")
+    return f"{amount.what}: {number}{' ' * bool(amount.unit)}{amount.unit} ({amount.source})"
+
+
+def _count(things, noun):
+    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"

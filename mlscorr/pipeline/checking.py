@@ -1,0 +1,188 @@
+"""``check``: all that is wrong with a survey before it is corrected, and what that will take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.evaluate.datum import datum_warnings
+from mlscorr.io.las import spread_times
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
+from mlscorr.io.survey_file import read_survey
+from mlscorr.pipeline.faults import Fault, Faults, find_faults
+from mlscorr.pipeline.finding import check_control
+from mlscorr.pipeline.needs import (
+    Amount,
+    amounts_needed,
+    amounts_read,
+    amounts_written,
+    sample_clouds,
+)
+from mlscorr.pipeline.quick_look import QuickLook, look_near_control
+from mlscorr.survey import Survey
+
+
+@dataclass(frozen=True)
+class CheckedSurvey:
+    """What a check of a survey says.
+
+    Parameters
+    ----------
+    faults : tuple of Fault
+        What stops a correction, or makes it wrong.
+    warnings : tuple of str
+        What may be wrong.
+    notes : tuple of str
+        What was worked out, and what was looked at.
+    unchecked : tuple of str
+        What was not checked, and why.
+    read, written, needed : tuple of Amount
+        Of a correction. Empty where a fault hides the survey.
+    """
+
+    faults: tuple[Fault, ...]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    unchecked: tuple[str, ...] = ()
+    read: tuple[Amount, ...] = ()
+    written: tuple[Amount, ...] = ()
+    needed: tuple[Amount, ...] = ()
+
+
+def check(path: str | Path) -> CheckedSurvey:
+    """Check a survey in seconds: all of its faults at once, without correcting it.
+
+    Clouds are read by their headers, by times spread over them, and near some surveyed points.
+
+    Parameters
+    ----------
+    path : path
+        survey.toml, or the folder that holds it.
+
+    Returns
+    -------
+    CheckedSurvey
+    """
+    first = Faults()
+    survey = first.of("data", read_survey, path)
+    if survey is None:
+        faults = Faults()
+        find_faults(path, faults)
+        for fault in first.faults:
+            faults.add(fault.where, fault.sentence)
+        reason = "Targets in the cloud, time and memory: the faults come first."
+        return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
+    return _checked(survey, first)
+
+
+def _checked(survey, faults):
+    """The CheckedSurvey of a survey that can be read."""
+    for sentence in _crs_conflicts(survey):
+        faults.warnings = [warning for warning in faults.warnings if warning != sentence]
+        faults.add("data", sentence)
+    layouts = [read_layout(file.path) for file in survey.clouds]
+    passes, outside = _placed_times(survey, layouts)
+    for sentence in (*outside, *_crs_hints(survey, layouts), *_uncovered(survey, layouts)):
+        faults.warn(sentence)
+    sample = faults.of("data", sample_clouds, survey)
+    for sentence in sample.warnings if sample else ():
+        faults.warn(sentence)
+    probe, notes, unchecked = _looked(survey, faults)
+    return CheckedSurvey(
+        faults=tuple(faults.faults),
+        warnings=tuple(faults.warnings),
+        notes=(*survey.notes, *notes),
+        unchecked=unchecked,
+        read=amounts_read(survey, passes),
+        written=amounts_written(survey),
+        needed=amounts_needed(survey, sample, probe) if sample else (),
+    )
+
+
+def _crs_conflicts(survey) -> Iterator[str]:
+    """A sentence on each file whose own CRS is another one."""
+    if survey.crs is not None:
+        sentences = (crs_conflict(read_layout(file.path), survey.crs) for file in survey.clouds)
+        yield from filter(None, sentences)
+
+
+def _crs_hints(survey, layouts) -> Iterator[str]:
+    """A sentence where the files state a CRS and survey.toml does not."""
+    stated = stated_crs(layouts[0]) if survey.crs is None else None
+    if stated is not None:
+        code = crs_code(stated)
+        hint = f': set crs = "{code}".' if code else "."
+        yield (
+            f"survey.toml gives no crs, the VLRs of {layouts[0].path.name} state "
+            f"{crs_name(stated)}{hint}"
+        )
+
+
+def _placed_times(survey, layouts) -> tuple[int, list[str]]:
+    """Number of passes that times spread over the files lie in; sentences on those outside."""
+    passes, outside = 0, []
+    for file, layout in zip(survey.clouds, layouts, strict=True):
+        segment = survey.trajectory.segment(spread_times(layout)[1] + file.time_constant)
+        passes += len(set(segment[segment >= 0].tolist()))
+        share = float(np.mean(segment < 0))
+        if share > 0:
+            start, end = survey.trajectory.gps_time[[0, -1]]
+            outside.append(
+                f"About {share:.0%} of the points of {file.path.name} lie outside the trajectory "
+                f"[{start:.3f}, {end:.3f}] s or in its {len(survey.trajectory.gaps)} gaps, by "
+                f"{len(segment)} times spread over it: they stay as they are (exit code 4). Export "
+                "the whole trajectory."
+            )
+    return passes, outside
+
+
+def _uncovered(survey, layouts) -> Iterator[str]:
+    """A sentence on surveyed points outside the boxes of all files."""
+    place = survey.surveyed.position[:, :2]
+    covered = np.zeros(len(place), bool)
+    for layout in layouts:
+        low, high = cloud_box(layout)[:, :2]
+        margin = survey.search_radius
+        covered |= ((place >= low - margin) & (place <= high + margin)).all(axis=1)
+    if not covered.all():
+        names = [survey.surveyed.name[i] for i in np.flatnonzero(~covered)]
+        yield (
+            f"{len(names)} of the {len(place)} surveyed points lie more than "
+            f"{survey.search_radius:g} m outside the clouds by their headers (first: {names[0]})."
+        )
+
+
+def _looked(survey: Survey, faults: Faults) -> tuple[QuickLook | None, list[str], tuple[str, ...]]:
+    """What a look at some targets shows, sentences on it, and on what was not looked at."""
+    if not len(survey.surveyed):
+        return None, [], ("Targets in the cloud: the survey has no control.",)
+    faults.of("data", check_control, survey)
+    problems = Faults()
+    probe = problems.of("data", look_near_control, survey)
+    if probe is None:
+        reasons = tuple(f"Targets in the cloud: {fault.sentence}" for fault in problems.faults)
+        return None, [], reasons
+    matched = probe.matched
+    is_whole = len(probe.points) == len(survey.surveyed)
+    if probe.fault or (probe.doubt and is_whole and not len(matched)):
+        faults.add("data", probe.fault or probe.doubt)
+    elif probe.doubt:
+        faults.warn(probe.doubt)
+    datum = datum_warnings(matched, survey.trajectory, survey.pos)
+    for sentence in (*problems.warnings, *datum):
+        faults.warn(sentence)
+    notes = [
+        f"{len(set(matched.name))} of {len(probe.points)} targets that were looked at are found."
+    ]
+    if len(matched):
+        middle = ", ".join(
+            f"{axis} {value:+.3f}"
+            for axis, value in zip("ENH", np.median(matched.misclosure, axis=0), strict=True)
+        )
+        notes.append(f"In the median they are surveyed {middle} m beside the cloud.")
+    rest = f"Targets: {len(probe.points)} of {len(survey.surveyed)} were looked at."
+    return probe, notes, () if is_whole else (rest,)

@@ -1,0 +1,174 @@
+"""All that is wrong with the files of a survey at once, where reading them stops at the first."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from mlscorr.io.control import holds_points, read_control_list
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.las_crs import crs_conflict
+from mlscorr.io.nearness import check_together
+from mlscorr.io.sbet import check_crs
+from mlscorr.io.survey_file import cloud_file, crs_notes, survey_toml
+from mlscorr.io.survey_paths import check_distinct, existing, matching, single_files
+from mlscorr.io.survey_scanners import mounted_scanners
+from mlscorr.io.survey_sections import SurveyFile
+from mlscorr.io.toml_file import read_toml
+from mlscorr.io.trajectory import read_trajectory
+from mlscorr.survey import Trajectory
+
+Place = Literal["survey.toml", "data", "system"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What stops a correction.
+
+    Parameters
+    ----------
+    where : str
+        In survey.toml (or in the names of files), in the data, or in the system that gives them.
+    sentence : str
+    """
+
+    where: Place
+    sentence: str
+
+
+@dataclass
+class Faults:
+    """Faults and warnings, in the order in which they were met, each once.
+
+    Parameters
+    ----------
+    faults : list of Fault
+    warnings : list of str
+    """
+
+    faults: list[Fault] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def of(self, where: Place, function: Callable, *arguments: object) -> Any:
+        """The result of a function, None where it meets a fault, which is kept.
+
+        Parameters
+        ----------
+        where : str
+            Where a ValueError of the function is.
+        function : function
+        *arguments
+            Its own.
+        """
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                return function(*arguments)
+            except ValueError as error:
+                self.add(where, str(error))
+            except OSError as error:  # survey.toml names a file that is not there, or ...
+                is_named = isinstance(error, FileNotFoundError) and error.errno is None
+                self.add("survey.toml" if is_named else "system", str(error))
+            finally:
+                for warning in caught:
+                    self.warn(str(warning.message))
+        return None
+
+    def add(self, where: Place, sentence: str) -> None:
+        """Keep a fault.
+
+        Parameters
+        ----------
+        where, sentence : str
+            As of Fault.
+        """
+        if not any(sentence in fault.sentence for fault in self.faults):
+            self.faults.append(Fault(where, sentence))
+
+    def warn(self, sentence: str) -> None:
+        """Keep a warning.
+
+        Parameters
+        ----------
+        sentence : str
+        """
+        if sentence not in self.warnings:
+            self.warnings.append(sentence)
+
+
+def find_faults(path: str | Path, faults: Faults) -> None:
+    """Find what is wrong with a survey by reading its files one by one, clouds by their headers.
+
+    Parameters
+    ----------
+    path : path
+        survey.toml, or the folder that holds it.
+    faults : Faults
+        Are added to.
+    """
+    toml = faults.of("survey.toml", survey_toml, path)
+    settings = toml and faults.of("survey.toml", read_toml, toml, SurveyFile, "it")
+    if settings is None:
+        return
+    crs = None
+    if settings.crs is not None and faults.of("survey.toml", check_crs, settings.crs):
+        crs = settings.crs
+    clouds = [
+        cloud
+        for name in settings.cloud.files
+        for cloud in faults.of("survey.toml", matching, toml, "cloud.files", name) or ()
+    ]
+    if clouds:
+        faults.of("survey.toml", check_distinct, toml, clouds)
+    others = {
+        key: name and faults.of("survey.toml", existing, toml, key, name)
+        for key, name in single_files(settings).items()
+    }
+    trajectory = _trajectory(settings, others, faults)
+    _control(others["control.file"], settings.control, trajectory, faults)
+    if trajectory is not None and crs is not None:
+        faults.of("data", crs_notes, crs, trajectory, False)
+    read = [_cloud(cloud, trajectory, settings, crs, faults) for cloud in dict.fromkeys(clouds)]
+    if all(read):
+        faults.of("survey.toml", mounted_scanners, toml, settings, tuple(read))
+
+
+def _trajectory(settings, files, faults):
+    """The trajectory, None where it can't be read."""
+    path = files["trajectory.file"]
+    if path is None or (settings.trajectory.accuracy and files["trajectory.accuracy"] is None):
+        return None
+    accuracy = files["trajectory.accuracy"]
+    return faults.of("data", read_trajectory, path, settings.crs, accuracy)
+
+
+def _control(path, section, trajectory: Trajectory | None, faults):
+    """Look at the control, and at how it lies to the trajectory."""
+    if path is None or not faults.of("data", holds_points, path):
+        return
+    if trajectory is None:  # which tells X from Y in a list that does not
+        problems = Faults()
+        problems.of("data", read_control_list, path, section)
+        for fault in problems.faults:
+            if "km of the trajectory" not in fault.sentence:
+                faults.add(fault.where, fault.sentence)
+        return
+    points = faults.of("data", read_control_list, path, section, trajectory)
+    if points is not None:
+        faults.of("data", check_together, path, points.control + points.check, trajectory)
+
+
+def _cloud(path, trajectory, settings, crs, faults):
+    """CloudFile of a path; None where it has a fault, or no trajectory tells its time system."""
+    layout = faults.of("data", read_layout, path)
+    if layout is None:
+        return None
+    if crs is not None and (conflict := faults.of("data", crs_conflict, layout, crs)):
+        faults.add("data", conflict)
+    if trajectory is None:
+        return None
+    read = faults.of("data", cloud_file, path, trajectory, settings.cloud.gps_time, None)
+    return read and read[0]

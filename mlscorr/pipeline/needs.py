@@ -1,0 +1,160 @@
+"""What a correction will read and write, and the time and memory that it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from mlscorr.evaluate.beams import BeamCheck
+from mlscorr.io.las import read_chunks
+from mlscorr.io.settings import SETTINGS as IO
+from mlscorr.pipeline.quick_look import QuickLook
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.survey import CloudFile, PointCloud, Survey
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much of something, and how that is known.
+
+    Parameters
+    ----------
+    what : str
+    number : float
+    unit : str
+        Of the number, empty for a count.
+    source : str
+        Where the number is from.
+    """
+
+    what: str
+    number: float
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True)
+class DecodedSample:
+    """A run of points from the middle of each cloud file.
+
+    Parameters
+    ----------
+    points : int
+    seconds : float
+        That decoding them took. Units: s.
+    warnings : tuple of str
+        On files whose beams can't have been measured so.
+    """
+
+    points: int
+    seconds: float
+    warnings: tuple[str, ...]
+
+
+def sample_clouds(survey: Survey) -> DecodedSample:
+    """Decode a run of each file, of a million points together.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    run = max(IO.sampled_points, IO.chunk_points // len(survey.clouds))
+    points, start = 0, perf_counter()
+    chunks = {file: list(_middle(file, run)) for file in survey.clouds}
+    seconds = perf_counter() - start
+    beams = BeamCheck(survey)
+    read = beams.watched(lambda file: iter(chunks[file]))
+    points = sum(len(chunk) for file in survey.clouds for chunk in read(file))
+    return DecodedSample(points, seconds, tuple(beams.warnings()))
+
+
+def _middle(file: CloudFile, run: int) -> Iterator[PointCloud]:
+    first = max(0, file.points - run) // 2
+    return read_chunks(file, first=first, end=min(file.points, first + run))
+
+
+def amounts_read(survey: Survey, sampled: int) -> tuple[Amount, ...]:
+    """Points, epochs and surveyed points of a survey.
+
+    Parameters
+    ----------
+    survey : Survey
+    sampled : int
+        Number of passes that samples of the clouds lie in.
+
+    Returns
+    -------
+    tuple of Amount
+    """
+    trajectory = survey.trajectory
+    driven = float(np.sum(np.diff(trajectory.passes, axis=1)))
+    way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+    return (
+        Amount("points", survey.points, "", f"headers of {len(survey.clouds)} cloud files"),
+        Amount("scanners", len(survey.by_scanner), "", "survey.toml"),
+        Amount("passes", sampled, "", f"{IO.sampled_points} times of each file"),
+        Amount("trajectory", driven, "s", f"{len(trajectory)} epochs, {way.sum() / 1e3:.2f} km"),
+        Amount("control points", len(survey.control), "", "role control"),
+        Amount("check points", len(survey.check), "", "role check; they take no part"),
+    )
+
+
+def amounts_written(survey: Survey) -> tuple[Amount, ...]:
+    """Files that a correction writes, and their sizes.
+
+    Parameters
+    ----------
+    survey : Survey
+
+    Returns
+    -------
+    tuple of Amount
+        Units: MB.
+    """
+    clouds = sum(file.path.stat().st_size for file in survey.clouds) / 1e6
+    epochs = len(survey.trajectory)
+    table = epochs * SETTINGS.epoch_bytes / 1e6
+    return (
+        Amount("clouds", clouds, "MB", f"{len(survey.clouds)} files, sizes of the inputs"),
+        Amount("trajectory.csv", table, "MB", f"{epochs} epochs of {SETTINGS.epoch_bytes} bytes"),
+        Amount("report.html, report.json, targets.csv, pictures", SETTINGS.report_megabytes, "MB",
+               "surveys of 24 points; docs/results.md"),
+    )  # fmt: skip
+
+
+def amounts_needed(
+    survey: Survey, sample: DecodedSample, probe: QuickLook | None
+) -> tuple[Amount, ...]:
+    """Time and memory that a correction takes, by rates that were measured.
+
+    Parameters
+    ----------
+    survey : Survey
+    sample : DecodedSample
+    probe : QuickLook or None
+
+    Returns
+    -------
+    tuple of Amount
+    """
+    decoding = survey.points * sample.seconds / max(sample.points, 1)
+    fitting = 0.0 if probe is None else probe.seconds * len(survey.surveyed)
+    rate = sample.points / max(sample.seconds, 1e-9) / 1e6
+    points = SETTINGS.decodings * decoding
+    seconds = points + fitting + SETTINGS.report_seconds
+    return (
+        Amount("time", seconds, "s", "the sum of the next three, on this machine as it is now"),
+        Amount("reading and writing points", points, "s",
+               f"{SETTINGS.decodings:g} times decoding (docs/results.md) at {rate:.1f} million "
+               f"points/s, measured here on {sample.points}"),
+        Amount("fitting targets", fitting, "s",
+               "no target was fitted" if probe is None else f"{probe.seconds:.2f} s a surveyed "
+               f"point, measured here on {len(probe.points)}"),
+        Amount("report and pictures", SETTINGS.report_seconds, "s",
+               "docs/results.md; none with --no-report"),
+        Amount("memory", SETTINGS.memory, "GB",
+               "largest of 0.5 to 22 million points; docs/results.md"),
+    )  # fmt: skip

@@ -1,0 +1,200 @@
+"""Some surveyed targets looked for where the vehicle passed them, before the clouds are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from mlscorr.io.las_windows import read_windows
+from mlscorr.io.nearness import nearest_epochs
+from mlscorr.pipeline.finding import NearPoints, fit_while_reading, match_targets, nothing_found
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.survey import ControlPoints, Matched, PointCloud, Survey
+from mlscorr.targets import Candidates, search_radius
+
+
+@dataclass(frozen=True)
+class QuickLook:
+    """What a look at some surveyed points showed.
+
+    Parameters
+    ----------
+    points : ControlPoints
+        Those that were looked at.
+    matched : Matched
+        Those that were found.
+    fault : str
+        A sentence where another size or height finds them, empty otherwise.
+    doubt : str
+        A sentence where few were found and nothing says why.
+    seconds : float
+        What fitting a target took. Units: s.
+    """
+
+    points: ControlPoints
+    matched: Matched
+    fault: str
+    doubt: str
+    seconds: float
+
+
+def look_near_control(survey: Survey) -> QuickLook:
+    """Look for some targets of a survey where the vehicle passed them.
+
+    Where they are not found they are looked for with sizes doubled (radii may stand for diameters)
+    and with heights of the cloud.
+
+    Parameters
+    ----------
+    survey : Survey
+        With surveyed points.
+
+    Raises
+    ------
+    ValueError
+        Where the files are not in order of time, so that a look takes as long as reading them.
+    """
+    survey = replace(survey, control=spread_points(survey), check=survey.surveyed[[]])
+    windows = {file.path: list(_near(survey, file)) for file in survey.clouds}
+    survey = replace(survey, control=_affordable(survey, windows))
+    start = perf_counter()
+    matched, candidates, near = _find(survey, windows)
+    seconds = (perf_counter() - start) / len(survey.control)
+    fault = doubt = ""
+    if 2 * len(set(matched.name)) < len(survey.control):
+        fault = _with_sizes_doubled(survey, windows, matched) or _with_other_heights(
+            survey, windows, matched
+        )
+        doubt = "" if fault else _doubt(survey, matched, candidates, near)
+    return QuickLook(survey.control, matched, fault, doubt, seconds)
+
+
+def spread_points(survey: Survey) -> ControlPoints:
+    """Some surveyed points, spread over the drive.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    order = np.argsort(nearest_epochs(survey.surveyed.position[:, :2], survey.trajectory)[1])
+    some = np.linspace(0, len(order) - 1, min(len(order), SETTINGS.looked_points))
+    return survey.surveyed[order[np.rint(some).astype(int)]]
+
+
+def _affordable(survey, windows):
+    """As many of the points, still spread, as can be fitted in the time for a look."""
+    points, share = survey.control, SETTINGS.looked_seconds / SETTINGS.looked_points
+    single = replace(survey, control=points[len(points) // 2 :][:1])
+    for _ in range(2):  # the first fit may have to be compiled
+        start = perf_counter()
+        _find(single, windows)
+        seconds = perf_counter() - start
+        if seconds <= share:
+            return points
+    count = min(len(points), max(3, int(SETTINGS.looked_seconds / seconds)))
+    return points[np.rint(np.linspace(0, len(points) - 1, count)).astype(int)]
+
+
+def _near(survey, file) -> Iterator[PointCloud]:
+    """Points of a file beside surveyed points, whatever their heights."""
+    place, radius = survey.control.position, search_radius(survey, survey.control)
+    for chunk in read_windows(file, _spans(survey)):
+        apart = np.full(len(chunk), np.inf)
+        for centre, limit in zip(place[:, :2], radius, strict=True):
+            np.minimum(apart, np.hypot(*(chunk.xyz[:, :2] - centre).T) / limit, out=apart)
+        if (apart <= 1.0).any():
+            yield chunk[apart <= 1.0]
+
+
+def _spans(survey):
+    """Starts and ends (k, 2), in order, of the times when the points were passed. Units: s."""
+    trajectory, inside = survey.trajectory, np.zeros(len(survey.trajectory), bool)
+    for centre in survey.control.position[:, :2]:
+        apart = np.hypot(*(trajectory.position[:, :2] - centre).T)
+        inside |= apart <= np.hypot(apart.min(), SETTINGS.looked_length)
+    inside &= np.isin(trajectory.segment(trajectory.gps_time), -1, invert=True)
+    part = np.cumsum(np.diff(trajectory.segment(trajectory.gps_time), prepend=0) != 0)
+    edge = np.diff(np.where(inside, part + 1, 0), prepend=0, append=0) != 0
+    starts = np.flatnonzero(edge[:-1] & inside)
+    ends = np.flatnonzero(edge[1:] & inside)
+    return np.column_stack([trajectory.gps_time[starts], trajectory.gps_time[ends]])
+
+
+def _find(survey, windows) -> tuple[Matched, Candidates, NearPoints]:
+    """The surveyed points that are found in what was read."""
+    targets, candidates, near = fit_while_reading(survey, lambda file: iter(windows[file.path]))
+    if not targets:
+        return Matched.none(), candidates, near
+    matches = match_targets(targets, candidates, survey).matches
+    return Matched.by_name(matches.matched, survey.control), candidates, near
+
+
+def _with_sizes_doubled(survey, windows, matched):
+    """A sentence where sizes are radii."""
+    points = survey.control
+    doubled = replace(points, size=2 * points.size)
+    refit = _find(replace(survey, control=doubled), windows)[0]
+    if not _is_better(refit, matched, points):
+        return ""
+    return (
+        f"The sizes of the control look like radii: of {len(points)} surveyed points that were "
+        f"looked at {_count(matched)} are found as they stand, {_count(refit)} with sizes doubled. "
+        "A size is a circle's diameter, or a square's edge."
+    )
+
+
+def _with_other_heights(survey, windows, matched):
+    """A sentence where heights are of another system."""
+    points = survey.control
+    above = _above_cloud(points, [chunk for chunks in windows.values() for chunk in chunks])
+    if not np.isfinite(above) or abs(above) < survey.search_radius / 2:
+        return ""
+    lowered = replace(points, position=points.position - [0.0, 0.0, above])
+    refit = _find(replace(survey, control=lowered), windows)[0]
+    if not _is_better(refit, matched, points):
+        return ""
+    shift = above + refit.misclosure[:, 2]
+    return (
+        f"The heights of control and cloud differ: {_count(refit)} of {len(points)} surveyed "
+        f"points that were looked at are found {abs(np.median(shift)):.2f} m "
+        f"{'below' if np.median(shift) > 0 else 'above'} their own heights (scatter "
+        f"{np.std(shift):.3f} m), {_count(matched)} as they stand. A geoid undulation (heights "
+        "over an ellipsoid beside heights over a geoid), another vertical datum, or feet: bring "
+        "both into one system of heights."
+    )
+
+
+def _above_cloud(points, chunks):
+    """How far points lie above the middle height of the cloud about them, median. Units: m."""
+    cloud = np.concatenate([np.empty((0, 3)), *(chunk.xyz for chunk in chunks)])
+    near = [np.hypot(*(cloud[:, :2] - place[:2]).T) < SETTINGS.scanned_radius
+            for place in points.position]  # fmt: skip
+    above = [
+        place[2] - np.median(cloud[rows, 2])
+        for place, rows in zip(points.position, near, strict=True)
+        if rows.any()
+    ]
+    return np.median(above) if above else np.nan
+
+
+def _is_better(refit, matched, points):
+    return _count(refit) > max(_count(matched), len(points) // 2)
+
+
+def _count(matched):
+    return len(set(matched.name))
+
+
+def _doubt(survey, matched, candidates, near):
+    """A sentence on what a quick look does not find."""
+    if not len(matched):
+        return nothing_found(survey, candidates, near)
+    return (
+        f"A quick look finds {_count(matched)} of the {len(survey.control)} surveyed points that "
+        f"it looks at, among {near.points} points (intensity {near.darkest:.0f} to "
+        f"{near.brightest:.0f}) near them: check kind, size and place in the control file, and "
+        "the intensity of the cloud."
+    )

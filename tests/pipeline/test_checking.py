@@ -1,0 +1,173 @@
+"""A survey folder in: all that is wrong with it at once, and what a correction will take."""
+
+import re
+import shutil
+import warnings
+
+import laspy
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import mlscorr
+from mlscorr.cli import app
+from mlscorr.io.control import read_control
+from mlscorr.pipeline.faults import Faults, find_faults
+
+NEAR = 1.5  # m from a surveyed point: what is left of the cloud
+
+
+@pytest.fixture(scope="module")
+def small(street, tmp_path_factory):
+    "The street with little more than its targets"
+    folder = tmp_path_factory.mktemp("small") / "survey"
+    shutil.copytree(street, folder, ignore=shutil.ignore_patterns("truth.*"))
+    cloud = laspy.read(folder / "pass-1.laz")
+    control, check = read_control(folder / "control.csv")
+    places = (control + check).position
+    away = np.linalg.norm(cloud.xyz[:, None] - places, axis=2).min(axis=1)
+    cloud.points = cloud.points[away < NEAR]
+    cloud.write(folder / "pass-1.laz")
+    return folder
+
+
+@pytest.fixture
+def survey(small, tmp_path):
+    "A copy to be changed"
+    return shutil.copytree(small, tmp_path / "survey")
+
+
+def edit(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def change_control(folder, column, change):
+    "Set a column of the control anew"
+    header, *rows = (folder / "control.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    for row in cells:
+        row[column] = f"{change(float(row[column])):.4f}"
+    (folder / "control.csv").write_text("\n".join([header, *map(",".join, cells)]) + "\n")
+
+
+def sentences(checked):
+    return [fault.sentence for fault in checked.faults]
+
+
+def test_a_good_survey_has_no_fault_and_is_counted(small):
+    "Nothing is said against it; points, passes, files and control are those that it has"
+    checked = mlscorr.check(small)
+    assert (checked.faults, checked.warnings) == ((), ())
+    amounts = {amount.what: amount.number for amount in checked.read}
+    assert amounts["points"] == laspy.read(small / "pass-1.laz").header.point_count
+    assert [amounts[name] for name in ("scanners", "passes", "control points", "check points")] == [
+        *(1, 1),
+        *(4, 1),
+    ]
+    assert amounts["trajectory"] == pytest.approx(8.0)
+    written = sum(amount.number for amount in checked.written)
+    assert written > (small / "pass-1.laz").stat().st_size / 1e6
+    needed = {amount.what: amount for amount in checked.needed}
+    assert needed["time"].number > needed["report and pictures"].number > 0
+    assert all(amount.source for amount in (*checked.read, *checked.written, *checked.needed))
+
+
+def test_all_faults_are_named_at_once(survey):
+    "Two missing files, a bad CRS, exchanged axes, a cut cloud: five sentences, not the first alone"
+    edit(survey / "survey.toml", '"pass-1.laz"', '"pass-1.laz", "pass-2.laz"')
+    edit(survey / "survey.toml", "EPSG:32650", "EPSG:4326")
+    edit(survey / "survey.toml", "[control]", '[scene]\nreference = "mesh.ply"\n[control]')
+    header, *rows = (survey / "control.csv").read_text().splitlines()
+    swapped = [",".join([c[0], c[2], c[1], *c[3:]]) for c in (row.split(",") for row in rows)]
+    (survey / "control.csv").write_text("\n".join([header, *swapped]) + "\n")
+    cloud = (survey / "pass-1.laz").read_bytes()
+    (survey / "pass-1.laz").write_bytes(cloud[: len(cloud) // 2])
+    checked = mlscorr.check(survey)
+    expected = ("projected CRS", "pass-2.laz", "mesh.ply", "be swapped", "cut off")
+    assert len(checked.faults) == len(expected)
+    for words in expected:
+        assert any(words in sentence for sentence in sentences(checked)), words
+    assert [fault.where for fault in checked.faults].count("survey.toml") == 3
+    assert "come first" in checked.unchecked[0]
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "words"),
+    [
+        (3, lambda height: height + 15.3, r"5 of 5 .* 15\.3\d m below .* geoid undulation"),
+        (7, lambda size: size / 2, "0 are found as they stand, 5 with sizes doubled"),
+    ],
+    ids=["heights", "radii"],
+)
+def test_a_quick_look_tells_heights_and_radii(column, change, words, survey):
+    "Targets that are there at other heights or of twice the size say what is wrong by how much"
+    change_control(survey, column, change)
+    checked = mlscorr.check(survey)
+    assert len(checked.faults) == 1
+    assert re.search(words, sentences(checked)[0])
+
+
+def test_a_small_difference_of_heights_is_a_warning_as_in_a_correction(survey):
+    "Within the search radius targets are found, and the datum is doubted in the same sentence"
+    change_control(survey, 3, lambda height: height + 3.0)
+    checked = mlscorr.check(survey)
+    assert not checked.faults
+    assert any("vertical datum" in sentence for sentence in checked.warnings)
+
+
+def test_the_crs_of_the_cloud_counts(survey):
+    "Another zone in survey.toml is a fault here and a warning in a correction; none is a hint"
+    edit(survey / "survey.toml", "EPSG:32650", "EPSG:32649")
+    with warnings.catch_warnings(action="ignore"):
+        checked = mlscorr.check(survey)
+    assert re.search("EPSG:32650.*EPSG:32649.*km apart", sentences(checked)[0])
+    with pytest.warns(UserWarning, match="VLRs of pass-1.laz state EPSG:32650"):
+        mlscorr.read_survey(survey)
+    edit(survey / "survey.toml", 'crs = "EPSG:32649"', "")
+    checked = mlscorr.check(survey)
+    assert not checked.faults
+    assert any('set crs = "EPSG:32650"' in sentence for sentence in checked.warnings)
+
+
+def test_points_outside_the_trajectory_are_a_share(survey):
+    "The last second of eight is cut: about an eighth is told beforehand, and the way out"
+    lines = (survey / "trajectory.csv").read_text().splitlines()
+    (survey / "trajectory.csv").write_text("\n".join(lines[:600]) + "\n")
+    checked = mlscorr.check(survey)
+    assert not checked.faults
+    assert any("% of the points of pass-1.laz lie outside" in text for text in checked.warnings)
+
+
+def test_what_lies_beside_the_cloud_is_counted(survey):
+    "A surveyed point 300 m down the street is named before anything is read"
+    row = (survey / "control.csv").read_text().splitlines()[-1].split(",")
+    row[:2] = "T99", f"{float(row[1]) + 300.0:.3f}"
+    with (survey / "control.csv").open("a") as file:
+        file.write(",".join(row) + "\n")
+    assert any("first: T99" in sentence for sentence in mlscorr.check(survey).warnings)
+
+
+def test_the_command_says_what_the_function_returns(survey):
+    "A page without a fault ends with the next command; a fault with its code, warnings before"
+    good = CliRunner().invoke(app, ["check", str(survey)])
+    assert good.exit_code == 0, good.stderr
+    for title in ("Read", "Written", "Needed", "Worked out"):
+        assert title in good.stderr.splitlines()
+    assert good.stderr.splitlines()[-1].startswith("No fault, 0 warnings. Next: mlscorr correct")
+    (survey / "control.csv").unlink()
+    bad = CliRunner().invoke(app, ["check", str(survey), "--quiet"])
+    assert bad.exit_code == 2
+    assert bad.stderr.splitlines()[0].startswith("Error: control.file of ")
+    assert bad.stderr.splitlines()[-1] == "1 fault"
+
+
+def test_a_fault_is_kept_once_and_where_it_is(tmp_path):
+    "The same sentence twice is one fault; what the system refuses is the system's"
+    faults = Faults()
+    find_faults(tmp_path / "none", faults)
+    find_faults(tmp_path / "none", faults)
+    assert [fault.where for fault in faults.faults] == ["survey.toml"]
+    faults.of("data", (tmp_path / "none").read_text)
+    assert faults.faults[-1].where == "system"
