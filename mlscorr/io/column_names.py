@@ -49,6 +49,7 @@ TRAJECTORY_NAMES = PLACE_NAMES | {
     "roll": "rollwinkel roulis alabeo 横滚 横滚角 翻滚角",
     "pitch": "nick nickwinkel tangage cabeceo 俯仰 俯仰角",
     "heading": "hdg hdng azimuth azimut cap rumbo kurs 航向 航向角",
+    "yaw": "gierwinkel lacet guiñada 偏航 偏航角",
     "sigma_easting": "sdeast sigmae sde stdeast",
     "sigma_northing": "sdnorth sigman sdn stdnorth",
     "sigma_height": "sdheight sigmah sdh stdheight sdup",

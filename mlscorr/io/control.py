@@ -10,6 +10,7 @@ import numpy as np
 
 from mlscorr.io.column_names import CONTROL_NAMES
 from mlscorr.io.control_lists import (
+    HINTS,
     SIGMAS,
     check_unused,
     complete,
@@ -102,8 +103,9 @@ def read_control_list(
     ValueError, UserWarning
         As read_control; also for what can be understood in two ways.
     """
+    groups, chosen = (NORMAL,), section.columns.chosen
     layout = read_layout(
-        path, COLUMNS, (NORMAL,), CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns
+        path, COLUMNS, groups, CONTROL_NAMES, lacking, chosen, unnamed_columns, HINTS
     )
     layout, given = (layout, {}) if layout.is_own else complete(layout, section, NORMAL)
     lines = list(read_rows(layout, exact=True))

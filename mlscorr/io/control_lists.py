@@ -18,6 +18,7 @@ from mlscorr.io.text_files import shown
 from mlscorr.survey import Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
+HINTS = {("easting", "latitude"): " Latitude and longitude must be projected first."}
 UNNAMED_AXES = ("x", "y")  # either may point east
 
 

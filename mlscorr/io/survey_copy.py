@@ -57,7 +57,8 @@ def write_survey_copy(
             section["files"] = list(names)
     if trajectory is not None:
         document["trajectory"]["file"] = trajectory
-        document["trajectory"].pop("accuracy", None)  # its sigmas are its own
+        for key in set(document["trajectory"]) - {"file"}:  # its sigmas and columns are its own
+            del document["trajectory"][key]
     for section, mounting in zip(scanners or [document], mountings, strict=bool(mountings)):
         lever_arm, boresight = mounting_values(mounting)
         section["mounting"]["lever_arm"] = lever_arm

@@ -9,13 +9,13 @@ from mlscorr.io.las import spread_times
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
-from mlscorr.io.sbet import check_area, check_crs, describe_projection
+from mlscorr.io.projection import check_area, check_crs, describe_projection
 from mlscorr.io.survey_paths import files_of
 from mlscorr.io.survey_scanners import mounted_scanners, scanner_notes
 from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
 from mlscorr.io.time_systems import match_times
 from mlscorr.io.toml_file import read_toml
-from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
+from mlscorr.io.trajectory import read_trajectory_file
 from mlscorr.survey import CloudFile, Pos, Scanner, Survey, Trajectory
 
 FILE_NAME = "survey.toml"
@@ -53,15 +53,15 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     settings = read_survey_file(path, planned)
     clouds, trajectory_file, accuracy, control_file, reference = files = files_of(path, settings)
     inputs = tuple(input_file(*named) for named in _named(path, files))
-    trajectory = read_trajectory(trajectory_file, settings.crs, accuracy)
-    control, check, layouts = NO_POINTS, NO_POINTS, []
+    recorded = read_trajectory_file(trajectory_file, settings.crs, accuracy, settings.trajectory)
+    trajectory, control, check = recorded.trajectory, NO_POINTS, NO_POINTS
+    layouts = [*filter(None, [recorded.layout])]
     if control_file is not None and holds_points(control_file):
         points = read_control_list(control_file, settings.control, trajectory)
         control, check = points.control, points.check
         check_together(control_file, control + check, trajectory)
         layouts += filter(None, [points.layout])
-    is_geographic = trajectory_file.suffix.lower() in SBET_SUFFIXES
-    notes = crs_notes(settings.crs, trajectory, is_geographic)
+    notes = crs_notes(settings.crs, trajectory, recorded.is_sbet)
     system = settings.cloud.gps_time if settings.cloud else "auto"
     read = [cloud_file(cloud, trajectory, system, settings.crs) for cloud in clouds]
     cloud_files = tuple(file for file, _ in read)
@@ -91,22 +91,22 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     )
 
 
-def crs_notes(crs: str | None, trajectory: Trajectory, is_geographic: bool) -> list[str]:
+def crs_notes(crs: str | None, trajectory: Trajectory, is_sbet: bool) -> list[str]:
     """Sentences on the CRS; warns where the trajectory lies outside its area.
 
     Parameters
     ----------
     crs : str or None
     trajectory : Trajectory
-    is_geographic : bool
-        Whether its file has latitudes and longitudes.
+    is_sbet : bool
+        Whether its file is an SBET, with latitudes and longitudes.
     """
     if crs is None:
         return ["No CRS was given."]
     projected = check_crs(crs)
     check_area(projected, trajectory)
     notes = [f"Coordinates are in {crs} ({projected.name})."]
-    return notes + list(describe_projection(crs) if is_geographic else ())
+    return notes + list(describe_projection(crs) if is_sbet else ())
 
 
 def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFile:

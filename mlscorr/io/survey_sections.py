@@ -41,11 +41,42 @@ class CloudSection(TomlSection):
     gps_time: Literal["auto", "week", "standard"] = "auto"
 
 
+class TrajectoryColumns(ColumnsSection):
+    """Which column of a trajectory is what."""
+
+    gps_time: Column = None
+    easting: Column = None
+    northing: Column = None
+    height: Column = None
+    latitude: Column = None
+    longitude: Column = None
+    roll: Column = None
+    pitch: Column = None
+    heading: Column = None
+    sigma_easting: Column = None
+    sigma_northing: Column = None
+    sigma_height: Column = None
+    sigma_roll: Column = None
+    sigma_pitch: Column = None
+    sigma_heading: Column = None
+
+
 class TrajectorySection(TomlSection):
-    """The trajectory's file, and the accuracy of an SBET."""
+    """The trajectory's file, the accuracy of an SBET, columns and conventions of others."""
 
     file: str
     accuracy: str | None = None
+    columns: TrajectoryColumns = TrajectoryColumns()
+    angles: Literal["deg", "rad"] | None = None
+    heading: (
+        Literal[
+            "clockwise from grid north", "clockwise from true north", "counterclockwise from east"
+        ]
+        | None
+    ) = None
+    pitch: Literal["nose up", "nose down"] | None = None
+    roll: Literal["right side down", "right side up"] | None = None
+    axes: Literal["right-forward-up", "forward-left-up", "forward-right-down"] | None = None
 
 
 class MountingSection(TomlSection):

@@ -99,6 +99,7 @@ def read_layout(
     lacking: Callable[[Collection[str]], list[str]],
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
+    hints: Mapping[tuple[str, str], str] | None = None,
 ) -> TableLayout:
     """The layout of a table in our own columns, or of one as others write them.
 
@@ -109,6 +110,8 @@ def read_layout(
         See find_columns: a table with all required names in a first line with commas is our own.
     names, lacking, chosen, unnamed
         See find_layout.
+    hints : mapping, optional
+        Name that is missing and one that is there to the sentence that says the way out.
 
     Returns
     -------
@@ -136,9 +139,12 @@ def read_layout(
         meanings = find_meanings(header, names, chosen)
         used = {header[i] for positions in meanings.values() for i in positions}
         missing = lacking(meanings)
-        is_geographic = "latitude" in meanings and "easting" in missing
-        way_out = " Latitude and longitude must be projected first." * is_geographic
-        raise refusal or ValueError(missing_sentence(path, header, missing, used) + way_out)
+        ways_out = "".join(
+            way_out
+            for (name, other), way_out in (hints or {}).items()
+            if name in missing and other in meanings
+        )
+        raise refusal or ValueError(missing_sentence(path, header, missing, used) + ways_out)
     return layout
 
 

@@ -1,30 +1,52 @@
-"""Trajectories from CSV or SBET, and back to CSV."""
+"""Trajectories from CSV, SBET and the files of others, and back to CSV."""
 
-import warnings
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.layouts import TableLayout
+from mlscorr.io.course import check_heading, checked_motion
 from mlscorr.io.output import output_file
-from mlscorr.io.sbet import read_sbet
+from mlscorr.io.sbet import is_sbet, read_sbet
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.table_rows import read_numbers
-from mlscorr.io.tables import find_columns, read_header
+from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.text_files import warn_of_cut
+from mlscorr.io.trajectory_tables import (
+    ATTITUDE_SIGMAS,
+    COLUMNS,
+    POSITION_SIGMAS,
+    read_table,
+    read_terrascan,
+)
+from mlscorr.io.trj import MARK
 from mlscorr.survey import Trajectory
 
-COLUMNS = ("gps_time", "easting", "northing", "height", "roll", "pitch", "heading")
-POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
-ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
 SBET_SUFFIXES = (".sbet", ".out")
+NOTHING_GIVEN = TrajectorySection(file="")
+
+
+@dataclass(frozen=True)
+class TrajectoryFile:
+    """A trajectory as it was read, and what was understood of its file.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    is_sbet : bool
+    layout : str or None
+        A sentence; None for an SBET and for our own columns, where nothing had to be understood.
+    """
+
+    trajectory: Trajectory
+    is_sbet: bool
+    layout: str | None = None
 
 
 def read_trajectory(
     path: str | Path, crs: str | None = None, accuracy: str | Path | None = None
 ) -> Trajectory:
-    """Trajectory of a .csv file, or of an SBET (.sbet, .out).
+    """Trajectory of a .csv file, an SBET, or a file of others.
 
     Parameters
     ----------
@@ -43,30 +65,69 @@ def read_trajectory(
     ------
     ValueError
         For missing columns, cells that are not numbers, times that don't increase, radians where
-        degrees belong, and an unknown suffix.
+        degrees belong, and an unknown kind of file.
 
     Warns
     -----
     UserWarning
         When the heading disagrees with the course over ground.
     """
+    return read_trajectory_file(path, crs, accuracy).trajectory
+
+
+def read_trajectory_file(
+    path: str | Path,
+    crs: str | None = None,
+    accuracy: str | Path | None = None,
+    section: TrajectorySection = NOTHING_GIVEN,
+) -> TrajectoryFile:
+    """Trajectory of a file whose kind its content tells: SBET, TerraScan's, TUM's, or a table.
+
+    Parameters
+    ----------
+    path, crs, accuracy
+        See read_trajectory.
+    section : TrajectorySection, optional
+        What survey.toml says of columns and conventions.
+
+    Returns
+    -------
+    TrajectoryFile
+
+    Raises
+    ------
+    ValueError, UserWarning
+        As read_trajectory; also for what can be understood in two ways.
+    """
     path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix in SBET_SUFFIXES:
-        return _checked_motion(path, read_sbet(path, crs, accuracy))
-    if suffix != ".csv":
-        raise ValueError(
-            f"{path} has the unknown suffix '{path.suffix}'; "
-            f"a trajectory is .csv or SBET ({', '.join(SBET_SUFFIXES)})."
-        )
+    with path.open("rb") as file:
+        start = file.read(SETTINGS.longest_line)
+    if path.suffix.lower() in SBET_SUFFIXES or is_sbet(path):
+        given = sorted(section.model_fields_set - {"file", "accuracy"})
+        if given:
+            raise ValueError(
+                f"{path} is an SBET, whose columns and conventions are known: remove "
+                f"{', '.join(given)} from [trajectory]."
+            )
+        return TrajectoryFile(checked_motion(path, read_sbet(path, crs, accuracy)), True)
     if accuracy is not None:
         raise ValueError(
             f"{path} has its accuracy in its own sigma columns; an accuracy file ({accuracy}) "
             "belongs to an SBET."
         )
-    trajectory = _checked_motion(path, _read_csv(path))
-    warn_of_cut(path)
-    return trajectory
+    is_text = not start.startswith(MARK)
+    is_wide = start[:2] in (b"\xff\xfe", b"\xfe\xff")  # UTF-16
+    if is_text and b"\0" in start and not is_wide and path.suffix.lower() != ".csv":
+        raise ValueError(
+            f"{path} is of an unknown kind: no table of text, no SBET (whole records of 136 bytes, "
+            f"angles in radians) and no trajectory of TerraScan. Export it as text or SBET, from "
+            "RIEGL's POF too, whose layout is not public."
+        )
+    table, layout = (read_table if is_text else read_terrascan)(path, section, crs)
+    trajectory = checked_motion(path, _trajectory_of(path, table))
+    if is_text and not is_wide:
+        warn_of_cut(path)
+    return TrajectoryFile(trajectory, False, layout)
 
 
 def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
@@ -101,15 +162,12 @@ def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
             file.write((line * len(rows)) % tuple(rows.ravel()))
 
 
-def _read_csv(path):
-    header, lines = read_header(path)
-    columns = find_columns(path, header, COLUMNS, (POSITION_SIGMAS, ATTITUDE_SIGMAS))
-    numbers = read_numbers(TableLayout(Path(path), tuple(header), lines, columns, is_own=True))
-    table = dict(zip(columns, numbers.T, strict=True))
+def _trajectory_of(path, table):
+    """The Trajectory of a table in our own columns and conventions."""
     _check_values(path, table)
     angles = np.column_stack([table[name] for name in COLUMNS[4:]])
     position = np.column_stack([table[name] for name in COLUMNS[1:4]])
-    _check_heading(path, table["gps_time"], position, angles)
+    check_heading(path, table["gps_time"], position, angles)
 
     def sigmas(names):
         return np.column_stack([table[name] for name in names]) if names[0] in table else None
@@ -141,72 +199,3 @@ def _check_values(path, table):
                 f"{(values < 0).sum()} of {len(values)} epochs of {path} have a negative {name} "
                 f"(first: epoch {np.argmax(values < 0) + 1})."
             )
-
-
-def _checked_motion(path, trajectory):
-    """The trajectory, where a vehicle can move so: no lone epoch far off, no leap of a distance.
-
-    A POS that finds its satellites again falls back at once by metres, so a single step may be
-    faster than any vehicle, two in turn may not.
-    """
-    length = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
-    speed = length / np.diff(trajectory.gps_time)
-    is_fast = np.concatenate([[True], speed > SETTINGS.fastest, [True]])
-    bad = is_fast[1:-1] & (is_fast[:-2] | is_fast[2:] | (length > SETTINGS.near))
-    if bad.any():
-        worst = int(np.argmax(np.where(bad, speed, 0.0)))
-        raise ValueError(
-            f"{bad.sum()} of {len(bad)} steps of {path} are faster than {SETTINGS.fastest:.0f} "
-            f"m/s, which no vehicle is (fastest: {length[worst]:.1f} m at {speed[worst]:.3g} m/s, "
-            f"at {trajectory.gps_time[worst]:.3f} s): an epoch is wrong, or the units are not m "
-            "and s. Remove it, or export the trajectory anew."
-        )
-    return trajectory
-
-
-def _check_heading(path, gps_time, position, angles):
-    """Compare the heading with the course over ground where the vehicle moves.
-
-    Radians in a column of degrees are refused; a heading that fits the course neither way is
-    warned of only: boats drift and vehicles reverse.
-    """
-    heading, course = _heading_and_course(gps_time, position, angles[:, 2])
-    if len(course) < 10:
-        return
-    misfit = _median_difference(np.radians(heading), course)
-    tolerance = np.radians(SETTINGS.course_tolerance)
-    if misfit < tolerance:
-        return
-    if np.abs(angles).max() <= 2 * np.pi and _median_difference(heading, course) < tolerance:
-        raise ValueError(
-            f"The angles of {path} seem to be radians where degrees belong: none exceeds 2 pi, "
-            f"and the heading fits the course over ground to "
-            f"{np.degrees(_median_difference(heading, course)):.1f} deg when taken as radians, "
-            f"to {np.degrees(misfit):.1f} deg when taken as degrees."
-        )
-    warnings.warn(
-        f"The heading of {path} differs from the course over ground by {np.degrees(misfit):.0f} "
-        f"deg (median of {len(course)} epochs). Unless the vehicle drifts or reverses, the heading "
-        "may not be clockwise from grid north, or easting and northing may be swapped.",
-        stacklevel=4,
-    )
-
-
-def _heading_and_course(gps_time, position, heading):
-    """Heading as it stands in the file, and course (rad), at epochs where the vehicle moves."""
-    steps = np.diff(gps_time)
-    if len(steps) == 0 or (steps <= 0).any():  # Trajectory says what is wrong
-        return np.empty(0), np.empty(0)
-    stride = max(1, round(SETTINGS.baseline / np.median(steps)))
-    start, end = np.arange(0, len(gps_time) - stride), np.arange(stride, len(gps_time))
-    moved = position[end] - position[start]
-    seconds = gps_time[end] - gps_time[start]
-    distance = np.hypot(moved[:, 0], moved[:, 1])
-    moving = distance > SETTINGS.moving * np.maximum(seconds, SETTINGS.baseline)
-    moving &= seconds < 10 * stride * np.median(steps)  # not across a gap
-    return heading[start + stride // 2][moving], np.arctan2(moved[:, 0], moved[:, 1])[moving]
-
-
-def _median_difference(heading, course):
-    """Median of the absolute differences of two directions. Units: rad."""
-    return np.median(np.abs(np.mod(heading - course + np.pi, 2 * np.pi) - np.pi))

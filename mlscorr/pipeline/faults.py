@@ -12,13 +12,13 @@ from mlscorr.io.control import holds_points, read_control_list
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
-from mlscorr.io.sbet import check_crs
+from mlscorr.io.projection import check_crs
 from mlscorr.io.survey_file import cloud_file, crs_notes, survey_toml
 from mlscorr.io.survey_paths import check_distinct, existing, matching, single_files
 from mlscorr.io.survey_scanners import mounted_scanners
 from mlscorr.io.survey_sections import SurveyFile
 from mlscorr.io.toml_file import read_toml
-from mlscorr.io.trajectory import read_trajectory
+from mlscorr.io.trajectory import read_trajectory_file
 from mlscorr.survey import Trajectory
 
 Place = Literal["survey.toml", "data", "system"]
@@ -138,11 +138,12 @@ def find_faults(path: str | Path, faults: Faults) -> None:
 
 def _trajectory(settings, files, faults):
     """The trajectory, None where it can't be read."""
-    path = files["trajectory.file"]
-    if path is None or (settings.trajectory.accuracy and files["trajectory.accuracy"] is None):
+    path, section = files["trajectory.file"], settings.trajectory
+    if path is None or (section.accuracy and files["trajectory.accuracy"] is None):
         return None
     accuracy = files["trajectory.accuracy"]
-    return faults.of("data", read_trajectory, path, settings.crs, accuracy)
+    recorded = faults.of("data", read_trajectory_file, path, settings.crs, accuracy, section)
+    return recorded and recorded.trajectory
 
 
 def _control(path, section, trajectory: Trajectory | None, faults):

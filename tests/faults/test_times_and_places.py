@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.sbet import check_area, check_crs, read_sbet
+from mlscorr.io.projection import check_area, check_crs
+from mlscorr.io.sbet import read_sbet
 from mlscorr.survey import Trajectory
 
 START = 357_700.0  # s of week

@@ -7,7 +7,8 @@ from pyproj import Geod
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles, georeference, to_scanner
-from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS, describe_projection, read_sbet
+from mlscorr.io.projection import describe_projection
+from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS, read_sbet
 from mlscorr.io.trajectory import read_trajectory, write_trajectory_csv
 from mlscorr.survey import Mounting, Trajectory
 from tests.beds.shared import shared
@@ -129,7 +130,7 @@ def test_bad_epochs_are_refused(tmp_path, change, message):
         ("\n\n", "is empty"),
         (HEADER + "\n", "header but no epochs"),
         (HEADER.replace("heading", "yaw") + "\n1,2,3,4,5,6,7\n", "no column heading; it has"),
-        (HEADER.replace(",", ";") + "\n1;2;3\n", "no column gps_time"),
+        (HEADER.replace(",", ";") + "\n1;2;3\n", "Line 2 .* 3 columns where 7 belong"),
         (HEADER + ",height\n1,2,3,4,5,6,7,8\n", "column height 2 times"),
         (HEADER + "\n1,2,3,4,5,6,7\n2,2,3,4\n", "Line 3 .* 4 columns .* cut off"),
         (HEADER + "\n1,2,3,4,5,6,7\n2,2,x,4,5,6,7\n", "Line 3 .*'x' where a number belongs"),
@@ -181,14 +182,16 @@ def test_a_vehicle_at_rest_has_no_course(tmp_path):
     assert len(read_trajectory(csv_of(tmp_path / "t.csv", table))) == 400
 
 
-def test_unknown_suffix_and_needless_accuracy_are_refused(tmp_path):
+def test_unknown_kinds_and_needless_accuracy_are_refused(tmp_path):
     "What can't be used is said, not ignored"
-    with pytest.raises(ValueError, match=r"unknown suffix '\.txt'"):
-        read_trajectory(tmp_path / "t.txt")
+    (tmp_path / "t.pof").write_bytes(bytes(1000))
+    with pytest.raises(ValueError, match=r"t\.pof is of an unknown kind: .* POF too"):
+        read_trajectory(tmp_path / "t.pof")
+    csv_of(tmp_path / "t.csv", table_of(drive(50)))
     with pytest.raises(ValueError, match="its own sigma columns"):
         read_trajectory(tmp_path / "t.csv", accuracy=tmp_path / "smrmsg.out")
     with pytest.raises(FileNotFoundError):
-        read_trajectory(tmp_path / "t.csv")
+        read_trajectory(tmp_path / "u.csv")
 
 
 # ---- SBET

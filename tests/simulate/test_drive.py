@@ -364,7 +364,7 @@ def test_a_stop_in_a_given_path_adds_no_length(tmp_path):
             "gps_time,x,y,z\n1,2,3,4\n2,2,3,nan\n",
             "1 of 2 epochs of .* are not numbers",
         ),
-        ("c.csv", "t,a,b\n1,2,3\n", "has no column gps_time"),
+        ("c.csv", "t,a,b\n1,2,3\n", "has no column easting"),
     ],
 )
 def test_files_that_are_no_path_are_refused(name, text, match, tmp_path):

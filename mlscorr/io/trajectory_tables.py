@@ -1,0 +1,153 @@
+"""Trajectories in tables: our own columns, those of Inertial Explorer and others, and TUM's.
+
+TUM's rows are `time x y z qx qy qz qw` without a header, parted by blanks.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.column_names import TRAJECTORY_NAMES, UNITS, plain
+from mlscorr.io.conventions import (
+    ANGLES,
+    QUATERNION,
+    UNIT_TOLERANCE,
+    Conventions,
+    attitude_of_quaternions,
+    in_our_conventions,
+)
+from mlscorr.io.layout_search import NUMBER
+from mlscorr.io.layouts import TableLayout
+from mlscorr.io.survey_sections import TrajectorySection
+from mlscorr.io.table_rows import read_numbers
+from mlscorr.io.tables import read_layout
+from mlscorr.io.trj import read_trj
+
+PLACE = ("easting", "northing", "height")
+COLUMNS = ("gps_time", *PLACE, *ANGLES)
+POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
+ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
+GRID, TRUE = "clockwise from grid north", "clockwise from true north"
+TUM = ("gps_time", *PLACE, *QUATERNION)
+INERTIAL_EXPLORER = ("hell", "hdngsd")  # names of columns that no other program writes
+HINTS = {
+    ("easting", "x"): " Say under [trajectory.columns] in survey.toml which of X and Y is easting.",
+    (
+        "heading",
+        "yaw",
+    ): " Its yaw is a heading by convention only: say under [trajectory] in survey.toml how "
+    f'it counts, as heading = "counterclockwise from east" or "{GRID}".',
+}
+
+
+def read_table(
+    path: Path, section: TrajectorySection, crs: str | None
+) -> tuple[dict[str, np.ndarray], str | None]:
+    """Columns of a trajectory in our names, units and conventions, and what was understood.
+
+    Parameters
+    ----------
+    path : Path
+    section : TrajectorySection
+    crs : str or None
+
+    Returns
+    -------
+    table : dict
+        Name of a column to an (n,) array. Units: s, m, deg.
+    layout : str or None
+        A sentence; None for our own columns without conventions of others.
+
+    Raises
+    ------
+    ValueError
+        For missing columns, cells that are no numbers, and conventions that are not known.
+    """
+
+    def lacking(names: Collection[str]) -> list[str]:
+        is_projected = "latitude" not in names or {"easting", "northing"} <= set(names)
+        place = PLACE if is_projected else ("latitude", "longitude", "height")
+        angles = ("roll", "pitch", "yaw" if section.heading and "yaw" in names else "heading")
+        return [name for name in ("gps_time", *place, *angles) if name not in names]
+
+    groups, chosen = (POSITION_SIGMAS, ATTITUDE_SIGMAS), section.columns.chosen
+    layout = read_layout(
+        path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, _tum_columns, HINTS
+    )
+    layout = layout if layout.is_own else _used(layout)
+    if section.angles:
+        angles = (*ANGLES, "yaw", *ATTITUDE_SIGMAS)
+        factors = {name: UNITS[section.angles] for name in angles if name in layout.columns}
+        layout = replace(layout, factors=layout.factors | factors)
+    table = dict(zip(layout.columns, read_numbers(layout).T, strict=True))
+    if "qw" in layout.columns:
+        table, axes = attitude_of_quaternions(path, table, section.axes)
+        return table, f"{layout}; body axes {axes}."
+    if "yaw" in table:
+        table["heading"] = table.pop("yaw")
+    conventions = Conventions.of(section, _usual_heading(layout, section))
+    given = section.model_fields_set & {"angles", "heading", "pitch", "roll"}
+    if layout.is_own and not given:
+        return table, None
+    table = in_our_conventions(path, table, conventions, crs)
+    degrees = "" if "roll" in layout.factors else ", angles in degrees"
+    where = (
+        f"; latitude and longitude in the datum of {crs}" if "latitude" in layout.columns else ""
+    )
+    return table, f"{layout}{where}; {conventions}{degrees}."
+
+
+def read_terrascan(
+    path: Path, section: TrajectorySection, crs: str | None
+) -> tuple[dict[str, np.ndarray], str]:
+    """Columns of a TerraScan trajectory in our conventions, and what was understood.
+
+    Parameters
+    ----------
+    path, section, crs
+        See read_table.
+
+    Returns
+    -------
+    table : dict
+    layout : str
+    """
+    conventions = Conventions.of(section, GRID)
+    table = in_our_conventions(path, read_trj(path), conventions, crs)
+    return table, f"{path.name} was read as a TerraScan trajectory; {conventions}."
+
+
+def _tum_columns(cells: Sequence[str]) -> Mapping[str, int]:
+    """Columns of a row in TUM's layout: eight numbers, the last four a unit quaternion."""
+    if len(cells) != len(TUM) or not all(map(NUMBER.fullmatch, cells)):
+        return {}
+    length = np.linalg.norm([float(cell.replace(",", ".")) for cell in cells[4:]])
+    is_attitude = abs(length - 1.0) < UNIT_TOLERANCE
+    return dict(zip(TUM, range(len(TUM)), strict=True)) if is_attitude else {}
+
+
+def _used(layout: TableLayout) -> TableLayout:
+    """The layout with the columns that are used: one kind of place, sigmas of all axes or none."""
+    columns = layout.columns
+    needless = {"x", "y"}
+    needless |= {"latitude", "longitude"} if "easting" in columns else set()
+    needless |= {"yaw"} if "heading" in columns else set()
+    for group in (POSITION_SIGMAS, ATTITUDE_SIGMAS):
+        needless |= set() if set(group) <= set(columns) else set(group)
+    used = {name: i for name, i in columns.items() if name not in needless}
+    return replace(layout, columns=used)
+
+
+def _usual_heading(layout, section):
+    """How headings count where survey.toml doesn't say: from true north beside a latitude."""
+    if "latitude" in layout.columns:
+        return TRUE
+    if not section.heading and set(map(plain, layout.header)) & set(INERTIAL_EXPLORER):
+        raise ValueError(
+            f"{layout.path} was exported by Inertial Explorer, whose headings count from true "
+            "north unless its profile takes the convergence off. Say which under [trajectory] in "
+            f'survey.toml: heading = "{TRUE}" or "{GRID}".'
+        )
+    return GRID
