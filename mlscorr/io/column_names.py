@@ -57,16 +57,17 @@ TRAJECTORY_NAMES = PLACE_NAMES | {
     "sigma_pitch": "pitchsd sdpitch stdpitch",
     "sigma_heading": "hdngsd headingsd sdheading stdheading",
 }
+BRACKETS = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]\s*$")
 UNITS = {  # to m, deg and s
     **dict.fromkeys(("m", "meter", "metre", "meters", "metres", "mètres", "metros", "米"), 1.0),
     **dict.fromkeys(("s", "sec", "seconds", "秒", "deg", "degree", "degrees", "°", "度"), 1.0),
     **{"cm": 0.01, "mm": 0.001, "rad": 57.29577951308232, "gon": 0.9},
 }
-FOREIGN_UNITS = ("ft", "feet", "usft", "us-ft", "ftus", "sft", "in", "yd", "km", "dms", "hms")
+FOREIGN_UNITS = re.compile(r"(us|s|us-)?(ft|feet|foot)(us)?|in|inch|inches|yd|km|dms|hms")
 
 
 def plain(name: str) -> str:
-    """A name without case, width, brackets with a unit, blanks and punctuation.
+    """A name without case, width, brackets at its end, blanks and punctuation.
 
     Parameters
     ----------
@@ -74,12 +75,10 @@ def plain(name: str) -> str:
 
     Examples
     --------
-    >>> plain("Pkt.-Nr."), plain("Höhe [m]"), plain("H-Ell"), plain("Height (ellipsoidal)")
-    ('pktnr', 'höhe', 'hell', 'height(ellipsoidal)')
+    >>> plain("Pkt.-Nr."), plain("Höhe [m]"), plain("H-Ell"), plain("Nordwert (ETRS89/UTM)")
+    ('pktnr', 'höhe', 'hell', 'nordwert')
     """
-    words = unicodedata.normalize("NFKC", name).casefold().strip()
-    if unit_of(words) is not None:
-        words = words[: max(words.rfind("["), words.rfind("("))]
+    words = BRACKETS.sub("", unicodedata.normalize("NFKC", name).casefold())
     return re.sub(r"[\s_.\-/:,'\"]+", "", words)
 
 
@@ -92,12 +91,22 @@ def unit_of(name: str) -> str | None:
 
     Examples
     --------
-    >>> unit_of("东坐标(m)"), unit_of("Elev [ft]"), unit_of("Height (ellipsoidal)")
-    ('m', 'ft', None)
+    >>> unit_of("东坐标(m)"), unit_of("Elev [US survey ft]"), unit_of("Height (ellipsoidal)")
+    ('m', 'us survey ft', None)
     """
-    words = unicodedata.normalize("NFKC", name).casefold().strip()
-    match = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]$", words)
-    return match[1] if match and (match[1] in UNITS or match[1] in FOREIGN_UNITS) else None
+    match = BRACKETS.search(unicodedata.normalize("NFKC", name).casefold())
+    unit = re.sub(r"^in\s+", "", match[1]) if match else ""  # as in: height (in m)
+    return unit if unit in UNITS or is_foreign(unit) else None
+
+
+def is_foreign(unit: str) -> bool:
+    """Whether a unit is one that is not read.
+
+    Parameters
+    ----------
+    unit : str
+    """
+    return any(map(FOREIGN_UNITS.fullmatch, unit.split()))
 
 
 def find_meanings(

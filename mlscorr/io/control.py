@@ -123,6 +123,7 @@ def read_control_list(
         )
     if not layout.is_own:
         check_unused(layout, [cells for _, cells in lines], {"role": ROLES, "kind": KINDS})
+    has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
     for row in rows:
         _check(path, row)
@@ -130,7 +131,9 @@ def read_control_list(
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
     return ControlList(
-        control, check, None if layout.is_own else sentence_on(layout, given, section.check)
+        control,
+        check,
+        None if layout.is_own else sentence_on(layout, has_axes, given, section.check),
     )
 
 

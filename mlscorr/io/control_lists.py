@@ -202,16 +202,21 @@ def _axes_east_and_north(layout, rows, trajectory):
     )
 
 
-def sentence_on(layout: TableLayout, given: Mapping[str, Any], patterns: Sequence[str]) -> str:
+def sentence_on(
+    layout: TableLayout, has_axes: bool, given: Mapping[str, Any], patterns: Sequence[str]
+) -> str:
     """What was understood of a list, and what survey.toml says of all points.
 
     Parameters
     ----------
     layout : TableLayout
+    has_axes : bool
+        Whether the trajectory told easting from northing.
     given : mapping
     patterns : sequence of str
         Of check points.
     """
+    axes = ", easting and northing told by the trajectory" * has_axes
     values = [f"{k} {shown(v) if isinstance(v, str) else f'{v:g} m'}" for k, v in given.items()]
     values += [f"but check for {shown(', '.join(patterns))}"] * bool(patterns)
-    return f"{layout}{'; of all points: ' + ', '.join(values) if values else ''}."
+    return f"{layout}{axes}{'; of all points: ' + ', '.join(values) if values else ''}."

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mlscorr.io.column_names import FOREIGN_UNITS, UNITS, find_meanings, unit_of
+from mlscorr.io.column_names import UNITS, find_meanings, is_foreign, unit_of
 from mlscorr.io.layouts import (
     COMMENT_MARKS,
     ENCODINGS,
@@ -83,8 +83,8 @@ def find_layout(
                 f"{path} has a table in {len(layouts)} sheets ({sheets}): keep one of them."
             )
         for layout in layouts[:1]:
-            letters = "".join(layout.header)
-            if encoding != "gb18030" or not letters.isascii():  # else nothing tells it from others
+            is_told = not "".join(layout.header).isascii() or _are_pairs(path)
+            if encoding != "gb18030" or is_told:
                 return layout
     return None
 
@@ -105,6 +105,13 @@ def _encodings(path):
         return ("utf-16",) if file.read(2) in (b"\xff\xfe", b"\xfe\xff") else tuple(
             name for name in ENCODINGS if name != "utf-16"
         )  # fmt: skip
+
+
+def _are_pairs(path):
+    """Whether letters beyond ASCII come in pairs of bytes, as Chinese ones do and umlauts don't."""
+    with path.open("rb") as file:
+        start = file.read(SETTINGS.copied_bytes)
+    return all(len(run) % 2 == 0 for run in re.findall(rb"[\x80-\xff]+", start))
 
 
 def _candidates(path, encoding):
@@ -167,8 +174,7 @@ def _uncommented(cells):
 def _holds_units(cells, columns):
     """Whether the row below a header has units in place of values."""
     texts = [cells[i].strip("()[] ").casefold() for i in columns.values() if i < len(cells)]
-    known = {*UNITS, *FOREIGN_UNITS, ""}
-    return any(texts) and all(text in known for text in texts)
+    return any(texts) and all(not text or text in UNITS or is_foreign(text) for text in texts)
 
 
 def _with_numbers(layout, units, rows):
@@ -176,7 +182,7 @@ def _with_numbers(layout, units, rows):
     path, factors = layout.path, {}
     for name, i in layout.columns.items():
         unit = units[i] if i < len(units) else None
-        if unit in FOREIGN_UNITS:
+        if unit is not None and unit not in UNITS:
             raise ValueError(
                 f"{path} has the {name} in '{unit}', where m, mm, deg, rad or s belong: "
                 "convert this column."

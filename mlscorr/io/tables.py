@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.column_names import find_meanings
-from mlscorr.io.layout_search import find_layout, likely_header
+from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
 from mlscorr.io.layouts import TableLayout, not_text
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
@@ -213,7 +213,9 @@ def missing_sentence(
     others = [cell for cell in header if cell and cell not in used]
     near = nearest(missing[0], others)
     hint = f" {missing[0]} may be meant by '{shown(near)}'." if near else ""
-    if {"easting", "northing", "height"} <= set(missing):
+    if sum(NUMBER.fullmatch(cell) is not None for cell in header) > 2:
+        hint = " It has no header: number its columns in survey.toml, as easting = 2."
+    elif {"easting", "northing", "height"} <= set(missing):
         hint += " It holds no coordinates: is another file meant?"
     names = shown(", ".join(header)) or "no header"
     return f"{path} has no column {', '.join(missing)}; it has {names}.{hint}"

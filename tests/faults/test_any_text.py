@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.control import read_control
-from mlscorr.io.survey_sections import SurveyFile
+from mlscorr.io.control import read_control, read_control_list
+from mlscorr.io.survey_sections import ControlSection, SurveyFile
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory import read_trajectory, write_trajectory_csv
 from mlscorr.survey import Trajectory
@@ -24,7 +24,11 @@ EXAMPLES = settings(
 CONTROL = "name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role\n"
 TRAJECTORY = "gps_time,easting,northing,height,roll,pitch,heading\n"
 SURVEY = '[cloud]\nfiles = ["a.las"]\n[trajectory]\nfile = "a.csv"\n[control]\nfile = "b.csv"\n'
+LIST = "Punkt;Ostwert;Nordwert;Höhe\n"
+OF_ALL = ControlSection(file="", kind="circle", size=0.6, sigma=[0.003, 0.004])
 READERS = {
+    "list.txt": (LIST, lambda path: read_control_list(path, OF_ALL)),
+    "drive.txt": (TRAJECTORY.replace(",", "\t"), read_trajectory),
     "control.csv": (CONTROL, read_control),
     "trajectory.csv": (TRAJECTORY, read_trajectory),
     "survey.toml": (SURVEY, lambda path: read_toml(path, SurveyFile, "it")),

@@ -38,7 +38,8 @@ LISTS = {  # what writes such a file: content, its letters, and what is understo
     ),
     "name, northing, easting, height, code": (
         "P1,3373991.48,532012.49,44.48,GCP\nP2,3373978.17,532030.0,44.5,\n",
-        "utf-8", "northing = column 2, easting = column 3",
+        "utf-8", "easting = column 3, height = column 4 (commas, decimal point), easting and "
+        "northing told by the trajectory",
     ),
     "Leica, header behind a comment mark": (
         "# Infinity 4.1\n# Point Id\tEasting\tNorthing\tOrthometric Height\n"
@@ -69,6 +70,12 @@ LISTS = {  # what writes such a file: content, its letters, and what is understo
         "P2\t532030\t3373978,17\t44,5\n",
         "utf-16", "height = Cota (tabs, decimal comma, letters of UTF-16)",
     ),
+    "Swiss, letters in names alone, remarks in brackets": (
+        "Nr. Ostwert(LV95/LN02) Nordwert(LV95/LN02) Höhe Bemerkung\n"
+        "----------------------------------------\n"
+        "P1  532012.490  3373991.480  44.480 Tafel\nP2  532030.000  3373978.170  44.500 Säule\n",
+        "cp1252", "easting = Ostwert(LV95/LN02)",
+    ),
     "Chinese": (
         "点号,东坐标(m),北坐标(m),高程(m)\nP1,532012.49,3373991.48,44.48\n"
         "P2,532030,3373978.17,44.5\n",
@@ -88,6 +95,13 @@ def test_lists_of_others_are_read_and_said(kind, drive, tmp_path):
     assert sentence in points.layout
     assert "kind circle, size 0.6 m, role control" in points.layout
     assert holds_points(tmp_path / "list.txt")
+
+
+@pytest.mark.parametrize(("name", "encoding"), [("Brücke", "cp1252"), ("桥", "gb18030")])
+def test_letters_of_names_are_told_apart(name, encoding, drive, tmp_path):
+    "Chinese letters take two bytes, umlauts stand alone"
+    points = read(tmp_path, f"PtID;E;N;H\n{name};532012,49;3373991,48;44,48\n", drive, encoding)
+    assert points.control.name == (name,)
 
 
 def test_columns_of_the_list_go_before_what_is_said_of_all(drive, tmp_path):
@@ -158,6 +172,7 @@ P1 = "P1;532012,49;3373991,48;44,48\n"
         ("Punkt;E;N;H\n" + P1.replace("44,48", "hoch"), "height 'hoch', which is not a number"),
         ("Punkt;E;N;H\n" + P1 + P1, "names P1 more than once"),
         ("Punkt;E;N;H\n", "header but no points"),
+        ("P1;GCP;532012,49;3373991,48;44,48\n", "no header: number its columns in survey.toml, as"),
     ],
 )  # fmt: skip
 def test_what_may_mean_two_things_or_nothing_is_refused(content, message, drive, tmp_path):
