@@ -2,7 +2,17 @@
 
 from importlib import import_module
 
-_PIPELINE = ("calibrate", "check", "compare", "correct", "diagnose", "extract", "find_ties", "plan")
+_PIPELINE = (
+    "calibrate",
+    "check",
+    "compare",
+    "correct",
+    "diagnose",
+    "extract",
+    "find_ties",
+    "init",
+    "plan",
+)
 _HOMES = {
     "read_simulator": "mlscorr.simulate.simulator_file",
     "read_survey": "mlscorr.io.survey_file",

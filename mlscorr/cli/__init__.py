@@ -16,6 +16,7 @@ from mlscorr.cli.demo import demo
 from mlscorr.cli.diagnose import diagnose
 from mlscorr.cli.doctor import doctor
 from mlscorr.cli.extract import extract
+from mlscorr.cli.init import init
 from mlscorr.cli.plan import plan
 from mlscorr.cli.render import render
 from mlscorr.cli.simulate import simulate
@@ -23,7 +24,7 @@ from mlscorr.cli.terminal import deafen, listen, warn
 from mlscorr.cli.ties import ties
 
 COMMANDS = (
-    *(check, correct, extract, ties, calibrate, compare, render, demo),
+    *(init, check, correct, extract, ties, calibrate, compare, render, demo),
     *(simulate, diagnose, plan, doctor),
 )
 

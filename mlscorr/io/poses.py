@@ -111,7 +111,7 @@ def _read_pos(path):
         ) from None
     from pyproj import Transformer
 
-    zone = _utm_zone(*table[0, 1:3])
+    zone = utm_zone(*table[0, 1:3])
     to_map = Transformer.from_crs("EPSG:4326", zone, always_xy=True)
     table[:, 1], table[:, 2] = to_map.transform(table[:, 2], table[:, 1])
     return table
@@ -122,13 +122,20 @@ def _sbet_zone(path):
     record = np.fromfile(path, dtype="<f8", count=len(SBET_FIELDS))
     if len(record) < len(SBET_FIELDS) or not np.isfinite(record[1:3]).all():
         return "EPSG:32631"
-    return _utm_zone(*np.degrees(record[1:3]))
+    return utm_zone(*np.degrees(record[1:3]))
 
 
-def _utm_zone(latitude, longitude):
-    """EPSG code of the WGS 84 UTM zone of a place in degrees.
+def utm_zone(latitude: float, longitude: float) -> str:
+    """EPSG code of the WGS 84 UTM zone of a place.
 
-    >>> _utm_zone(30.46, 114.47), _utm_zone(-33.9, 151.2)
+    Parameters
+    ----------
+    latitude, longitude : float
+        Units: deg.
+
+    Examples
+    --------
+    >>> utm_zone(30.46, 114.47), utm_zone(-33.9, 151.2)
     ('EPSG:32650', 'EPSG:32756')
     """
     zone = int(np.floor((longitude + 180.0) / 6.0)) % 60 + 1

@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -52,13 +52,31 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
         raise ValueError(
             f"{path} can't be read: brackets are nested too deep, or a number has too many digits."
         ) from None
-    try:
-        validated = model.model_validate(document)
-    except ValidationError as error:
-        sentences = " ".join(_sentence(item, model) for item in _causes(error.errors()))
-        raise ValueError(f"{path}: {sentences}") from None
+    validated = validate(str(path), document, model)
     warn_of_cut(path)
     return validated
+
+
+def validate(source: str, document: dict[str, Any], model: type[Model]) -> Model:
+    """A document as a pydantic model.
+
+    Parameters
+    ----------
+    source : str
+        Where it is from, in words.
+    document : dict
+    model : class of pydantic
+
+    Raises
+    ------
+    ValueError
+        As read_toml.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        sentences = " ".join(_sentence(item, model) for item in _causes(error.errors()))
+        raise ValueError(f"{source}: {sentences}") from None
 
 
 def _causes(items):

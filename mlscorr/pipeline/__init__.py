@@ -8,4 +8,5 @@ from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose
 from mlscorr.pipeline.extraction import ExtractedSurvey, extract
 from mlscorr.pipeline.planning import PlannedSurvey, plan
 from mlscorr.pipeline.simulation import demo, simulate_survey
+from mlscorr.pipeline.starting import StartedSurvey, init
 from mlscorr.pipeline.ties import TiedSurvey, find_ties

@@ -20,6 +20,13 @@ class Settings:
         8.0  # s, of which a look at fewer of them is made where targets are dense
     )
     looked_length: float = 15.0  # m, of the way to either side of one: beams may look 45 deg ahead
+    listed_files: int = 5  # files; more are written as a pattern
+    # Lines a second
+    rated_points: int = 200_000  # points, half a second of a fast scanner
+    turning_time: float = 0.5  # s of points: tens of lines of any scanner
+    turning_points: int = 4000  # points of these: enough for the mean of a direction
+    turning_rates: tuple[float, float] = (4.0, 600.0)  # 1/s, slower and faster than any scanner
+    uneven_turn: float = 0.25  # of the scatter that any other rate leaves; that of turns is a tenth
     epoch_bytes: int = 137  # bytes, of a line of trajectory.csv with sigmas in a UTM zone
     # What a correction took beside the fits of its targets, docs/results.md
     decodings: float = 5.0  # times decoding the points once: reading, ties, copying, drawing

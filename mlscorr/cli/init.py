@@ -1,0 +1,53 @@
+"""The command that makes a survey.toml of what lies in a folder."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import mlscorr
+from mlscorr.cli.terminal import Exit, Quiet, exit_code, say
+
+NAMES = {"none": "not used", "table": "not used", "reference": "mesh"}
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(help="Folder with clouds, trajectory and control.")],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="File to write, FOLDER/survey.toml if none.")
+    ] = None,
+    given: Annotated[
+        list[str],
+        typer.Option("--set", help="What survey.toml shall say, as 'control.size = 0.6'."),
+    ] = (),
+    quiet: Quiet = False,
+) -> None:
+    """Write a survey.toml for the files in a folder, and say which is which and why."""
+    with exit_code(Exit.USAGE):
+        started = mlscorr.init(folder, out, _document(given))
+        started.write()
+    for role in started.roles:
+        say(f"{NAMES.get(role.role, role.role)}: {role.path.relative_to(folder)} ({role.reason})")
+    for note in started.notes:
+        say(note)
+    say(f"Written: {started.path}. Next: mlscorr check {started.path}")
+
+
+def _document(given):
+    """Tables of lines such as control.size = 0.6; what is no value of TOML is text."""
+    lines = []
+    for line in given:
+        key, _, value = line.partition("=")
+        try:
+            tomllib.loads(f"value = {value}")
+        except tomllib.TOMLDecodeError:
+            value = json.dumps(value.strip())
+        lines.append(f"{key} = {value}")
+    try:
+        return tomllib.loads("\n".join(lines))
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(
+            f"--set takes a key and its value, as 'control.size = 0.6': {error}."
+        ) from None

@@ -1,0 +1,117 @@
+"""What the files of a folder are, by their content: clouds, trajectories, control, meshes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings
+from mlscorr.io.control_lists import unnamed_columns
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.layout_search import NUMBER, likely_header
+from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
+from mlscorr.io.text_files import shown
+
+Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
+CLOUDS, MESHES = (".las", ".laz"), (".ply",)
+TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
+TRAJECTORIES = (".sbet", ".trj", ".pof", ".pofx")
+RECORDS = (".out", ".smrmsg", ".bin")
+RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json", "truth.json")
+
+
+@dataclass(frozen=True)
+class FileRole:
+    """What a file is for a survey, and why.
+
+    Parameters
+    ----------
+    path : Path
+    role : str
+        What its content looks like; ``table`` for one of another content.
+    reason : str
+    """
+
+    path: Path
+    role: Role
+    reason: str
+
+
+def sort_files(folder: Path) -> list[FileRole]:
+    """Roles of the files in a folder and in the folders within it, but those of results.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    list of FileRole
+    """
+    inner = [path for path in sorted(folder.iterdir()) if path.is_dir() and path.name[0] != "."]
+    results = [path for path in inner if any((path / name).exists() for name in RESULTS)]
+    places = [folder, *(path for path in inner if path not in results)]
+    files = [path for place in places for path in sorted(place.iterdir()) if path.is_file()]
+    roles = [_role(path) for path in files if path.name[0] != "." and path.suffix != ".toml"]
+    return roles + [FileRole(path, "none", "results of a run") for path in results]
+
+
+def _role(path) -> FileRole:
+    """What one file is by its suffix and its first bytes."""
+    suffix = path.suffix.lower()
+    if suffix in CLOUDS:
+        return _cloud(path)
+    if suffix in MESHES:
+        return FileRole(path, "reference", "a mesh")
+    if suffix in TRAJECTORIES:
+        return FileRole(path, "trajectory", f"its suffix is {path.suffix}")
+    if suffix in TABLES:
+        return FileRole(path, *_table(path))
+    if suffix in RECORDS:
+        return next(_records(path), FileRole(path, "none", "no whole records of SBET or smrmsg"))
+    return FileRole(path, "none", "nothing that a survey.toml names")
+
+
+def _cloud(path):
+    """A cloud, or none with what is wrong in it."""
+    try:
+        layout = read_layout(path)
+    except ValueError as error:
+        return FileRole(path, "none", str(error))
+    return FileRole(path, "cloud", f"{layout.points} points in format {layout.point_format}")
+
+
+def _records(path) -> Iterator[FileRole]:
+    """What a headerless file of float64 may be: its times and angles tell."""
+    kinds: tuple[tuple[Role, tuple[str, ...]], ...]
+    kinds = ("trajectory", SBET_FIELDS), ("accuracy", SMRMSG_FIELDS)
+    for role, fields in kinds:
+        if path.stat().st_size == 0 or path.stat().st_size % (8 * len(fields)):
+            continue
+        table = np.fromfile(path, "<f8", 100 * len(fields)).reshape(-1, len(fields))
+        is_timed = np.isfinite(table).all() and (np.diff(table[:, 0]) > 0).all()
+        is_angle = np.abs(table[:, 1:3]).max() <= 2 * np.pi if role == "trajectory" else True
+        if is_timed and is_angle:
+            name = "SBET" if role == "trajectory" else "smrmsg"
+            yield FileRole(path, role, f"whole {name} records with increasing times")
+
+
+def _table(path) -> tuple[Role, str]:
+    """Role of a table by the names of its columns, or by numbers without names."""
+    header = likely_header(path, TRAJECTORY_NAMES)
+    driven = set(find_meanings(header, TRAJECTORY_NAMES))
+    if len(driven & {"roll", "pitch", "heading"}) > 1:
+        return "trajectory", f"columns {', '.join(sorted(driven))}"
+    header = likely_header(path, CONTROL_NAMES)
+    surveyed = set(find_meanings(header, CONTROL_NAMES))
+    if "name" in surveyed and ({"easting", "northing"} <= surveyed or {"x", "y"} <= surveyed):
+        return "control", f"columns {', '.join(sorted(surveyed))}"
+    if unnamed_columns(header):
+        return "control", "rows of a name and three numbers"
+    if len(header) == 8 and all(map(NUMBER.fullmatch, header)):
+        return "trajectory", "rows of eight numbers, as time, place and quaternion"
+    if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):
+        return "table", f"its columns are {shown(', '.join(header))}"
+    return "none", "no table of places"

@@ -1,0 +1,56 @@
+"""How many lines a scanner drew in a second, by the directions of its beams over time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.survey import PointCloud, Trajectory
+
+
+def line_rate(cloud: PointCloud, trajectory: Trajectory) -> float | None:
+    """Turns a second of the beam about the vehicle's forward axis, where it turns evenly.
+
+    The rate is that by which the angle of the beam, less what it turned, scatters least.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        A run of points with a pose, in any order.
+    trajectory : Trajectory
+
+    Returns
+    -------
+    float or None
+        None where no rate stands out: a swinging mirror, several beams at once, a narrow view.
+        Units: 1/s.
+    """
+    some = cloud[np.abs(cloud.gps_time - np.median(cloud.gps_time)) < SETTINGS.turning_time / 2]
+    some = some[:: max(1, len(some) // SETTINGS.turning_points)]
+    some = some[trajectory.segment(some.gps_time) >= 0]
+    if len(some) < 100:
+        return None
+    pose = trajectory.at(some.gps_time)
+    beam = pose.attitude.inv().apply(some.xyz - pose.position)
+    time, angle = some.gps_time - some.gps_time[0], np.arctan2(beam[:, 2], beam[:, 0])
+    length = float(np.ptp(time))
+    if length < SETTINGS.turning_time / 10:
+        return None
+    step = 0.25 / length
+    lowest, highest = SETTINGS.turning_rates
+    rates = np.arange(lowest, highest, step)
+    rates = np.concatenate([-rates[::-1], rates])
+    evenness = _evenness(rates, time, angle)
+    best = int(np.argmax(evenness))
+    others = np.abs(rates - rates[best]) > 2.0 / length
+    near = rates[best] + np.linspace(-2, 2, 81) * step
+    finest = _evenness(near, time, angle)
+    if 1.0 - finest.max() > SETTINGS.uneven_turn * (1.0 - evenness[others].max()):
+        return None
+    return float(abs(near[np.argmax(finest)]))
+
+
+def _evenness(rates, time, angle):
+    """Length (k,) of the mean direction left by each rate: 1 where it explains all angles."""
+    direction = np.exp(1j * angle)
+    return np.array([abs(np.mean(direction * np.exp(-2j * np.pi * r * time))) for r in rates])

@@ -1,0 +1,252 @@
+"""``init``: a survey.toml of what lies in a folder; what is ambiguous is named, never guessed."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mlscorr.io.folder_roles import FileRole, sort_files
+from mlscorr.io.las import read_chunks
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.output import output_file
+from mlscorr.io.survey_file import FILE_NAME, read_survey
+from mlscorr.io.survey_sections import PlannedSurveyFile
+from mlscorr.io.toml_file import validate
+from mlscorr.pipeline.choice import (
+    Cloud,
+    choose_accuracy,
+    choose_control,
+    choose_crs,
+    choose_trajectory,
+)
+from mlscorr.pipeline.line_rate import line_rate
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.pipeline.survey_text import SurveyText
+from mlscorr.survey import CloudFile, PointCloud, Trajectory
+
+HINT = " What is said in survey.toml is given here as --set 'control.size = 0.6'."
+
+
+@dataclass(frozen=True)
+class StartedSurvey:
+    """A survey.toml that can be read, and what each file of the folder is.
+
+    Parameters
+    ----------
+    path : Path
+        Of the survey.toml to write.
+    text : str
+    roles : tuple of FileRole
+        ``none`` and ``table`` are not used.
+    notes : tuple of str
+        What reading it says.
+    """
+
+    path: Path
+    text: str
+    roles: tuple[FileRole, ...]
+    notes: tuple[str, ...] = ()
+
+    def write(self) -> Path:
+        """Write survey.toml, whole or not at all; returns its path.
+
+        Raises
+        ------
+        ValueError
+            Where there is one.
+        OSError
+        """
+        _check_free(self.path)
+        with output_file(self.path) as part:
+            part.write_text(self.text, encoding="utf-8")
+        return self.path
+
+
+def init(
+    folder: str | Path, out: str | Path | None = None, given: Mapping[str, Any] | None = None
+) -> StartedSurvey:
+    """Say what lies in a folder, and make a survey.toml of it that runs.
+
+    Parameters
+    ----------
+    folder : path
+        With LAS or LAZ files, a trajectory, and control, if there is any.
+    out : path, optional
+        Of the survey.toml, in the folder by default.
+    given : mapping, optional
+        What survey.toml shall say, by sections: goes before what is found.
+
+    Returns
+    -------
+    StartedSurvey
+        Nothing is written yet.
+
+    Raises
+    ------
+    ValueError
+        Where survey.toml is there, where files are missing, ambiguous or do not fit, with what is
+        to be added.
+    """
+    folder, given = Path(folder), given or {}
+    if not folder.is_dir():
+        raise ValueError(f"{folder} is no folder; give the one that holds the clouds.")
+    path = folder / FILE_NAME if out is None else Path(out)
+    _check_free(path)
+    roles = sort_files(folder)
+    try:
+        text, roles = _text(folder, path, given, roles)
+        return StartedSurvey(path, text, tuple(roles), _read_notes(path, text))
+    except ValueError as error:
+        hint = HINT if "survey.toml" in str(error) and "--set" not in str(error) else ""
+        raise ValueError(f"{error}{hint} Nothing was written.") from None
+
+
+def _check_free(path):
+    if path.exists():
+        raise ValueError(f"{path} is there already; move it, or write another with -o FILE.")
+
+
+def _text(folder, path, given, roles):
+    """The text, and the roles with those that are not taken."""
+    _validate(given)
+    clouds = _clouds(folder, given, roles)
+    drive, late = choose_trajectory(
+        _roles(folder, given, "trajectory", roles), clouds, given.get("trajectory", {})
+    )
+    crs, why_crs = choose_crs(clouds, drive, given.get("crs"))
+    accuracy = choose_accuracy([r for r in roles if r.role == "accuracy"], drive, crs)
+    trajectory = drive.read(crs, accuracy)
+    control, points, apart = choose_control(
+        _roles(folder, given, "control", roles), trajectory, given.get("control", {})
+    )
+    refusals = late | apart
+    roles = [replace(role, role="none", reason=refusals[role.path]) if role.path in refusals
+             else role for role in roles]  # fmt: skip
+    text = SurveyText(given)
+    text.put("", "name", folder.resolve().name, "of the folder")
+    if crs is not None:
+        text.put("", "crs", crs, why_crs)
+    else:
+        text.note("", f'crs = "EPSG:..."  of cloud and control: {why_crs}')
+    _put_clouds(text, path, clouds, trajectory)
+    length = float(np.ptp(trajectory.gps_time))
+    text.put("trajectory", "file", _name(path, drive.path),
+             f"{len(trajectory)} epochs, {length:.0f} s")  # fmt: skip
+    if accuracy is not None:
+        text.put("trajectory", "accuracy", _name(path, accuracy), "sigmas of the SBET")
+    if control is not None:
+        text.put("control", "file", _name(path, control), _targets(points))
+    rate = _rate(clouds[0], trajectory)
+    if rate is not None:
+        text.put("scanner", "lines_per_second", round(rate, 1), f"gps_time of {clouds[0].name}")
+    meshes = [role.path for role in roles if role.role == "reference"]
+    if len(meshes) == 1:
+        text.put("scene", "reference", _name(path, meshes[0]), "the only mesh")
+    elif meshes:
+        text.note("scene", f"One of {', '.join(mesh.name for mesh in meshes)}:")
+    return str(text), roles
+
+
+def _validate(given):
+    """Refuse what no survey.toml can say."""
+    document: dict[str, Any] = {"trajectory": {"file": ""}, **given}
+    for section, key in (("trajectory", "file"), ("control", "file"), ("cloud", "files")):
+        if section in given:
+            document[section] = {key: [""] if key == "files" else "", **given[section]}
+    validate("What is given", document, PlannedSurveyFile)
+
+
+def _roles(folder, given, key, roles):
+    """Files that may be of a role: the one that is given, else those that look like it."""
+    name = given.get(key, {}).get("file")
+    if name is not None:
+        if not (folder / name).is_file():
+            raise ValueError(f"{key}.file = {name} is given, and {folder / name} does not exist.")
+        return [FileRole(folder / name, key, "as given")]
+    return [role for role in roles if role.role in (key, "table")]
+
+
+def _clouds(folder, given, roles):
+    """Clouds of a folder. Raises ValueError where one is damaged, or there is none."""
+    names = given.get("cloud", {}).get("files")
+    if names is not None:
+        files = [path for name in names for path in sorted(folder.glob(name))]
+        return [Cloud(read_layout(path)) for path in files] or _no_cloud(folder)
+    damaged = [role.reason for role in roles if role.role == "none"
+               and role.path.suffix.lower() in (".las", ".laz")]  # fmt: skip
+    if damaged:
+        raise ValueError(" ".join(damaged))
+    clouds = [Cloud(read_layout(role.path)) for role in roles if role.role == "cloud"]
+    return clouds or _no_cloud(folder)
+
+
+def _no_cloud(folder):
+    raise ValueError(f"{folder} holds no LAS or LAZ file: add the clouds with their gps_time.")
+
+
+def _put_clouds(text, path, clouds, trajectory):
+    """Files of the clouds, their time systems and passes."""
+    names = [_name(path, cloud.layout.path) for cloud in clouds]
+    patterns = {f"{os.path.dirname(name)}/*{Path(name).suffix}".lstrip("/") for name in names}
+    if len(names) > SETTINGS.listed_files and len(patterns) == 1:
+        there = list(path.parent.glob(next(iter(patterns))))
+        names = sorted(patterns) if len(there) == len(names) else names
+    points = sum(cloud.layout.points for cloud in clouds)
+    spans, passes, systems = [], 0, Counter()
+    for cloud in clouds:
+        match = cloud.match(trajectory, text.given.get("cloud.gps_time", "auto"))
+        times = cloud.times[np.isfinite(cloud.times)] + match.constant
+        segment = trajectory.segment(times)
+        passes += len(set(segment[segment >= 0].tolist()))
+        spans.append((times.min(), times.max()))
+        systems[str(match)] += 1
+    text.put("cloud", "files", names, f"files: {len(clouds)}, points: {points}, passes: {passes}")
+    text.put("cloud", "gps_time", "auto", "; ".join(systems))
+    start, end = np.array(sorted(spans)).T
+    if (end[:-1] - start[1:] > SETTINGS.tile_overlap * (end - start)[:-1]).any():
+        text.note("cloud", "Files overlap in time. Where two scanners wrote them, say which wrote")
+        text.note("cloud", "which under [[scanner]] (docs/survey.md), each with its own mounting.")
+
+
+def _targets(points):
+    """Words on control and check points, and their kinds and sizes."""
+    whole = points.control + points.check
+    kinds = Counter(zip(whole.kind, whole.size.tolist(), strict=True))
+    listed = ", ".join(f"{n} {kind} {size:g} m" for (kind, size), n in kinds.most_common(5))
+    return f"{len(points.control)} control, {len(points.check)} check points: {listed}"
+
+
+def _rate(cloud: Cloud, trajectory: Trajectory) -> float | None:
+    """Lines a second of a cloud, None where they are not seen."""
+    constant, points = cloud.match(trajectory).constant, cloud.layout.points
+    file = CloudFile(cloud.layout.path, points, constant, "")
+    first = max(0, points - SETTINGS.rated_points) // 2
+    run = read_chunks(file, first=first, end=min(points, first + SETTINGS.rated_points))
+    return line_rate(PointCloud.concatenate(list(run)), trajectory)
+
+
+def _name(path, file):
+    """A file as survey.toml names it."""
+    return Path(os.path.relpath(file.resolve(), path.parent.resolve())).as_posix()
+
+
+def _read_notes(path, text):
+    """What reading a survey.toml of this text says. Raises ValueError as read_survey."""
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            survey = read_survey(part)
+    except (ValueError, FileNotFoundError) as error:
+        raise ValueError(str(error).replace(str(part), str(path))) from None
+    finally:
+        part.unlink(missing_ok=True)
+    return (*survey.notes, *(f"Warning: {warning.message}" for warning in caught))

@@ -1,0 +1,108 @@
+"""The text of a survey.toml: what is known with why, what is not known as comments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import tomlkit
+
+COLUMN = 40  # characters, behind which comments start
+HEAD = "# Made by mlscorr init. Lines behind # are not known, or need not be: docs/survey.md."
+OPTIONAL = {
+    "trajectory": ['# accuracy = "smrmsg.out"       # of an SBET without sigmas'],
+    "control": [
+        '# file = "control.csv"          # surveyed targets; without them passes are only tied',
+    ],
+    "mounting": [
+        "# How the scanner stands on the POS, by drawing or calibration; calibrate and diagnose",
+        "# need it, a correction does without.",
+        "# lever_arm = [0.0, 0.0, 0.0]   # m: right, forward, up; from the POS to the scanner",
+        "# boresight = [0.0, 0.0, 0.0]   # deg, [a, b, c]: Rz(c) Ry(b) Rx(a), scanner to body",
+    ],
+    "scanner": [
+        "# range_noise = 0.005           # m, one sigma, of the data sheet",
+        "# angle_noise = 0.001           # deg, likewise",
+        "# lines_per_second = 100        # of the mirror",
+    ],
+    "pos": [
+        "# What is believed where the trajectory has no sigmas: one sigma, of the data sheet.",
+        "# position_sigma = 0.02         # m",
+        "# attitude_sigma = [0.005, 0.005, 0.015]  # deg: roll, pitch, heading",
+        "# correlation_time = 30.0       # s",
+    ],
+    "matching": ["# search_radius = 10.0          # m, how far a target may lie from its point"],
+    "scene": ['# reference = "reference.ply"   # a surface in the same coordinates, for diagnose'],
+}
+
+
+class SurveyText:
+    """Lines of a survey.toml by section, in the order of docs/survey.md.
+
+    Parameters
+    ----------
+    given : mapping
+        What the user says: goes before all that is put, and is written though nothing is put.
+    """
+
+    def __init__(self, given: Mapping[str, Any]):
+        self.given = _flat(given)
+        names = ("", "cloud", *OPTIONAL)
+        self.lines: dict[str, list[str]] = {name: [] for name in names}
+        self.keys: dict[str, set[str]] = {name: set() for name in names}
+
+    def put(self, section: str, key: str, value: object, reason: str) -> None:
+        """Write a key with its value and why, unless the user gave it.
+
+        Parameters
+        ----------
+        section : str
+            Empty for the first.
+        key : str
+        value : object
+            What TOML holds.
+        reason : str
+        """
+        dotted = f"{section}.{key}" if section else key
+        if dotted in self.given:
+            value, reason = self.given.pop(dotted), "as given"
+        self.keys.setdefault(section, set()).add(key)
+        line = f"{key} = {tomlkit.item(value).as_string()}"
+        self.lines.setdefault(section, []).append(f"{line:<{COLUMN - 1}} # {_shown(reason)}")
+
+    def note(self, section: str, sentence: str) -> None:
+        """Write a comment.
+
+        Parameters
+        ----------
+        section, sentence : str
+        """
+        self.lines[section].append(f"# {_shown(sentence)}")
+
+    def __str__(self) -> str:
+        for dotted in list(self.given):
+            section, _, key = dotted.rpartition(".") if dotted.count(".") < 2 else (
+                dotted.split(".")[0], "", dotted.split(".", 1)[1])  # fmt: skip
+            self.put(section, key, self.given[dotted], "")
+        parts = [HEAD, *self.lines.pop("")]
+        for section, lines in self.lines.items():
+            keys = self.keys.get(section, set())
+            unknown = [
+                line for line in OPTIONAL.get(section, ()) if line[2:].split(" =")[0] not in keys
+            ]
+            parts += ["", f"[{section}]" if keys else f"# [{section}]", *lines, *unknown]
+        return "\n".join(parts) + "\n"
+
+
+def _flat(given, prefix=""):
+    """Dotted keys of nested tables."""
+    flat = {}
+    for key, value in given.items():
+        dotted = f"{prefix}{key}"
+        flat |= _flat(value, f"{dotted}.") if isinstance(value, Mapping) else {dotted: value}
+    return flat
+
+
+def _shown(sentence):
+    """A sentence as a comment may hold it: one line."""
+    return "".join(c if c.isprintable() else " " for c in sentence)

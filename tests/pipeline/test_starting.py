@@ -1,0 +1,352 @@
+"""A folder in, a survey.toml that runs out; or a sentence on what is ambiguous and what to add."""
+
+import re
+import tomllib
+
+import laspy
+import numpy as np
+import pyproj
+import pytest
+from typer.testing import CliRunner
+
+import mlscorr
+from mlscorr.cli import app
+from mlscorr.pipeline.line_rate import line_rate
+from mlscorr.pipeline.survey_text import SurveyText
+from mlscorr.survey import PointCloud
+
+START, EAST, NORTH = 413_200.0, 532_000.0, 3_374_000.0
+WEEK = 604_800.0 * 2300
+HEADER = "gps_time,easting,northing,height,roll,pitch,heading\n"
+CONTROL = "name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role\n"
+POINTS = [("T01", 12.5, -8.5, 44.4), ("T02", 60.0, 8.2, 42.5), ("C01", 90.0, 8.1, 42.6)]
+
+
+def trajectory(start=START, seconds=40.0, row="{:.3f},{:.4f},3374000,42,0.1,-0.2,90.0"):
+    times = start + np.arange(0.0, seconds, 0.1)
+    return "\n".join(row.format(t, EAST + 5 * (t - start)) for t in times) + "\n"
+
+
+def control(form="{},{:.3f},{:.3f},{:.3f},0.003,0.004,circle,0.6,{}", swap=False):
+    rows = [(name, EAST + e, NORTH + n, h) for name, e, n, h in POINTS]
+    rows = [(name, n, e, h) if swap else (name, e, n, h) for name, e, n, h in rows]
+    roles = ["check" if row[0][0] == "C" else "control" for row in rows]
+    return "".join(form.format(*row, role) + "\n" for row, role in zip(rows, roles, strict=True))
+
+
+def write_cloud(path, crs=None, start=START + 2.0, standard=False):
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = [0.001] * 3, [EAST, NORTH, 0.0]
+    header.global_encoding.gps_time_type = laspy.header.GpsTimeType(int(standard))
+    if crs:
+        wkt = pyproj.CRS.from_user_input(crs).to_wkt("WKT1_GDAL")
+        header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
+        header.global_encoding.wkt = True
+    las = laspy.LasData(header)
+    las.xyz = np.array([EAST, NORTH, 40.0]) + np.outer(np.arange(100), [1.0, 0.1, 0.0])
+    las.gps_time = np.linspace(start, start + 15.0, 100) + (WEEK - 1e9) * standard
+    las.write(path)
+
+
+def write_sbet(path, start=START, east=EAST):
+    "A drive of 40 s, projected back to latitudes and longitudes"
+    times = start + np.arange(0.0, 40.0, 0.05)
+    back = pyproj.Transformer.from_crs("EPSG:32650", "EPSG:4326", always_xy=True)
+    longitude, latitude = back.transform(east + 5 * (times - start), np.full(len(times), NORTH))
+    record = np.zeros((len(times), 17))
+    record[:, 0], record[:, 3] = times, 42.0
+    record[:, 1], record[:, 2] = np.radians(latitude), np.radians(longitude)
+    record[:, 9] = np.radians(90.0)
+    record.tofile(path)
+
+
+def write_smrmsg(path):
+    record = np.full((42, 10), 0.02)
+    record[:, 0] = START - 1.0 + np.arange(42)
+    record.tofile(path)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    "Clouds of two passes in UTM zone 50, a trajectory, control"
+    write_cloud(tmp_path / "pass-1.las", "EPSG:32650")
+    write_cloud(tmp_path / "pass-2.las", "EPSG:32650", START + 20.0, standard=True)
+    (tmp_path / "trajectory.csv").write_text(HEADER + trajectory())
+    (tmp_path / "control.csv").write_text(CONTROL + control())
+    return tmp_path
+
+
+def read(folder):
+    return tomllib.loads((folder / "survey.toml").read_text())
+
+
+# ---- folders that say enough
+
+
+def test_a_folder_of_our_own_files_becomes_a_survey(folder):
+    "Clouds, CRS, trajectory and control are named with their reasons, and the survey can be read"
+    started = mlscorr.init(folder)
+    assert not (folder / "survey.toml").exists()
+    assert started.write() == folder / "survey.toml"
+    assert read(folder) == {
+        "name": folder.name,
+        "crs": "EPSG:32650",
+        "cloud": {"files": ["pass-1.las", "pass-2.las"], "gps_time": "auto"},
+        "trajectory": {"file": "trajectory.csv"},
+        "control": {"file": "control.csv"},
+    }
+    survey = mlscorr.read_survey(folder)
+    assert (survey.control.name, survey.check.name) == (("T01", "T02"), ("C01",))
+    for words in (
+        "by the VLRs of pass-1.las",
+        "passes: 2",
+        "adjusted standard GPS time",
+        "3 circle",
+    ):
+        assert words in started.text
+    assert "# lever_arm" in started.text and "# boresight" in started.text
+    assert {role.path.name: role.role for role in started.roles} == {
+        "pass-1.las": "cloud",
+        "pass-2.las": "cloud",
+        "trajectory.csv": "trajectory",
+        "control.csv": "control",
+    }
+
+
+def test_an_sbet_gives_the_zone_where_no_cloud_states_a_crs(folder):
+    "SBET and smrmsg under the suffix .out are told by their content; the UTM zone is the drive's"
+    for name in ("pass-1.las", "pass-2.las"):
+        (folder / name).unlink()
+    write_cloud(folder / "pass-1.las")
+    (folder / "trajectory.csv").unlink()
+    write_sbet(folder / "export_Mission 1.out")
+    write_smrmsg(folder / "smrmsg_Mission 1.out")
+    text = mlscorr.init(folder).text
+    document = tomllib.loads(text)
+    assert document["crs"] == "EPSG:32650"
+    assert document["trajectory"] == {
+        "file": "export_Mission 1.out",
+        "accuracy": "smrmsg_Mission 1.out",
+    }
+    assert "UTM zone of export_Mission 1.out" in text
+
+
+def test_lists_of_a_total_station_are_control(folder):
+    "A list by German names, of which the sizes stand in survey.toml, beside a README"
+    (folder / "control.csv").unlink()
+    rows = control("{};{:.3f};{:.3f};{:.3f}").replace(".", ",")
+    (folder / "Festpunkte.txt").write_text("Punkt;Rechtswert;Hochwert;Höhe\n" + rows)
+    (folder / "README.txt").write_text("Scanned on Monday, with Peter, in the rain.\n")
+    given = {"control": {"kind": "circle", "size": 0.6, "sigma": [0.003, 0.004], "check": ["C*"]}}
+    started = mlscorr.init(folder, given=given)
+    assert tomllib.loads(started.text)["control"] == {"file": "Festpunkte.txt", **given["control"]}
+    assert [r.role for r in started.roles if r.path.name == "README.txt"] == ["none"]
+
+
+def test_clouds_in_a_folder_of_their_own_are_a_pattern(folder):
+    "Six tiles are one pattern; results of an earlier run are no input; a mesh is the reference"
+    (folder / "las").mkdir()
+    for name in ("pass-1.las", "pass-2.las"):
+        (folder / name).unlink()
+    for i in range(6):
+        write_cloud(folder / "las" / f"tile {i}.las", "EPSG:32650", START + 2.0 + i)
+    (folder / "corrected").mkdir()
+    write_cloud(folder / "corrected" / "tile 0.las")
+    (folder / "corrected" / "report.json").write_text("{}")
+    (folder / "street.ply").write_text("ply\nelement face 2\nend_header\n")
+    started = mlscorr.init(folder)
+    document = tomllib.loads(started.text)
+    assert document["cloud"]["files"] == ["las/*.las"]
+    assert document["scene"] == {"reference": "street.ply"}
+    assert "Files overlap in time" in started.text
+
+
+def test_a_trajectory_of_another_day_is_not_taken(folder):
+    "Of two trajectories that which covers the clouds is; the other is said not to"
+    (folder / "yesterday.csv").write_text(HEADER + trajectory(START - 86_400.0))
+    started = mlscorr.init(folder)
+    assert tomllib.loads(started.text)["trajectory"]["file"] == "trajectory.csv"
+    reason = next(r.reason for r in started.roles if r.path.name == "yesterday.csv")
+    assert reason.startswith("None of the sampled times")
+
+
+def test_control_of_another_town_is_not_taken(folder):
+    "Of two lists that near the trajectory is"
+    (folder / "other.csv").write_text(CONTROL + control().replace(",53", ",93"))
+    started = mlscorr.init(folder)
+    assert tomllib.loads(started.text)["control"]["file"] == "control.csv"
+    assert any("km from it" in role.reason for role in started.roles)
+
+
+def test_a_folder_without_control_has_none(folder):
+    "Ties need none: the section stays a comment"
+    (folder / "control.csv").unlink()
+    text = mlscorr.init(folder).text
+    assert "control" not in tomllib.loads(text)
+    assert "# [control]" in text
+
+
+# ---- folders that do not
+
+
+def photos(folder):
+    (folder / "control.csv").unlink()
+    (folder / "photos.csv").write_text("image,taken\na.jpg,12:00\nb.jpg,12:01\n")
+
+
+def dates(folder):
+    rows = trajectory(row="2023-05-01 10:00:{:09.3f},{:.4f},3374000,42,0.1,-0.2,90.0")
+    (folder / "trajectory.csv").write_text(HEADER + rows)
+
+
+def other_zone(folder):
+    (folder / "trajectory.csv").unlink()
+    write_sbet(folder / "a.sbet", east=EAST + 2e6)
+
+
+def write(name, text):
+    return lambda folder: (folder / name).write_text(text)
+
+
+def remove(name):
+    return lambda folder: (folder / name).unlink()
+
+
+AMBIGUOUS = {
+    "two trajectories": (
+        write("smoothed.csv", HEADER + trajectory()),
+        ["2 files may be the trajectory", "smoothed.csv", "--set 'trajectory.file = "],
+    ),
+    "a trajectory by other names": (
+        write(
+            "trajectory.csv",
+            HEADER.replace("roll,pitch,heading", "wx,wy,wz").replace("gps_time", "tick")
+            + trajectory(),
+        ),
+        ["No file looks like", "trajectory.csv .its columns are tick", "trajectory.columns"],
+    ),
+    "no trajectory": (remove("trajectory.csv"), ["No file looks like a trajectory", "gps_time"]),
+    "trajectory of another day": (
+        write("trajectory.csv", HEADER + trajectory(START + 86_400.0)),
+        ["None of the sampled times of pass-1.las"],
+    ),
+    "dates for seconds": (dates, ["trajectory.csv", "2023-05-01", "where a number belongs"]),
+    "SBET of another zone": (other_zone, ["VLRs of pass-1.las", "disagree|another CRS"]),
+    "two lists": (
+        write("check.csv", CONTROL + control()),
+        ["2 files may be the control", "check.csv", "--set 'control.file = "],
+    ),
+    "no control but a table": (
+        photos,
+        ["photos.csv is neither", "image, taken", "easting, northing, height"],
+    ),
+    "axes exchanged": (
+        write("control.csv", CONTROL + control(swap=True)),
+        ["Easting and northing seem to be swapped"],
+    ),
+    "X and Y far away": (
+        write("control.csv", "Pt,X,Y,Z\nP1,10.0,20.0,3.0\nP2,15.0,25.0,3.0\n"),
+        ["control.kind|kind = ", "--set 'control.size = 0.6'"],
+    ),
+    "sizes unknown": (
+        write("control.csv", "Pt,E,N,H\n" + control("{},{:.3f},{:.3f},{:.3f}")),
+        ["no column .*kind, size", "--set 'control.size = 0.6'"],
+    ),
+    "two heights": (
+        write(
+            "control.csv",
+            CONTROL.replace("height", "Elevation,H-Ell")
+            + control("{},{:.3f},{:.3f},{:.3f},50.0,0.003,0.004,circle,0.6,{}"),
+        ),
+        ["2 columns that may be the height", "Elevation", "--set"],
+    ),
+    "clouds of two zones": (
+        lambda folder: write_cloud(folder / "pass-3.las", "EPSG:32649"),
+        ["VLRs of pass-3.las", "EPSG:32649", "km apart"],
+    ),
+    "a cut cloud": (
+        lambda folder: (folder / "pass-2.las").write_bytes(
+            (folder / "pass-2.las").read_bytes()[:-500]
+        ),
+        ["pass-2.las", "cut off"],
+    ),
+    "no cloud": (
+        lambda folder: [(folder / f"pass-{i}.las").unlink() for i in (1, 2)],
+        ["no LAS or LAZ file"],
+    ),
+    "survey.toml is there": (write("survey.toml", "# mine"), ["is there already"]),
+}
+
+
+@pytest.mark.parametrize(("spoil", "words"), AMBIGUOUS.values(), ids=AMBIGUOUS)
+def test_what_is_ambiguous_is_named_and_nothing_written(spoil, words, folder):
+    "Exit code 2, one sentence with what to add, and the folder as it was"
+    spoil(folder)
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    result = CliRunner().invoke(app, ["init", str(folder)])
+    assert result.exit_code == 2, result.stderr
+    last = result.stderr.splitlines()[-1]
+    assert last.startswith("Error: ") and "Traceback" not in result.stderr
+    for pattern in words:
+        assert re.search(pattern, last), last
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_what_is_said_decides(folder):
+    "--set names one of two trajectories, and values that no file holds; text needs no quotes"
+    (folder / "smoothed.csv").write_text(HEADER + trajectory())
+    (folder / "control.csv").write_text("Pt,E,N,H\n" + control("{},{:.3f},{:.3f},{:.3f}"))
+    sets = ("trajectory.file = smoothed.csv", "control.kind=square", "control.size = 0.4",
+            "control.sigma = [0.01, 0.01]", "pos.position_sigma = 0.1")  # fmt: skip
+    arguments = [argument for line in sets for argument in ("--set", line)]
+    out = folder / "other.toml"
+    result = CliRunner().invoke(app, ["init", str(folder), "-o", str(out), *arguments])
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr.splitlines()[-1].startswith(f"Written: {out}")
+    survey = mlscorr.read_survey(out)
+    assert survey.control.kind == ("square",) * 3
+    assert survey.pos.position_sigma == 0.1
+    assert tomllib.loads(out.read_text())["trajectory"]["file"] == "smoothed.csv"
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [("control.sizes = 0.6", "nearest known one is control.size"), ("= 3", "takes a key")],
+)
+def test_what_no_survey_can_say_is_refused(line, words, folder):
+    "An unknown key is named with the nearest one"
+    result = CliRunner().invoke(app, ["init", str(folder), "--set", line])
+    assert result.exit_code == 2 and words in result.stderr
+
+
+def test_names_of_files_are_quoted():
+    "Quotation marks, blanks and breaks in values and reasons leave the text whole"
+    text = SurveyText({})
+    text.put("", "name", 'a "b"\nc', "of\nd")
+    text.put("control", "file", "für Müller.csv", "")
+    document = tomllib.loads(str(text))
+    assert document == {"name": 'a "b"\nc', "control": {"file": "für Müller.csv"}}
+
+
+# ---- lines a second
+
+
+def test_the_rate_of_lines_is_seen_in_directions_over_time(folder):
+    "A beam that turns 90 times a second, half of it met: the rate to 0.1; a swinging one: none"
+    drive = mlscorr.init(folder)
+    drive.write()
+    survey = mlscorr.read_survey(folder)
+    time = START + 10.0 + np.arange(0.0, 0.5, 1e-5)
+    pose = survey.trajectory.at(time)
+
+    def cloud(angle):
+        beam = 10.0 * np.column_stack([np.cos(angle), np.zeros(len(time)), np.sin(angle)])
+        xyz = pose.position + pose.attitude.apply(beam)
+        return PointCloud(xyz, time, np.zeros(len(time)))
+
+    turning = 2 * np.pi * 90.0 * (time - START)
+    low = cloud(turning)[np.sin(turning) < 0]
+    assert line_rate(low, survey.trajectory) == pytest.approx(90.0, abs=0.1)
+    swinging = cloud(-np.pi / 2 + 0.5 * np.sin(turning))
+    assert line_rate(swinging, survey.trajectory) is None
+    assert line_rate(low[:50], survey.trajectory) is None
