@@ -38,6 +38,7 @@ def commanded(street, tmp_path_factory):
     folder = tmp_path_factory.mktemp("öffentliche Straße")
     shutil.copytree(street, folder / "Erste Fahrt")
     command = [MLSCORR, "correct", "Erste Fahrt/survey.toml", "-o", "out/für Müller", "--json"]
+    command += ["--trajectory", "drive.sbet", "--trajectory", "drive.tum"]
     process = subprocess.run(command, capture_output=True, text=True, cwd=folder)
     return process, folder / "out" / "für Müller"
 

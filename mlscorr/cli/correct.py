@@ -39,6 +39,13 @@ def correct(
     no_report: Annotated[
         bool, typer.Option("--no-report", help="Leave out report.html and the pictures: faster.")
     ] = False,
+    trajectory: Annotated[
+        list[str],
+        typer.Option(
+            help="A further file for the corrected trajectory, in OUT: NAME.sbet (with its smrmsg) "
+            "or NAME.tum."
+        ),
+    ] = (),
     fail_if: Annotated[
         list[str],
         typer.Option(
@@ -54,7 +61,9 @@ def correct(
     """Correct the cloud of a survey with its control points, and report on it."""
     with exit_code(Exit.USAGE):
         from mlscorr.evaluate.quality import failures, read_gate
+        from mlscorr.io.trajectory_exports import check_exports
 
+        check_exports(trajectory)
         gates = [read_gate(text) for text in fail_if]
         if no_ties and ties_only:
             raise ValueError("--no-ties and --ties-only leave nothing to correct with: give one.")
@@ -62,9 +71,12 @@ def correct(
         recorded = mlscorr.read_survey(survey)
         for sentence in recorded.layouts:
             say(sentence)
+        check_exports(trajectory, recorded.crs, is_read=True)
         ties = "off" if no_ties else "only" if ties_only else None
         result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
-        report = result.write(out, overwrite, progress, sigma, page=not no_report)
+        report = result.write(
+            out, overwrite, progress, sigma, page=not no_report, trajectories=trajectory
+        )
     tell(report, out, as_json)
     outside = report["coverage"]["points_outside_trajectory"]
     if outside:

@@ -189,6 +189,50 @@ def convergence_at(crs: str, easting: np.ndarray, northing: np.ndarray) -> np.nd
     )
 
 
+def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Latitude, longitude and ellipsoidal height of places on the map, and their convergence.
+
+    Parameters
+    ----------
+    crs : str
+        See check_crs.
+    position : (n, 3) array
+        Units: m.
+
+    Returns
+    -------
+    place : dict
+        latitude, longitude (rad) and height (m), each (n,).
+    convergence : (n,) array
+        Units: rad.
+
+    Raises
+    ------
+    ValueError
+        Where a grid is missing, or the CRS does not reach.
+    """
+    from pyproj import Transformer
+    from pyproj.exceptions import ProjError
+
+    projected = check_crs(crs)
+    try:
+        transformer = Transformer.from_crs(
+            projected,
+            projected.geodetic_crs.to_3d(),
+            always_xy=True,
+            only_best=True,
+            allow_ballpark=False,
+        )
+        easting, northing, height = position.T
+        longitude, latitude, height = transformer.transform(
+            easting, northing, height, errcheck=True
+        )
+    except ProjError as error:
+        raise ValueError(f"{crs} can't be left for latitude and longitude: {error}") from None
+    place = {"latitude": np.radians(latitude), "longitude": np.radians(longitude)}
+    return place | {"height": height}, convergence_at(crs, *position[:, :2].T)
+
+
 def _map(crs):
     """The horizontal part of a projected CRS."""
     from pyproj import Proj

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +22,7 @@ from mlscorr.io.las import sha256
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_targets_csv
 from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.io.trajectory_exports import check_exports, export_trajectory
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.tying import TieUse, estimate_survey
@@ -165,6 +166,7 @@ class CorrectedSurvey:
         progress: Callable | None = None,
         sigma: bool = False,
         page: bool = True,
+        trajectories: Sequence[str] = (),
     ) -> dict:
         """Write corrected clouds, trajectory, targets and report into a folder.
 
@@ -180,6 +182,9 @@ class CorrectedSurvey:
         page : bool
             Draw report.html and the pictures too, which takes longer than all else where the
             survey is short.
+        trajectories : sequence of str
+            Further files for the corrected trajectory: NAME.sbet or NAME.out with its smrmsg, or
+            NAME.tum.
 
         Returns
         -------
@@ -195,11 +200,17 @@ class CorrectedSurvey:
         """
         from mlscorr.report import headline
 
+        check_exports(trajectories, self.survey.crs, is_read=True)
         with output_folder(out, self.survey.inputs, overwrite) as folder:
             files, uncontrolled = self._write_clouds(folder, progress or silent, sigma)
             write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
+            exports = [
+                name
+                for export in trajectories
+                for name in export_trajectory(folder / export, self.trajectory, self.survey.crs)
+            ]
             write_targets_csv(folder / "targets.csv", [row.document() for row in self.targets])
-            report = self._report(folder, files, uncontrolled)
+            report = self._report(folder, files, uncontrolled, exports)
             content = document("report", {"headline": headline(report), **report.document()})
             write_json(folder / "report.json", content)
             if page:
@@ -251,7 +262,7 @@ class CorrectedSurvey:
         files = write_clouds(self.survey, folder, self.estimate.correction, watch, sigmas)
         return files, uncontrolled.tolist()
 
-    def _report(self, folder, files, uncontrolled):
+    def _report(self, folder, files, uncontrolled, exports):
         """The CorrectionReport, once all that it names stands in the folder."""
         from mlscorr.report.correction_report import CorrectionReport, Coverage, FileRow
 
@@ -262,7 +273,8 @@ class CorrectedSurvey:
         longest = float(np.diff(epochs if len(epochs) else self.estimate.span).max(initial=0.0))
         outside, total = (sum(file[k] for file in files) for k in (2, 1))
         span, support = self.estimate.span, self.estimate.support
-        outputs = ("corrected trajectory", "trajectory.csv"), ("targets", "targets.csv")
+        names = ["trajectory.csv", *exports]
+        outputs = [*(("corrected trajectory", name) for name in names), ("targets", "targets.csv")]
         return CorrectionReport(
             name=self.survey.name,
             crs=self.survey.crs,

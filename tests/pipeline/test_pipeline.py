@@ -233,6 +233,19 @@ def test_the_corrected_trajectory_can_be_read_again(corrected):
     assert np.degrees(turned.max()) < 1e-6
 
 
+def test_further_files_hold_the_corrected_trajectory(commanded, corrected):
+    "--trajectory writes an SBET with its smrmsg and TUM's quaternions, and the report lists them"
+    out, expected = commanded[1], corrected[0].trajectory
+    outputs = [file["name"] for file in read_json(out)["outputs"]]
+    names = ["drive.sbet", "smrmsg_drive.out", "drive.tum"]
+    assert outputs == ["trajectory.csv", *names, "targets.csv"]
+    sbet = read_trajectory(out / names[0], corrected[0].survey.crs, out / names[1])
+    for written in (sbet, read_trajectory(out / names[2])):
+        assert np.abs(written.position - expected.position).max() < 2e-5
+        assert np.degrees((written.attitude * expected.attitude.inv()).magnitude().max()) < 1e-6
+    assert np.abs(sbet.position_sigma - expected.position_sigma).max() < 1e-12
+
+
 def test_targets_csv_says_the_same_as_the_report(corrected):
     "One row for each target and pass, misclosures to 0.1 mm"
     _, out, report = corrected
