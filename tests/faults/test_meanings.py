@@ -190,6 +190,12 @@ ESTIMATED = {
     ),
 }
 
+CHECKED = {  # what a check says in words of its own
+    "heights over another ellipsoid or geoid": "geoid undulation",
+    "heights of control in feet": "or feet",
+    "radii for sizes": "look like radii",
+}
+
 
 def said(folder):
     "All that a correction says, in refusing or doing its work"
@@ -201,6 +207,30 @@ def said(folder):
         except ValueError as refusal:
             error = str(refusal)
     return "\n".join([error, *(str(warning.message) for warning in told)])
+
+
+def checked(folder):
+    "All that a check says"
+    result = mlscorr.check(folder)
+    return "\n".join([*(fault.sentence for fault in result.faults), *result.warnings])
+
+
+@pytest.mark.skipif(not IS_FULL, reason="in make faults")
+def test_a_check_names_them_before(tiny, tmp_path, record_property):
+    "What a correction says of a file's meaning, a check says too, or the cause in its own words"
+    rng, number, unnamed = np.random.default_rng(19), 0, Counter()
+    for kind, (draw, expected) in (READ | ESTIMATED).items():
+        shutil.rmtree(tmp_path / "survey", ignore_errors=True)
+        folder = shutil.copytree(tiny, tmp_path / "survey")
+        draw(rng)(folder)
+        number += 1
+        if (
+            re.search(f"{expected}|{CHECKED.get(kind, expected)}", checked(folder), re.DOTALL)
+            is None
+        ):
+            unnamed[kind] += 1
+    record_property("faults of meaning named by a check", f"{number}, unnamed {dict(unnamed)}")
+    assert not unnamed
 
 
 @pytest.mark.parametrize("kinds", [READ, ESTIMATED], ids=["read", "estimated"])
