@@ -27,7 +27,7 @@ PLACE_NAMES = {
 }
 CONTROL_NAMES = PLACE_NAMES | {
     "name": "id no nr n° num number point pointid pointname pointno pointnr pointnumber pt ptid "
-    "ptname ptno ptnr pnt station punkt punktnr punktnummer punktname punktid pkt pktnr pktname "
+    "ptname ptno ptnr pnt punkt punktnr punktnummer punktname punktid pkt pktnr pktname "
     "pnr bezeichnung nummer nom numéro numero matricule punto nombre 点号 点名 点 编号 名称",
     "sigma": "σ std stdev sd accuracy genauigkeit standardabweichung écarttype ecarttype "
     "precision précision precisión 中误差 精度",
@@ -35,10 +35,10 @@ CONTROL_NAMES = PLACE_NAMES | {
     "horizontalprecision horizontalaccuracy lagegenauigkeit 平面精度 平面中误差",
     "sigma_vertical": "sigmaz sigmahöhe cq1d 1dcq vrms vprec vacc elevationrms verticalprecision "
     "verticalaccuracy höhengenauigkeit 高程精度 高程中误差",
-    "kind": "shape targetkind targettype zielart art forme forma 形状 标靶类型",
+    "kind": "shape targetkind targettype zielart forme forma 形状 标靶类型",
     "size": "diameter größe groesse durchmesser kantenlänge taille diamètre tamaño diámetro "
     "尺寸 大小 直径 边长",
-    "role": "use usage rolle verwendung rôle rol uso 角色 用途",
+    "role": "rolle rôle rol 角色",
     "normal_e": "",
     "normal_n": "",
     "normal_h": "",

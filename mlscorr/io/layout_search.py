@@ -60,7 +60,8 @@ def find_layout(
         sheets that hold a table.
     """
     path, chosen = Path(path), dict(chosen or {})
-    if chosen and all(isinstance(column, int) for column in chosen.values()):
+    is_numbered = any(isinstance(column, int) for column in chosen.values())
+    if is_numbered:
         positions = {name: int(number) - 1 for name, number in chosen.items()}
         if missing := lacking(positions):
             raise ValueError(
@@ -72,7 +73,7 @@ def find_layout(
         layouts = []
         for start, rows in _candidates(path, encoding):
             layout = _layout_of(replace(start, path=path), rows, names, lacking, chosen)
-            layout = layout or _unnamed_layout(start, rows, chosen, unnamed)
+            layout = layout or _unnamed_layout(start, rows, is_numbered, unnamed)
             if layout is not None:
                 layouts.append(layout)
                 if layout.sheet is None:
@@ -141,6 +142,7 @@ def _layout_of(start, rows, names, lacking, chosen):
                     f'({", ".join(doubled)}): choose, as {name} = "{doubled[0]}" under '
                     "[control.columns] or [trajectory.columns] in survey.toml."
                 )
+        check_chosen(start.path, set(chosen) - set(meanings), chosen)
         columns = {name: positions[0] for name, positions in meanings.items()}
         layout = replace(start, header=tuple(cells), lines=number, columns=columns)
         below = [row for row in rows[place + 1 :] if not is_comment(row[1])]
@@ -152,10 +154,32 @@ def _layout_of(start, rows, names, lacking, chosen):
     return None
 
 
-def _unnamed_layout(start, rows, chosen, unnamed):
+def check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str | int]) -> None:
+    """Refuse columns that survey.toml names and the table does not have.
+
+    Parameters
+    ----------
+    path : Path
+    missing : collection of str
+        Our names.
+    chosen : mapping
+        See find_layout.
+
+    Raises
+    ------
+    ValueError
+        Names the first.
+    """
+    for name in sorted(set(missing) & set(chosen)):
+        raise ValueError(
+            f"{path} has no column '{chosen[name]}', which survey.toml names the {name}."
+        )
+
+
+def _unnamed_layout(start, rows, is_numbered, unnamed):
     """The layout of a table without a header: its first row, or the first with what was chosen."""
     rows = [row for row in rows if not (row[1] and row[1][0].startswith(COMMENT_MARKS))]
-    for place, (number, cells) in enumerate(rows if chosen else rows[:1]):
+    for place, (number, cells) in enumerate(rows if is_numbered else rows[:1]):
         columns = unnamed(cells)
         if columns:
             layout = replace(start, lines=number - 1, columns=dict(columns))

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mlscorr.io.column_names import plain
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.text_files import ENCODING, shown
 
@@ -49,11 +50,17 @@ class TableLayout:
     def __str__(self) -> str:
         """What was understood, without a full stop."""
         places = sorted(self.columns.items(), key=lambda item: item[1])
-        meanings = ", ".join(f"{name} = {self.name_of(name)}" for name, _ in places)
+        names = {name: self.name_of(name) for name, _ in places}
+        parts = [
+            f"{name} = {other}" for name, other in names.items() if plain(other) != plain(name)
+        ]
+        identical = [name for name, other in names.items() if plain(other) == plain(name)]
+        parts += [f"{', '.join(identical)} by name"] * bool(identical)
         parted = f"sheet {shown(self.sheet)}" if self.sheet else SEPARATORS[self.separator]
         letters = "" if self.encoding == ENCODING else f", letters of {ENCODINGS[self.encoding]}"
         sign = "comma" if self.decimal == "," else "point"
-        return f"{self.path.name} was read as {meanings} ({parted}, decimal {sign}{letters})"
+        form = f"{parted}, decimal {sign}{letters}"
+        return f"{self.path.name} was read as {', '.join(parts)} ({form})"
 
     def name_of(self, column: str) -> str:
         """What a column is called in the table, or its number from 1.

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.column_names import find_meanings
-from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
+from mlscorr.io.layout_search import NUMBER, check_chosen, find_layout, likely_header
 from mlscorr.io.layouts import TableLayout, not_text
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
@@ -139,6 +139,7 @@ def read_layout(
         meanings = find_meanings(header, names, chosen)
         used = {header[i] for positions in meanings.values() for i in positions}
         missing = lacking(meanings)
+        check_chosen(path, missing, chosen or {})
         ways_out = "".join(
             way_out
             for (name, other), way_out in (hints or {}).items()

@@ -44,12 +44,12 @@ LISTS = {  # what writes such a file: content, its letters, and what is understo
     "Leica, header behind a comment mark": (
         "# Infinity 4.1\n# Point Id\tEasting\tNorthing\tOrthometric Height\n"
         "P1\t532012.49\t3373991.48\t44.48\n# P9\t1\t2\t3\n\nP2\t532030.0\t3373978.17\t44.5\n",
-        "utf-8", "name = Point Id, easting = Easting",
+        "utf-8", "name = Point Id, height = Orthometric Height, easting, northing by name (tabs",
     ),
     "Trimble, northing first": (
         "\ufeffPoint ID,Northing,Easting,Elevation,Code\n"
         "P1,3373991.48,532012.49,44.48,\nP2,3373978.17,532030.0,44.5,x\n",
-        "utf-8", "northing = Northing, easting = Easting, height = Elevation (commas",
+        "utf-8", "height = Elevation, northing, easting by name (commas",
     ),
     "German office, letters of Windows": (
         "Punktnr.;Rechtswert;Hochwert;Höhe\nP1;532012,49;3373991,48;44,48\n"
@@ -149,6 +149,9 @@ def test_survey_toml_chooses_columns(columns, drive, tmp_path):
         read(tmp_path, content, drive)
     points = read(tmp_path, content, drive, columns=columns)
     assert points.control.position.tolist() == PLACES[:1]
+    for name in ("height", "size"):
+        with pytest.raises(ValueError, match=f"no column 'Elevatoin', .* names the {name}"):
+            read(tmp_path, content, drive, columns={"height": "Elevation", name: "Elevatoin"})
 
 
 P1 = "P1;532012,49;3373991,48;44,48\n"
