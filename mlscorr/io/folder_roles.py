@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings
-from mlscorr.io.control_lists import unnamed_columns
+from mlscorr.io.control_lists import lacking, unnamed_columns
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.layout_search import NUMBER, likely_header
+from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.text_files import shown
 
@@ -108,8 +108,11 @@ def _table(path) -> tuple[Role, str]:
     surveyed = set(find_meanings(header, CONTROL_NAMES))
     if "name" in surveyed and ({"easting", "northing"} <= surveyed or {"x", "y"} <= surveyed):
         return "control", f"columns {', '.join(sorted(surveyed))}"
-    if unnamed_columns(header):
-        return "control", "rows of a name and three numbers"
+    try:  # in other encodings, or without names
+        if find_layout(path, CONTROL_NAMES, lacking, {}, unnamed_columns) is not None:
+            return "control", "rows of a name and three coordinates"
+    except ValueError as error:  # has the columns, and is not clear
+        return "control", str(error)
     if len(header) == 8 and all(map(NUMBER.fullmatch, header)):
         return "trajectory", "rows of eight numbers, as time, place and quaternion"
     if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):

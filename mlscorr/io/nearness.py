@@ -61,6 +61,43 @@ def _feet(position, trajectory):
     return ""
 
 
+def far_cloud(name: str, box: np.ndarray, trajectory: Trajectory) -> tuple[str, bool]:
+    """A sentence on a cloud far from the trajectory, and whether it says what brings it there.
+
+    Parameters
+    ----------
+    name : str
+        Of the cloud.
+    box : (2, 2) array
+        Lowest and highest easting and northing by its header. Units: m.
+    trajectory : Trajectory
+
+    Returns
+    -------
+    sentence : str
+        Empty where the cloud is near.
+    is_explained : bool
+    """
+    apart = _box_distance(box, trajectory)
+    if apart < SETTINGS.near:
+        return "", False
+    sentence = f"{name} lies {apart / 1e3:.1f} km from the trajectory by its header"
+    for change, other in (
+        ("its coordinates taken as feet", box * FOOT),
+        ("easting and northing exchanged", box[:, ::-1]),
+    ):
+        if _box_distance(other, trajectory) < SETTINGS.near:
+            return f"{sentence}, and beside it with {change}: bring both into one CRS.", True
+    return f"{sentence}: one of them may be in another CRS, or of another survey.", False
+
+
+def _box_distance(box, trajectory):
+    """Least horizontal distance of a box from the trajectory's epochs. Units: m."""
+    place = trajectory.position[:, :2]
+    beside = np.maximum(np.maximum(box[0] - place, place - box[1]), 0.0)
+    return float(np.hypot(*beside.T).min())
+
+
 def distance_of(position: np.ndarray, trajectory: Trajectory) -> float:
     """Least horizontal distance of points from the trajectory's epochs. Units: m.
 

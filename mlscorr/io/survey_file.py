@@ -182,7 +182,10 @@ def survey_toml(path: str | Path) -> Path:
     if path.is_dir():
         path = path / FILE_NAME
     if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist; a survey is a folder with {FILE_NAME}.")
+        raise FileNotFoundError(
+            f"{path} does not exist; a survey is a folder with {FILE_NAME}, "
+            "which mlscorr init makes."
+        )
     return path
 
 

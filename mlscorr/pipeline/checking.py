@@ -12,6 +12,7 @@ from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.io.las import spread_times
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
+from mlscorr.io.nearness import far_cloud
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
 from mlscorr.pipeline.finding import check_control
@@ -88,6 +89,14 @@ def _checked(survey, faults):
     passes, outside = _placed_times(survey, layouts)
     for sentence in (*outside, *_crs_hints(survey, layouts), *_uncovered(survey, layouts)):
         faults.warn(sentence)
+    for layout in layouts:
+        sentence, is_explained = far_cloud(
+            layout.path.name, cloud_box(layout)[:, :2], survey.trajectory
+        )
+        if is_explained:
+            faults.add("data", sentence)
+        elif sentence:  # by a header, which may be wrong
+            faults.warn(sentence)
     sample = faults.of("data", sample_clouds, survey)
     for sentence in sample.warnings if sample else ():
         faults.warn(sentence)

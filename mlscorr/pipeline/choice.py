@@ -15,16 +15,15 @@ from mlscorr.io.folder_roles import FileRole
 from mlscorr.io.las import spread_times
 from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
 from mlscorr.io.las_layout import LasLayout
-from mlscorr.io.nearness import check_together, distance_of
+from mlscorr.io.nearness import check_together, far_cloud
 from mlscorr.io.poses import utm_zone
 from mlscorr.io.projection import check_area, check_crs
-from mlscorr.io.settings import SETTINGS as IO
 from mlscorr.io.survey_sections import ControlSection, TrajectorySection
 from mlscorr.io.time_systems import TimeMatch, match_times
 from mlscorr.io.trajectory import TrajectoryFile, read_trajectory_file
 from mlscorr.survey import Trajectory
 
-ANYWHERE = "EPSG:3857"  # projects every place: shows whether a file has latitudes, and where
+WORLD = ("EPSG:3857", "EPSG:6933")  # project all places: latitudes come out in two ways
 
 
 @dataclass(frozen=True)
@@ -62,18 +61,21 @@ class Drive:
     path : Path
     section : TrajectorySection
     recorded : TrajectoryFile
-        In ANYWHERE where it is geographic.
+        In the first of WORLD where it needs a CRS.
+    lack : str
+        The sentence of its reader where it needs a CRS.
     is_geographic : bool
     """
 
     path: Path
     section: TrajectorySection
     recorded: TrajectoryFile
-    is_geographic: bool
+    lack: str = ""
+    is_geographic: bool = False
 
     def read(self, crs: str | None, accuracy: Path | None = None) -> Trajectory:
         """The trajectory in a CRS."""
-        if not self.is_geographic:
+        if not self.lack:
             return self.recorded.trajectory
         return read_trajectory_file(self.path, crs, accuracy, self.section).trajectory
 
@@ -83,7 +85,7 @@ class Drive:
         from pyproj import Transformer
 
         place = np.median(self.recorded.trajectory.position[:, :2], axis=0)
-        to_degrees = Transformer.from_crs(ANYWHERE, "EPSG:4326", always_xy=True)
+        to_degrees = Transformer.from_crs(WORLD[0], "EPSG:4326", always_xy=True)
         longitude, latitude = to_degrees.transform(*place)
         return utm_zone(latitude, longitude)
 
@@ -140,12 +142,14 @@ def _read_drive(path, given):
     """Drive of a file. Raises ValueError as its reader."""
     section = TrajectorySection.model_validate({**given, "file": path.name})
     try:
-        return Drive(path, section, read_trajectory_file(path, None, None, section), False)
+        return Drive(path, section, read_trajectory_file(path, None, None, section))
     except ValueError as first:
-        try:
-            return Drive(path, section, read_trajectory_file(path, ANYWHERE, None, section), True)
-        except ValueError as second:
-            raise (second if "crs" in str(first) else first) from None
+        lack = str(first)
+    if "crs" not in lack:
+        raise ValueError(lack)
+    files = [read_trajectory_file(path, crs, None, section) for crs in WORLD]
+    places = [file.trajectory.position[:, :2] for file in files]
+    return Drive(path, section, files[0], lack, not np.array_equal(*places))
 
 
 def _ambiguous(what, candidates, clouds=()):
@@ -258,6 +262,8 @@ def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[st
         crs, reason = crs_code(own) or own.to_wkt(), f"by the VLRs of {cloud.name}"
     elif drive.is_geographic:
         crs, reason = drive.zone, f"UTM zone of {drive.path.name}; no cloud states a CRS"
+    elif drive.lack:
+        raise ValueError(drive.lack)
     else:
         _check_clouds(clouds, drive.recorded.trajectory, "map coordinates", "no file states a CRS")
         return None, "no file states it"
@@ -281,13 +287,9 @@ def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[st
 def _check_clouds(clouds, trajectory, crs, reason):
     """Refuse clouds far from the trajectory."""
     for cloud in clouds:
-        box = cloud_box(cloud.layout)[:, :2]
-        inside = (trajectory.position[:, :2] > box[0] - IO.near).all(axis=1)
-        inside &= (trajectory.position[:, :2] < box[1] + IO.near).all(axis=1)
-        if not inside.any():
-            apart = distance_of(box.mean(axis=0)[None], trajectory)
+        sentence, _ = far_cloud(cloud.name, cloud_box(cloud.layout)[:, :2], trajectory)
+        if sentence:
             raise ValueError(
-                f"{cloud.name} lies {apart / 1e3:.1f} km from the trajectory in {crs} ({reason}): "
-                "one of them is in another CRS. Say which, as --set 'crs = \"EPSG:...\"', or bring "
-                "both into one."
+                f"{sentence} The trajectory is taken in {crs} ({reason}); if it is not, say so, as "
+                "--set 'crs = \"EPSG:...\"'."
             )

@@ -146,6 +146,16 @@ def test_points_outside_the_trajectory_are_a_share(survey):
     assert any(re.match("About (1[89]|2[0-2])% of the points", text) for text in checked.warnings)
 
 
+def test_a_cloud_in_feet_is_named(survey):
+    "By its header, with the way it would lie beside the trajectory"
+    data = bytearray((survey / "pass-1.laz").read_bytes())
+    numbers = np.frombuffer(data, "<f8", 12, 131)  # scale, offset and box
+    data[131:227] = (numbers / 0.3048).tobytes()
+    (survey / "pass-1.laz").write_bytes(data)
+    assert any("beside it with its coordinates taken as feet" in s
+               for s in sentences(mlscorr.check(survey)))  # fmt: skip
+
+
 def test_what_lies_beside_the_cloud_is_counted(survey):
     "A surveyed point 300 m down the street is named before anything is read"
     row = (survey / "control.csv").read_text().splitlines()[-1].split(",")

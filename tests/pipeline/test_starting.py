@@ -66,6 +66,14 @@ def write_smrmsg(path):
     record.tofile(path)
 
 
+ROW = "{:.3f} {:.4f} 3374000 42 0.1 -0.2 90.0"
+EXPLORER = """Program:     Inertial Explorer Version 8.90
+
+GPSTime  Easting  Northing  H-Ell  Roll  Pitch  Heading
+(sec) (m) (m) (m) (deg) (deg) (deg)
+"""
+
+
 @pytest.fixture
 def folder(tmp_path):
     "Clouds of two passes in UTM zone 50, a trajectory, control"
@@ -143,6 +151,30 @@ def test_lists_of_a_total_station_are_control(folder):
     assert [r.role for r in started.roles if r.path.name == "README.txt"] == ["none"]
 
 
+def test_an_export_of_inertial_explorer_needs_its_north(folder):
+    "Said by --set it is a trajectory, by the clouds' CRS; without any CRS it is none by guess"
+    (folder / "trajectory.csv").unlink()
+    (folder / "ie.txt").write_text(EXPLORER + trajectory(row=ROW))
+    (folder / "control.csv").unlink()
+    (folder / "点.csv").write_bytes(
+        ("点号,东坐标(m),北坐标(m),高程(m)\n" + control("{},{:.3f},{:.3f},{:.3f}")).encode(
+            "gb18030"
+        )
+    )
+    given = {
+        "trajectory": {"heading": "clockwise from true north"},
+        "control": {"kind": "circle", "size": 0.6, "sigma": [0.003, 0.004]},
+    }
+    document = tomllib.loads(mlscorr.init(folder, given=given).text)
+    assert document["trajectory"] == {"file": "ie.txt", **given["trajectory"]}
+    assert document["control"]["file"] == "点.csv"
+    (folder / "pass-2.las").unlink()
+    write_cloud(folder / "pass-1.las")
+    with pytest.raises(ValueError, match="crs"):
+        mlscorr.init(folder, given=given)
+    assert "EPSG:32650" in mlscorr.init(folder, given={**given, "crs": "EPSG:32650"}).text
+
+
 def test_clouds_in_a_folder_of_their_own_are_a_pattern(folder):
     "Six tiles are one pattern; results of an earlier run are no input; a mesh is the reference"
     (folder / "las").mkdir()
@@ -204,6 +236,16 @@ def other_zone(folder):
     write_sbet(folder / "a.sbet", east=EAST + 2e6)
 
 
+def far(folder):
+    "Clouds that state no CRS, in feet"
+    (folder / "pass-2.las").unlink()
+    write_cloud(folder / "pass-1.las")
+    data = bytearray((folder / "pass-1.las").read_bytes())
+    numbers = np.frombuffer(data, "<f8", 12, 131)  # scale, offset and box
+    data[131:227] = (numbers / 0.3048).tobytes()
+    (folder / "pass-1.las").write_bytes(data)
+
+
 def write(name, text):
     return lambda folder: (folder / name).write_text(text)
 
@@ -243,6 +285,11 @@ AMBIGUOUS = {
     "axes exchanged": (
         write("control.csv", CONTROL + control(swap=True)),
         ["Easting and northing seem to be swapped"],
+    ),
+    "clouds in feet": (far, ["km from the trajectory .* beside it .* as feet", "map coordinates"]),
+    "headings from some north": (
+        write("trajectory.csv", EXPLORER + trajectory(row=ROW)),
+        ["Inertial Explorer", "clockwise from true north", "--set"],
     ),
     "X and Y far away": (
         write("control.csv", "Pt,X,Y,Z\nP1,10.0,20.0,3.0\nP2,15.0,25.0,3.0\n"),
