@@ -12,10 +12,11 @@ from scipy.spatial.transform import Rotation
 from mlscorr.correction.kernel import fill_increments, move_integers
 from mlscorr.frames import angle_sigma
 from mlscorr.survey import Mounting, PointCloud, Trajectory
+from mlscorr.survey.summary import Summary
 
 
-@dataclass(frozen=True)
-class Correction:
+@dataclass(frozen=True, repr=False)
+class Correction(Summary):
     """The pair recorded -> corrected of trajectory and mounting, applied to points by their time.
 
     With T, R the recorded pose, T', R' the corrected one, and a mounting that turns by

@@ -42,7 +42,7 @@ class Reference:
     place: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Returns(Columns):
     """Returns of a scanner in scan order, as the effects see and change them.
 

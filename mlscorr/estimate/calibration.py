@@ -18,6 +18,7 @@ from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.tied import TieResiduals
 from mlscorr.survey import Mounting, Trajectory
+from mlscorr.survey.summary import Summary
 
 MOUNTING_COMPONENTS = (
     "lever arm right",
@@ -61,8 +62,8 @@ class MountingEstimate:
         return self.covariance / np.outer(self.sigma, self.sigma)
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(Summary):
     """The calibrated mounting by collocation and by plain least squares.
 
     Parameters

@@ -18,12 +18,13 @@ from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.pos import StatedSigma, stated_sigma
 from mlscorr.survey import Pos, Trajectory, control_epochs
+from mlscorr.survey.summary import Summary
 
 NO_TREND = -1  # the order of a polynomial without any coefficient
 
 
-@dataclass(frozen=True)
-class Equations:
+@dataclass(frozen=True, repr=False)
+class Equations(Summary):
     """The observation equations of n observed targets, three rows each.
 
     Parameters

@@ -33,10 +33,11 @@ from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.estimate.tied import TieResiduals, graduated, screen_with_ties
 from mlscorr.survey import Matched, Pos, Ties, Trajectory
+from mlscorr.survey.summary import Summary
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, repr=False)
+class Estimate(Summary):
     """The estimated POS error.
 
     Parameters

@@ -21,10 +21,11 @@ from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Survey
+from mlscorr.survey.summary import Summary
 
 
-@dataclass(frozen=True)
-class CalibratedSurvey:
+@dataclass(frozen=True, repr=False)
+class CalibratedSurvey(Summary):
     """A calibrated survey: the calibration, the targets, and ``write``.
 
     Parameters

@@ -18,6 +18,7 @@ from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
 from mlscorr.survey import Survey
+from mlscorr.survey.summary import Summary
 
 
 def calibrate(
@@ -93,8 +94,8 @@ def _calibrated(survey, title, rng, progress, ties):
     return CalibratedSurvey(survey, calibration, control, check, missing)
 
 
-@dataclass(frozen=True)
-class CalibratedScanners:
+@dataclass(frozen=True, repr=False)
+class CalibratedScanners(Summary):
     """A calibrated survey of several scanners, each by what it saw, and ``write``.
 
     Parameters

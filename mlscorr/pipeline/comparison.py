@@ -20,6 +20,7 @@ from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.pipeline.methods import METHODS, load_open3d, method_named
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Matched, Survey
+from mlscorr.survey.summary import Summary
 
 
 def compare(
@@ -158,8 +159,8 @@ def _cross_validated(method, survey, control, candidates, groups, of_check, done
     return {**_statistics(left, why is None and bool(groups)), "why": why}
 
 
-@dataclass(frozen=True)
-class ComparedSurvey:
+@dataclass(frozen=True, repr=False)
+class ComparedSurvey(Summary):
     """All methods' rows of compare.json, their corrections by name, and ``write``.
 
     Parameters

@@ -27,6 +27,7 @@ from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.tying import TieUse, estimate_survey
 from mlscorr.survey import Matched, Survey, Trajectory
+from mlscorr.survey.summary import Summary
 from mlscorr.targets import FittedTarget
 
 
@@ -93,8 +94,8 @@ def correct(
     )
 
 
-@dataclass(frozen=True)
-class CorrectedSurvey:
+@dataclass(frozen=True, repr=False)
+class CorrectedSurvey(Summary):
     """A corrected survey: the estimate, the targets, the statistics, and ``write``.
 
     Parameters

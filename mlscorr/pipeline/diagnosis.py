@@ -41,6 +41,7 @@ from mlscorr.pipeline.planning import too_little
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate.simulator_file import Simulator, beliefs_of, write_simulator
 from mlscorr.survey import Survey, TargetObservations
+from mlscorr.survey.summary import Summary
 
 STEPS = 6  # of the progress beside reading: the inference, folds, plan
 LEAST_VIEWS = 6  # with a residual in m: fewer than the pose has parameters say nothing
@@ -180,8 +181,8 @@ def _observed(survey, believed, library, progress) -> tuple[Pairing, Rows, Beams
     return pairing, rows, beams, absence
 
 
-@dataclass(frozen=True)
-class DiagnosedSurvey:
+@dataclass(frozen=True, repr=False)
+class DiagnosedSurvey(Summary):
     """A survey with its diagnosis: the document of gap.json, and ``write``."""
 
     survey: Survey

@@ -20,6 +20,7 @@ from mlscorr.pipeline.finding import (
 )
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, TargetObservations
+from mlscorr.survey.summary import Summary
 from mlscorr.targets import BY_EDGES, as_observations, distinct, search_targets, why_useless
 
 BRIGHT_KINDS = ("circle", "square", "checkerboard")  # kinds that stand out without a surveyed place
@@ -132,8 +133,8 @@ def _sentences(survey, intensities, targets):
     return tuple(sentences)
 
 
-@dataclass(frozen=True)
-class ExtractedSurvey:
+@dataclass(frozen=True, repr=False)
+class ExtractedSurvey(Summary):
     """What was found in a survey's cloud, and ``write``.
 
     Parameters

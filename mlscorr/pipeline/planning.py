@@ -24,6 +24,7 @@ from mlscorr.gap import (
 from mlscorr.gap.signatures import signatures
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.survey import Matched, Survey, TargetObservations
+from mlscorr.survey.summary import Summary
 
 LARGE = 10.0  # times its usual size: an effect that must be larger to be seen is not seen
 
@@ -92,8 +93,8 @@ def _accuracy(survey, rows):
 _NOISE = "Noise shows in the roughness of surfaces and the spread of residuals, not in a shift."
 
 
-@dataclass(frozen=True)
-class PlannedSurvey:
+@dataclass(frozen=True, repr=False)
+class PlannedSurvey(Summary):
     """A survey before it is driven: the document of plan.json, and ``write``."""
 
     survey: Survey

@@ -13,6 +13,7 @@ from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_ties_csv
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Survey, TieFeatures
+from mlscorr.survey.summary import Summary
 from mlscorr.ties import (
     SETTINGS,
     TieCollector,
@@ -67,8 +68,8 @@ def find_ties(survey: Survey, progress: Callable | None = None) -> "TiedSurvey":
     return tied
 
 
-@dataclass(frozen=True)
-class TiedSurvey:
+@dataclass(frozen=True, repr=False)
+class TiedSurvey(Summary):
     """What passes of a survey both saw, and ``write``.
 
     Parameters

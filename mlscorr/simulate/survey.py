@@ -25,6 +25,7 @@ from mlscorr.simulate.scan import MeasuredPulses, Platform, Surfaces, pulses_of_
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene import Mesh, Scene, build_scene, static_scan
 from mlscorr.survey import ControlPoints, Mounting, PointCloud, Trajectory
+from mlscorr.survey.summary import Summary
 
 STREAMS = 7  # drive, scene, scan, POS, control, effects, reference: each leaves all others
 
@@ -41,8 +42,8 @@ class PulseBlock:
     cloud: PointCloud
 
 
-@dataclass(frozen=True)
-class SimulatedSurvey:
+@dataclass(frozen=True, repr=False)
+class SimulatedSurvey(Summary):
     """One simulated survey. Its pulses are made anew, block by block, each time they are asked for.
 
     Parameters

@@ -8,7 +8,7 @@ import numpy as np
 from mlscorr.survey.columns import Columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PointCloud(Columns):
     """One chunk of points.
 

@@ -14,6 +14,9 @@ class Columns:
     Numbers among their fields hold for all rows.
     """
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} rows)"
+
     def __len__(self) -> int:
         return len(getattr(self, fields(self)[0].name))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Pos, Scanner
 from mlscorr.survey.clouds import CloudFile
+from mlscorr.survey.summary import Summary
 from mlscorr.survey.targets import ControlPoints
 from mlscorr.survey.trajectory import Mounting, Trajectory
 
@@ -52,8 +53,8 @@ class MountedScanner:
     clouds: tuple[CloudFile, ...]
 
 
-@dataclass(frozen=True)
-class Survey:
+@dataclass(frozen=True, repr=False)
+class Survey(Summary):
     """One mobile survey as it was recorded: cloud files, trajectory, mounting, control, beliefs.
 
     Parameters

@@ -12,7 +12,7 @@ from mlscorr.survey.columns import Columns
 KINDS = ("circle", "square", "hole", "checkerboard", "board")  # see ControlPoints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ControlPoints(Columns):
     """Surveyed targets: control points, or check points as another instance.
 
@@ -58,7 +58,7 @@ class ControlPoints(Columns):
         return ControlPoints.concatenate([self, other])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TargetObservations(Columns):
     """Targets found in the cloud, one row per target and pass.
 
@@ -93,7 +93,7 @@ class TargetObservations(Columns):
     points: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Matched(Columns):
     """Observations with the surveyed points that they are, both with n rows.
 

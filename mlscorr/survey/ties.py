@@ -9,7 +9,7 @@ import numpy as np
 from mlscorr.survey.columns import Columns
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TieFeatures(Columns):
     """Planes and poles as each pass saw them, a metre and a second of it in a row.
 
@@ -76,7 +76,7 @@ class TieFeatures(Columns):
         return np.clip(times, low[inverse][rows], high[inverse][rows])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ties(Columns):
     """Things that were seen twice: scalar observations of what is wrong between both times.
 

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
 
+from mlscorr.survey.summary import Summary
+
 GAP_FACTOR = 10.0  # a step longer than ten median steps is a gap
 SAME_EPOCH = 1.0  # s; closer together, two targets say the same of the POS
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Summary):
     """Positions and attitudes of the POS navigation centre over time.
 
     Parameters

@@ -16,7 +16,7 @@ ROWS, COLUMNS = np.triu_indices(3)  # of the products: xx, xy, xz, yy, yz, zz
 DEPTH, ACROSS, ALONG = np.pi / 4, 1 / 3, 2 / 3 - np.pi**2 / 16
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shapes(Columns):
     """What cells hold: as in TieFeatures, and the way from the mean of the points to the centre.
 

@@ -18,7 +18,7 @@ from mlscorr.survey.columns import Columns
 FACTORS = 128  # kept of V0: those that the evidence comes back to, less than 100 MB
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Errors(Columns):
     """What each of n observations errs by, as sigmas in m.
 
@@ -54,7 +54,7 @@ class Errors(Columns):
         return (self.drift**2 + self.jitter**2).sum(axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Observations(Columns):
     """Metric rows as n scalar observations in the order of time, one for each look.
 

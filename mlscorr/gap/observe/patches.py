@@ -7,7 +7,7 @@ import numpy as np
 from mlscorr.survey.columns import Columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Patches(Columns):
     """Flat pieces of the cloud, in no order.
 

@@ -16,7 +16,7 @@ CHANNELS = ("target", "surface", "shared", "roughness", "return_rate")
 METRIC = ("target", "surface", "shared")  # in m along a direction; the others have no unit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SamplePulses(Columns):
     """A few pulses of each item, as recorded: what effects are applied to, with and without.
 

@@ -14,7 +14,7 @@ from mlscorr.survey import Survey
 from mlscorr.survey.columns import Columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class OnReference(Columns):
     """Patches that the reference surface has too.
 

@@ -12,7 +12,7 @@ from mlscorr.survey.columns import Columns
 NO_MOUNTING = Mounting(np.zeros(3), Rotation.identity())  # beams from the navigation centre
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RecordedPulses(Columns):
     """Pulses of a survey as they were recorded.
 

@@ -24,7 +24,7 @@ from mlscorr.survey import ControlPoints, Mounting, Survey, Trajectory
 from mlscorr.survey.columns import Columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Met(Columns):
     """What each pulse meets: range (n,) in m, NaN for nothing; cosine of incidence (n,); intensity
     (n,) in counts of 16 bits.

@@ -20,7 +20,7 @@ from mlscorr.survey import Mounting, Trajectory
 from mlscorr.survey.columns import Columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MeasuredPulses(Columns):
     """Measured returns in scan order, and what they truly hit.
 

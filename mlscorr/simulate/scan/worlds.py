@@ -116,7 +116,7 @@ class MeshWorld:
         return Met(np.where(triangle >= 0, distance, np.nan), slant, intensity), triangle
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Boards(Columns):
     """Targets as the simulator builds them: a bright disc on a darker board, a bright plate, a
     hole in a board, a checkerboard; and beside them what was recorded there.

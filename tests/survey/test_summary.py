@@ -1,0 +1,38 @@
+"""What a notebook shows of a survey: its parts and their sizes in a few words."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.survey.summary import Summary
+from tests.beds.tied_passes import tied_passes
+
+
+@dataclass(frozen=True, repr=False)
+class Part(Summary):
+    "Some fields of each kind"
+
+    name: str
+    vector: np.ndarray
+    table: np.ndarray
+    rows: object
+    words: tuple
+    sentence: str
+
+
+def test_arrays_show_their_sizes_and_short_values_themselves():
+    "Three numbers are shown, a table by its shape, long tuples by their number, long texts by type"
+    part = Part("T1", np.zeros(3), np.zeros((5, 2)), None, ("word",) * 20, "long " * 20)
+    assert repr(part) == (
+        "Part(name='T1', vector=array([0., 0., 0.]), table=array (5, 2), rows=None, "
+        "words=tuple of 20, sentence=str)"
+    )
+
+
+def test_a_survey_of_a_million_epochs_shows_in_a_line():
+    "The repr of nouns does not grow with what they hold"
+    survey = tied_passes(1)
+    for value in (survey.trajectory, survey.ties, survey.matched):
+        assert len(repr(value)) < 250
+    assert repr(survey.ties) == f"Ties({len(survey.ties)} rows)"
+    assert f"gps_time=array ({len(survey.trajectory.gps_time)},)" in repr(survey.trajectory)
