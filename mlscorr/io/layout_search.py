@@ -84,8 +84,8 @@ def find_layout(
                 f"{path} has a table in {len(layouts)} sheets ({sheets}): keep one of them."
             )
         for layout in layouts[:1]:
-            is_told = not "".join(layout.header).isascii() or _are_pairs(path)
-            if encoding != "gb18030" or is_told:
+            has_evidence = not "".join(layout.header).isascii() or _are_pairs(path)
+            if encoding != "gb18030" or has_evidence:
                 return layout
     return None
 
