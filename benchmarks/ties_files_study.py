@@ -1,11 +1,11 @@
 """What ties between passes add through files: clouds there and back, targets and ties found.
 
-python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--outage 8 32]
+python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--one-pass]
 
 RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
 far apart the trajectories of both passes are left in a place. Without control only the latter is
-claimed. Drives are the simulator's canyon by a MEMS unit without GNSS for a while in each pass:
-drift of decimetres to metres.
+claimed. Drives are the simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each
+pass of 150 s alone: its smoothed drift is 0.6 to 1 m.
 """
 
 import argparse
@@ -21,15 +21,21 @@ import mlscorr
 from mlscorr.simulate import read_scenario, simulate
 from mlscorr.simulate.recording import join_passes
 
-POINTS_PER_LINE = 400  # of 700, and 50 s of 90: a survey takes a minute
-DURATION = 50.0  # s of each pass
+POINTS_PER_LINE = 400  # of 700: a survey takes two minutes
+DURATION = 150.0  # s of each pass
+GNSS = 5.0  # s, at both ends of a pass
 NEAREST = 5.0  # m between two passes that are compared in a place
 
 
-def scenario(outage, processing):
-    """The canyon as a MEMS unit records it, without GNSS from outage[0] for outage[1] s."""
+def scenario():
+    """The canyon as a MEMS unit records it, with GNSS at the ends of the passes alone."""
     canyon = read_scenario(FOLDER / "canyon.toml")
-    pos = {"grade": "mems", "processing": processing, "sky_view": False, "outages": (outage,)}
+    starts = (0.0, DURATION + canyon.drive.passes[1].pause)
+    pos = {
+        "grade": "mems",
+        "sky_view": False,
+        "outages": tuple((start + GNSS, DURATION - 2 * GNSS) for start in starts),
+    }
     scanner = canyon.scanner[0].model_copy(update={"points_per_line": POINTS_PER_LINE})
     return canyon.model_copy(
         update={
@@ -82,10 +88,8 @@ def main():
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--control", type=int, nargs="+", default=[0, 3, 6, 12])
-    parser.add_argument("--outage", type=float, nargs=2, default=(8.0, 32.0), help="start, length")
-    parser.add_argument("--processing", default="filtered", choices=("filtered", "smoothed"))
     arguments = parser.parse_args()
-    drive = scenario(tuple(arguments.outage), arguments.processing)
+    drive = scenario()
     print("control  seed     raw   alone  within    ties  within   apart   ratio")
     ratios = {number: [] for number in arguments.control}
     for seed in range(arguments.first, arguments.first + arguments.seeds):
