@@ -391,8 +391,9 @@ def test_paths_may_be_relative_with_spaces_and_umlauts(commanded):
     "survey.toml's own paths count from its folder, -o from where the user stands"
     process, out = commanded
     assert process.returncode == 0, process.stderr
-    names = ["pass-1.laz", "pictures", "report.html", "report.json", "targets.csv"]
-    assert sorted(path.name for path in out.iterdir()) == [*names, "trajectory.csv"]
+    names = {"pass-1.laz", "pictures", "report.html", "report.json", "targets.csv"}
+    names |= {"trajectory.csv", "drive.sbet", "smrmsg_drive.out", "drive.tum"}  # as asked for
+    assert {path.name for path in out.iterdir()} == names
     assert [path.name for path in out.parent.iterdir()] == [out.name]
 
 
