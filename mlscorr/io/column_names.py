@@ -11,6 +11,8 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 
+AXES = ("easting", "northing", "height")
+ANGLES = ("roll", "pitch", "heading")
 PLACE_NAMES = {
     "easting": "e east ecoord ecoordinate rechtswert rechts ost ostwert este est "
     "东坐标 东 东向 东距 横坐标 e坐标",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.column_names import CONTROL_NAMES
+from mlscorr.io.column_names import AXES, CONTROL_NAMES
 from mlscorr.io.control_lists import (
     HINTS,
     SIGMAS,
@@ -28,8 +28,7 @@ from mlscorr.io.tables import read_layout
 from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
 from mlscorr.survey import KINDS, ControlPoints, Trajectory
 
-POSITION = ("easting", "northing", "height")
-COLUMNS = ("name", *POSITION, *SIGMAS, "kind", "size", "role")
+COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
 NORMAL = ("normal_e", "normal_n", "normal_h")
 ROLES = ("control", "check")
 NOTHING_GIVEN = ControlSection(file="")
@@ -190,7 +189,7 @@ def _check(path, row):
             f"{who} has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
             f"{_likely_unit(row['size'])}"
         )
-    for key in POSITION:
+    for key in AXES:
         if abs(row[key]) > SETTINGS.largest_coordinate:
             raise ValueError(
                 f"{who} has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
@@ -234,7 +233,7 @@ def _points(rows):
     normal = numbers(*NORMAL)
     return ControlPoints(
         name=tuple(row["name"] for row in rows),
-        position=numbers(*POSITION),
+        position=numbers(*AXES),
         sigma=numbers("sigma_horizontal", "sigma_horizontal", "sigma_vertical"),
         kind=tuple(row["kind"] for row in rows),
         size=numbers("size")[:, 0],

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from mlscorr.io.column_names import AXES
 from mlscorr.io.layout_search import NUMBER
 from mlscorr.io.layouts import TableLayout
-from mlscorr.io.nearness import AXES, distance_of
+from mlscorr.io.nearness import distance_of
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.tables import missing_sentence

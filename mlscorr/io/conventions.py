@@ -7,12 +7,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude
+from mlscorr.io.column_names import ANGLES, AXES
 from mlscorr.io.course import heading_and_course, median_difference
 from mlscorr.io.projection import convergence_at, project
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_sections import TrajectorySection
 
-ANGLES = ("roll", "pitch", "heading")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNIT_TOLERANCE = 1e-3  # of a quaternion's length, where three decimals are written
 OUR_AXES = {  # right, forward and up in the body axes of others, as columns
@@ -91,7 +91,7 @@ def in_our_conventions(
     if is_geographic:
         record = {name: np.radians(table.pop(name)) for name in ("latitude", "longitude")}
         position, convergence = project(crs, record | {"height": table["height"]})
-        table |= dict(zip(("easting", "northing", "height"), position.T, strict=True))
+        table |= dict(zip(AXES, position.T, strict=True))
     elif is_true:
         convergence = convergence_at(crs, table["easting"], table["northing"])
     if is_true:

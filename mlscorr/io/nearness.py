@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.io.column_names import AXES
 from mlscorr.io.settings import SETTINGS
 from mlscorr.survey import ControlPoints, Trajectory
 
 FOOT = 0.3048  # m; the US survey foot is longer by 2 ppm
-AXES = ("easting", "northing", "height")
 
 
 def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) -> None:

@@ -6,9 +6,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from mlscorr.io.column_names import AXES
 from mlscorr.survey import Ties
-
-AXES = ("easting", "northing", "height")
 
 
 def write_targets_csv(path: str | Path, targets: Sequence[dict]) -> None:

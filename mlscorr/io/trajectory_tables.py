@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.column_names import TRAJECTORY_NAMES, UNITS, plain
+from mlscorr.io.column_names import ANGLES, AXES, TRAJECTORY_NAMES, UNITS, plain
 from mlscorr.io.conventions import (
-    ANGLES,
     QUATERNION,
     UNIT_TOLERANCE,
     Conventions,
@@ -25,12 +24,11 @@ from mlscorr.io.table_rows import read_numbers
 from mlscorr.io.tables import read_layout
 from mlscorr.io.trj import read_trj
 
-PLACE = ("easting", "northing", "height")
-COLUMNS = ("gps_time", *PLACE, *ANGLES)
+COLUMNS = ("gps_time", *AXES, *ANGLES)
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
 ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
 GRID, TRUE = "clockwise from grid north", "clockwise from true north"
-TUM = ("gps_time", *PLACE, *QUATERNION)
+TUM = ("gps_time", *AXES, *QUATERNION)
 INERTIAL_EXPLORER = ("hell", "hdngsd")  # names of columns that no other program writes
 HINTS = {
     ("easting", "x"): " Say under [trajectory.columns] in survey.toml which of X and Y is easting.",
@@ -68,7 +66,7 @@ def read_table(
 
     def lacking(names: Collection[str]) -> list[str]:
         is_projected = "latitude" not in names or {"easting", "northing"} <= set(names)
-        place = PLACE if is_projected else ("latitude", "longitude", "height")
+        place = AXES if is_projected else ("latitude", "longitude", "height")
         angles = ("roll", "pitch", "yaw" if section.heading and "yaw" in names else "heading")
         return [name for name in ("gps_time", *place, *angles) if name not in names]
 
