@@ -1,33 +1,56 @@
 """Correct mobile laser scans with surveyed targets by least squares collocation."""
 
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-_PIPELINE = (
+if TYPE_CHECKING:  # what editors and type checkers see of the names that are loaded when used
+    from mlscorr import simulate
+    from mlscorr.io.survey_file import read_survey
+    from mlscorr.pipeline import (
+        calibrate,
+        check,
+        compare,
+        correct,
+        diagnose,
+        doctor,
+        extract,
+        find_ties,
+        init,
+        plan,
+        render,
+    )
+    from mlscorr.simulate.simulator_file import read_simulator
+
+__all__ = [
     "calibrate",
     "check",
     "compare",
     "correct",
     "diagnose",
+    "doctor",
     "extract",
     "find_ties",
     "init",
     "plan",
-)
-_HOMES = {
+    "read_simulator",
+    "read_survey",
+    "render",
+    "simulate",
+]
+_READERS = {
     "read_simulator": "mlscorr.simulate.simulator_file",
     "read_survey": "mlscorr.io.survey_file",
-} | dict.fromkeys(_PIPELINE, "mlscorr.pipeline")
-__all__ = [*_PIPELINE, "read_simulator", "read_survey", "simulate"]
+}
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     """Load what is asked for, and the libraries it needs, only then."""
     if name == "simulate":  # the package: mlscorr.simulate.simulate(scenario, rng)
         return import_module("mlscorr.simulate")
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+    if name in __all__:
+        return getattr(import_module(_READERS.get(name, "mlscorr.pipeline")), name)
     raise AttributeError(f"module 'mlscorr' has no attribute '{name}'")
 
 
-def __dir__():
-    return sorted([*globals(), *__all__])
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

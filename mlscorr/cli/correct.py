@@ -1,7 +1,7 @@
 """The command that corrects a survey."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -72,7 +72,7 @@ def correct(
         for sentence in recorded.layouts:
             say(sentence)
         check_exports(trajectory, recorded.crs, is_read=True)
-        ties = "off" if no_ties else "only" if ties_only else None
+        ties: Literal["off", "only"] | None = "off" if no_ties else "only" if ties_only else None
         result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
         report = result.write(
             out, overwrite, progress, sigma, page=not no_report, trajectories=trajectory

@@ -2,23 +2,25 @@
 
 import typer
 
+import mlscorr
 from mlscorr.cli.terminal import Exit, Json, say
 from mlscorr.cli.work import print_json
 
 
 def doctor(as_json: Json = False) -> None:
     """Tell what is installed, what is missing, and the line that installs it."""
-    from mlscorr.cli.installation import examine, remedy
     from mlscorr.io.output import document
 
-    findings = examine()
-    for finding in findings:
-        mark = "ok     " if finding.ok else "MISSING" if finding.needed else "without"
-        say(f"{mark} {finding.name}: {finding.state}")
-    for line in remedy(findings):
+    installation = mlscorr.doctor()
+    for part in installation.parts:
+        say(f"{part.mark:7s} {part.name}: {part.state}")
+    for line in installation.remedies:
         say(f"To install what is missing:  {line}")
     names = {"state": "found"}
-    rows = [{names.get(key, key): value for key, value in vars(part).items()} for part in findings]
+    rows = [
+        {names.get(key, key): value for key, value in vars(part).items()}
+        for part in installation.parts
+    ]
     print_json(document("doctor", {"findings": rows}), as_json)
-    if any(finding.needed and not finding.ok for finding in findings):
+    if not installation.is_complete:
         raise typer.Exit(Exit.LIBRARY_MISSING)

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+import mlscorr
 from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyArgument, exit_code, say
 from mlscorr.cli.work import print_json, work
 
@@ -47,11 +48,8 @@ def render(
     with exit_code(Exit.USAGE):
         pixels = _read_size(size)
     with work(out, overwrite, survey) as progress:
-        from mlscorr.io.survey_file import read_survey
-        from mlscorr.pipeline.rendering import render
-
-        drawn = render(
-            read_survey(survey),
+        drawn = mlscorr.render(
+            mlscorr.read_survey(survey),
             out,
             corrected,
             pixels,

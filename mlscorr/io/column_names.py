@@ -11,7 +11,9 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 
-AXES = ("easting", "northing", "height")
+from mlscorr.survey import data_frame
+
+AXES = data_frame.AXES
 ANGLES = ("roll", "pitch", "heading")
 PLACE_NAMES = {
     "easting": "e east ecoord ecoordinate rechtswert rechts ost ostwert este est "

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import Calibration
+from mlscorr.estimate.calibration import MOUNTING_COMPONENTS
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.evaluate.scores import score
 from mlscorr.evaluate.target_rows import surveyed_rows
@@ -21,7 +23,11 @@ from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Survey
+from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, repr=False)
@@ -42,6 +48,32 @@ class CalibratedSurvey(Summary):
     matched_control: Matched
     matched_check: Matched
     missing: list[TargetRow] = field(default_factory=list)
+
+    @property
+    def components(self) -> list[dict]:
+        """Rows of the parts of lever arm (m) and boresight (deg): what the recorded ones lack."""
+        units = ["m"] * 3 + ["deg"] * 3
+        scale = np.where(np.array(units) == "m", 1.0, np.degrees(1.0))
+        columns = {"component": MOUNTING_COMPONENTS, "unit": units}
+        for name in ("lsc", "ls"):
+            estimate = getattr(self.calibration, name)
+            columns[f"{name}_correction"] = (estimate.correction * scale).tolist()
+            columns[f"{name}_sigma"] = (estimate.sigma * scale).tolist()
+        columns["determined"] = self.calibration.determined.tolist()
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The components as a data frame; pandas is needed for it."""
+        return rows_frame(self.components)
+
+    def _overview(self):
+        """What a notebook shows."""
+        rows = [("", "correction", "1 sigma", "", "")]
+        for row in self.components:
+            numbers = (f"{row[f'lsc_{name}']:.4f}" for name in ("correction", "sigma"))
+            doubt = "" if row["determined"] else "not determined by this site"
+            rows.append((row["component"], *numbers, row["unit"], doubt))
+        return [(f"{self.survey.name}: what the recorded mounting lacks",), *rows]
 
     def write(
         self,

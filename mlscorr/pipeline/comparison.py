@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
 
 from mlscorr.baselines import Undetermined
-from mlscorr.evaluate.rows import Statistics, TargetRow
+from mlscorr.evaluate.rows import Statistics
 from mlscorr.evaluate.scores import misclosures
 from mlscorr.evaluate.target_rows import unseen_rows
-from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.compared_survey import ComparedSurvey
 from mlscorr.pipeline.finding import find_control, silent
-from mlscorr.pipeline.methods import METHODS, load_open3d, method_named
+from mlscorr.pipeline.methods import METHODS, load_open3d
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Matched, Survey
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Survey
 
 
 def compare(
@@ -157,127 +153,3 @@ def _cross_validated(method, survey, control, candidates, groups, of_check, done
             parts.append(misclosures(control[left_out], correction))
     left = np.vstack(parts)
     return {**_statistics(left, why is None and bool(groups)), "why": why}
-
-
-@dataclass(frozen=True, repr=False)
-class ComparedSurvey(Summary):
-    """All methods' rows of compare.json, their corrections by name, and ``write``.
-
-    Parameters
-    ----------
-    survey : Survey
-    matched_control, matched_check : Matched
-    rows : tuple of dict
-        As ``methods`` of compare.json has them.
-    corrections : dict
-        What has ``apply(cloud)``, by the methods' names.
-    groups : int
-        How many times control points were left out, zero without cross-validation.
-    missing : list of TargetRow
-        Surveyed points without an observation.
-    """
-
-    survey: Survey
-    matched_control: Matched
-    matched_check: Matched
-    rows: tuple[dict, ...]
-    corrections: dict
-    groups: int
-    missing: list[TargetRow] = field(default_factory=list)
-
-    def row(self, name: str) -> dict:
-        """The row of one method."""
-        return next(row for row in self.rows if row["name"] == name)
-
-    @property
-    def scored_by(self) -> str:
-        """What the methods are ranked by: check, cross_validated, or the mere fit to control."""
-        if "cross_validated" in self.rows[0] and self.groups:
-            return "cross_validated"
-        return "check" if len(self.matched_check) else "control"
-
-    @property
-    def document(self) -> dict:
-        """The document of compare.json."""
-        return document(
-            "compare",
-            {
-                "name": self.survey.name,
-                "crs": self.survey.crs,
-                "misclosure": "surveyed - observed, m",
-                "control_points": len(set(self.matched_control.name)),
-                "check_points": len(set(self.matched_check.name)),
-                "scored_by": self.scored_by,
-                "cross_validation_groups": self.groups,
-                "methods": list(self.rows),
-                "unseen": [{"name": row.name, "why": row.reason} for row in self.missing],
-            },
-        )
-
-    def write(
-        self,
-        out: str | Path,
-        clouds: Sequence[str] = (),
-        overwrite: bool = False,
-        progress: Callable | None = None,
-    ) -> dict:
-        """Write compare.json and compare.html, and the clouds as some methods correct them.
-
-        Parameters
-        ----------
-        out : path
-            The folder, which appears whole or not at all.
-        clouds : sequence of str
-            Names of methods; each one's clouds go into a folder of its name.
-
-        Returns
-        -------
-        dict
-            The document. Its ``files`` name what was written, with the points outside the
-            trajectory, which time-dependent methods leave as they were.
-
-        Raises
-        ------
-        ValueError
-            For a method that doesn't exist or wasn't determined, or when the folder holds an
-            input, or holds anything without overwrite.
-        OSError
-            When writing fails.
-        """
-        from mlscorr.report import basis, verdict, write_comparison
-
-        for name in clouds:
-            self._check_cloud(name)
-        content = self.document
-        content |= {"basis": basis(content), "verdict": verdict(content)}
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
-            content["files"] = self._write_clouds(folder, clouds, progress or silent)
-            write_json(folder / "compare.json", content)
-            write_comparison(folder / "compare.html", content)
-        return content
-
-    def _check_cloud(self, name):
-        why = self.row(method_named(name).name)["why"]
-        if why is not None:
-            raise ValueError(f"The method {name} has no cloud to write: {why}")
-
-    def _write_clouds(self, folder, names, progress):
-        """Rows on the files that were written."""
-        done = progress("Writing the clouds", self.survey.points * len(names)) if names else None
-        files = []
-        for name in names:
-            (folder / name).mkdir()
-            correction = self.corrections[name]
-            clouds = write_clouds(
-                self.survey, folder / name, correction, lambda times: done(len(times))
-            )
-            files += [
-                {
-                    "method": name,
-                    "name": f"{name}/{path.name}",
-                    "points": points,
-                    "points_outside_trajectory": outside,
-                }
-                for path, points, outside in clouds
-            ]
-        return files

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,7 +42,12 @@ from mlscorr.pipeline.planning import too_little
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate.simulator_file import Simulator, beliefs_of, write_simulator
 from mlscorr.survey import Survey, TargetObservations
+from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
 
 STEPS = 6  # of the progress beside reading: the inference, folds, plan
 LEAST_VIEWS = 6  # with a residual in m: fewer than the pose has parameters say nothing
@@ -220,6 +226,38 @@ class DiagnosedSurvey(Summary):
         if self.inference.verdict.label in ("none", "unknown"):
             return self.simulator
         return with_cause(self.simulator, self.survey, self.inference.cause)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row each parameter of the causes, the best first; pandas is needed for it."""
+        return rows_frame(
+            {"effect": cause["effect"], "probability": cause["probability"], **parameter}
+            for cause in self.document["causes"]
+            for parameter in cause["parameters"]
+        )
+
+    def plot(self, name: str = "where") -> Figure:
+        """A figure of the page.
+
+        Parameters
+        ----------
+        name : str
+            ``where``, ``innovations`` (over time), ``evidence``, ``separability``, ``closure`` or
+            ``map``.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such figure, or nothing to show in it.
+        """
+        from mlscorr.report.gap import diagnosis_figures, draw
+
+        return draw(diagnosis_figures(self.document), name)
+
+    def _overview(self):
+        """What a notebook shows."""
+        content = self.document
+        sentences = [content["verdict"]["sentence"], content["headline"], *content["advice"]]
+        return [(sentence,) for sentence in (self.survey.name, *sentences)]
 
     def write(self, out: Path, overwrite: bool = False) -> dict:
         """Write gap.json, gap.html and simulator.toml into a folder, whole or not at all.

@@ -1,9 +1,13 @@
 """``extract``: from a survey to the list of all target-like objects in its cloud."""
 
+from __future__ import annotations
+
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,8 +24,12 @@ from mlscorr.pipeline.finding import (
 )
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, TargetObservations
+from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
 from mlscorr.targets import BY_EDGES, as_observations, distinct, search_targets, why_useless
+
+if TYPE_CHECKING:
+    import pandas
 
 BRIGHT_KINDS = ("circle", "square", "checkerboard")  # kinds that stand out without a surveyed place
 NO_CONTROL = "No control point is known: every object was taken as it looks."
@@ -29,7 +37,7 @@ NO_CONTROL = "No control point is known: every object was taken as it looks."
 
 def extract(
     survey: Survey, rng: np.random.Generator | None = None, progress: Callable | None = None
-) -> "ExtractedSurvey":
+) -> ExtractedSurvey:
     """List all target-like objects in the cloud of a survey, with and without control.
 
     Objects of the control points' kinds and sizes are found everywhere, near control points
@@ -163,6 +171,17 @@ class ExtractedSurvey(Summary):
             {"name": refusal.name, "pass": refusal.pass_number, "reason": refusal.reason}
             for refusal in self.finding.matches.refusals
         ]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row each object and pass, as targets.json has them; pandas is needed for it."""
+        return rows_frame(self.targets)
+
+    def _overview(self):
+        """What a notebook shows."""
+        kinds = Counter(row["kind"] for row in self.targets)
+        objects = ", ".join(f"{kind}: {number}" for kind, number in kinds.items())
+        rows = [("objects", objects or "none"), ("unseen", len(self.missing))]
+        return [(self.survey.name,), *rows, *((sentence,) for sentence in self.warnings)]
 
     def _rows(self, observations: TargetObservations, reasons) -> list[dict]:
         rows = []

@@ -1,8 +1,11 @@
 """``plan``: what a survey will be able to show, before anyone drives."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,12 +27,17 @@ from mlscorr.gap import (
 from mlscorr.gap.signatures import signatures
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.survey import Matched, Survey, TargetObservations
+from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
 
 LARGE = 10.0  # times its usual size: an effect that must be larger to be seen is not seen
 
 
-def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> "PlannedSurvey":
+def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> PlannedSurvey:
     """What effects a survey can show and tell apart, from its geometry alone.
 
     Parameters
@@ -173,6 +181,34 @@ class PlannedSurvey(Summary):
         if not self.separability.classes:
             advice.append("All effects that show can be told apart.")
         return advice
+
+    def to_frame(self) -> pandas.DataFrame:
+        """How small an effect shows, a row each parameter; pandas is needed for it."""
+        detectable = self.document["detectable"]
+        return rows_frame(
+            {"effect": name, **row} for name, rows in detectable.items() for row in rows
+        )
+
+    def plot(self, name: str = "detectable") -> Figure:
+        """A figure of the page.
+
+        Parameters
+        ----------
+        name : str
+            ``detectable``, ``map`` or ``separability``.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such figure, or nothing to show in it.
+        """
+        from mlscorr.report.gap import draw, plan_figures
+
+        return draw(plan_figures(self.document), name)
+
+    def _overview(self):
+        """What a notebook shows."""
+        return [(sentence,) for sentence in (self.survey.name, *self.document["advice"])]
 
     def write(self, out: str | Path, overwrite: bool = False) -> dict:
         """Write plan.json and plan.html into a folder, whole or not at all: the document.

@@ -1,9 +1,12 @@
 """``ties``: from a survey to what two of its passes both saw."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,10 +28,13 @@ from mlscorr.ties import (
     unheld_sentence,
 )
 
+if TYPE_CHECKING:
+    import pandas
+
 AXES = ("across", "along", "up")  # of the way of the earlier view
 
 
-def find_ties(survey: Survey, progress: Callable | None = None) -> "TiedSurvey":
+def find_ties(survey: Survey, progress: Callable | None = None) -> TiedSurvey:
     """Find planes and poles that two passes both saw, without control.
 
     Parameters
@@ -105,6 +111,19 @@ class TiedSurvey(Summary):
                 }
             )
         return rows
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row each tie, with both its views, as a data frame; pandas is needed for it."""
+        return self.search.ties.to_frame()
+
+    def _overview(self):
+        """What a notebook shows."""
+        rows = [("passes", "planes", "poles", "apart across, along, up (m, RMS)")]
+        for pair in self.pairs:
+            apart = (pair["misfit"][axis]["rms"] for axis in AXES)
+            numbers = ", ".join("-" if rms is None else f"{rms:.3f}" for rms in apart)
+            rows.append((pair["passes"], pair["planes"], pair["poles"], numbers))
+        return [(self.survey.name,), *rows, *((sentence,) for sentence in self.warnings)]
 
     @property
     def stretches(self) -> list[dict]:

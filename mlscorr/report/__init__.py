@@ -1,8 +1,8 @@
 """The report of a correction: figures and one self-contained page."""
 
 from mlscorr.report.cloud import view_cloud
-from mlscorr.report.comparison_page import basis, verdict, write_comparison
+from mlscorr.report.comparison_page import basis, comparison_figure, verdict, write_comparison
 from mlscorr.report.correction_page import write_report
-from mlscorr.report.figures import write_pictures
+from mlscorr.report.figures import draw_figure, write_pictures
 from mlscorr.report.headline import headline
 from mlscorr.report.target_figures import write_contact_sheet

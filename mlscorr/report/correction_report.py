@@ -59,8 +59,8 @@ class Coverage:
 
     control_span: tuple[float, float]
     longest_gap_s: float
-    points_outside_trajectory: int
-    points_outside_control: int
+    points_outside_trajectory: int = 0
+    points_outside_control: int = 0
     points_extrapolated: int = 0
     points_corrected: int = 0
 

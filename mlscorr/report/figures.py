@@ -1,6 +1,8 @@
-"""All figures of a correction, as SVG for the page and as PNG files."""
+"""All figures of a correction, by name, as SVG for the page and as PNG files."""
 
 from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
@@ -10,6 +12,40 @@ from mlscorr.report.style import png, svg
 from mlscorr.report.target_map import map_figure
 from mlscorr.report.tie_map import tie_figure
 from mlscorr.report.timeline import attitude_figure, correction_figure
+
+FIGURES = ("correction", "attitude", "map", "residuals", "ties")  # the last where there are ties
+
+
+def draw_figure(
+    name: str, correction: Correction, report: CorrectionReport, ties: TieResiduals | None = None
+) -> Figure:
+    """A figure of a correction.
+
+    Parameters
+    ----------
+    name : str
+        Of FIGURES.
+    correction : Correction
+        Its corrected trajectory may hold the sigmas after the estimate.
+    report : CorrectionReport
+    ties : TieResiduals, optional
+
+    Raises
+    ------
+    ValueError
+        Where there is no such figure.
+    """
+    figures = {
+        "correction": lambda: correction_figure(correction, report),
+        "attitude": lambda: attitude_figure(correction, report),
+        "map": lambda: map_figure(correction, report),
+        "residuals": lambda: residual_figure(report),
+    }
+    if ties is not None:
+        figures["ties"] = lambda: tie_figure(correction, ties)
+    if name not in figures:
+        raise ValueError(f"There is no figure '{name}' of this correction: {', '.join(figures)}.")
+    return figures[name]()
 
 
 def drawings(
@@ -23,13 +59,8 @@ def drawings(
     report : CorrectionReport
     ties : TieResiduals, optional
     """
-    of_ties = {} if ties is None else {"ties": svg(tie_figure(correction, ties))}
-    return of_ties | {
-        "correction": svg(correction_figure(correction, report)),
-        "attitude": svg(attitude_figure(correction, report)),
-        "map": svg(map_figure(correction, report)),
-        "residuals": svg(residual_figure(report)),
-    }
+    names = FIGURES if ties is not None else FIGURES[:-1]
+    return {name: svg(draw_figure(name, correction, report, ties)) for name in names}
 
 
 def write_pictures(
@@ -52,15 +83,9 @@ def write_pictures(
     -------
     list of Path
     """
-    pictures = {
-        "correction.png": correction_figure(correction, report),
-        "map.png": map_figure(correction, report),
-        "residuals.png": residual_figure(report),
-    }
-    if ties is not None:
-        pictures["ties.png"] = tie_figure(correction, ties)
+    names = ["correction", "map", "residuals", *(["ties"] if ties is not None else [])]
     paths = []
-    for name, figure in pictures.items():
-        paths.append(Path(folder) / name)
-        paths[-1].write_bytes(png(figure))
+    for name in names:
+        paths.append(Path(folder) / f"{name}.png")
+        paths[-1].write_bytes(png(draw_figure(name, correction, report, ties)))
     return paths

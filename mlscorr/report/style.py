@@ -88,9 +88,16 @@ def nice(value: float) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)))
 
 
+class NotebookFigure(Figure):
+    """A figure that notebooks show without pyplot, which would keep and show it twice."""
+
+    def _repr_png_(self) -> bytes:
+        return png(self)
+
+
 def new_figure(height: float) -> Figure:
     """An empty figure of the common width (height in inch)."""
-    return Figure(figsize=(SETTINGS.figure_width, height), layout="constrained")
+    return NotebookFigure(figsize=(SETTINGS.figure_width, height), layout="constrained")
 
 
 def legend_above(figure: Figure, handles: Sequence[Artist], columns: int = 3) -> None:

@@ -1,10 +1,17 @@
 """Records whose fields are columns, one row for each of n things."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
+
+from mlscorr.survey.data_frame import columns_frame
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +31,10 @@ class Columns:
         """Some rows: bool (n,), numbers (k,), or a slice, which gives views."""
         return type(self)(*(_selected(getattr(self, field.name), rows) for field in fields(self)))
 
+    def to_frame(self) -> pandas.DataFrame:
+        """A data frame with a row each, vectors in three columns; pandas is needed for it."""
+        return columns_frame(_named_columns(self))
+
     @classmethod
     def concatenate(cls, parts: Iterable[Self]) -> Self:
         """All rows of some records, in their order."""
@@ -36,3 +47,13 @@ def _selected(column, rows):
     if isinstance(column, tuple):
         return tuple(np.array(column, object)[rows])
     return column[rows] if isinstance(column, np.ndarray | Columns) else column
+
+
+def _named_columns(record):
+    """Name -> column, those of records among the fields with the field's name before."""
+    columns = {}
+    for field in fields(record):
+        value = getattr(record, field.name)
+        nested = _named_columns(value) if isinstance(value, Columns) else {"": value}
+        columns |= {f"{field.name}_{name}".rstrip("_"): part for name, part in nested.items()}
+    return columns

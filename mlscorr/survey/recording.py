@@ -116,6 +116,25 @@ class Survey(Summary):
         """Number of points in all cloud files."""
         return sum(file.points for file in self.clouds)
 
+    def _overview(self):
+        """What a notebook shows."""
+        start, end = self.trajectory.gps_time[[0, -1]]
+        passes = len(self.trajectory.gaps) + 1
+        mounted = ", ".join(scanner.name for scanner in self.scanners) or (
+            "not given" if self.mounting is None else "given"
+        )
+        return [
+            ("name", self.name),
+            ("coordinates", self.crs or "not stated"),
+            ("clouds", f"{len(self.clouds)} files, {self.points} points"),
+            (
+                "trajectory",
+                f"{len(self.trajectory)} epochs, {start:.1f} to {end:.1f} s, gaps {passes - 1}",
+            ),
+            ("surveyed", f"{len(self.control)} control and {len(self.check)} check points"),
+            ("mounting", mounted),
+        ]
+
     @property
     def lever_arm(self) -> np.ndarray:
         """The scanner (3,) in body axes; zero where no mounting is known. Units: m."""

@@ -1,6 +1,8 @@
-"""What a notebook shows of a value: one line, for a survey holds millions of numbers."""
+"""What a notebook shows of a value: a line or a short table, not its millions of numbers."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import Field, fields, is_dataclass
+from html import escape
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,6 +28,13 @@ position_sigma=None, attitude_sigma=None)
         parts = (f"{field.name}={_short(getattr(self, field.name))}" for field in fields(self))
         return f"{type(self).__name__}({', '.join(parts)})"
 
+    def _repr_html_(self) -> str:
+        return html_table(type(self).__name__, self._overview())
+
+    def _overview(self) -> Iterable[Sequence[object]]:
+        """Rows of what a notebook shows; those of one cell are sentences."""
+        return [(field.name, _short(getattr(self, field.name))) for field in fields(self)]
+
 
 def _short(value):
     """A field's value in a few words."""
@@ -37,3 +46,27 @@ def _short(value):
         return f"{type(value).__name__} of {len(value)}"
     text = repr(value)
     return text if len(text) <= LONGEST else type(value).__name__
+
+
+def html_table(caption: str, rows: Iterable[Sequence[object]]) -> str:
+    """A table in HTML, with all that comes from files escaped.
+
+    Parameters
+    ----------
+    caption : str
+    rows : iterable of sequences
+        One cell alone covers the columns of the others.
+
+    >>> html_table("Survey", [("name", "A & B")])
+    '<table><caption>Survey</caption><tr><td>name</td><td>A &amp; B</td></tr></table>'
+    """
+    lines = [[escape(str(cell)) for cell in row] for row in rows]
+    columns = max(map(len, lines), default=1)
+    cells = [
+        f'<td colspan="{columns}">{line[0]}</td>'
+        if len(line) < columns
+        else f"<td>{'</td><td>'.join(line)}</td>"
+        for line in lines
+    ]
+    body = "".join(f"<tr>{line}</tr>" for line in cells)
+    return f"<table><caption>{escape(caption)}</caption>{body}</table>"

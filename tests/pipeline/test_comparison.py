@@ -246,3 +246,12 @@ def test_the_example_makes_its_picture(street, tmp_path):
     printed = subprocess.check_output(command, text=True)
     assert "shift           RMSE E/N/H" in printed
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_notebook_shows_table_figure_and_data_frame(compared):
+    "A row each method in both, and the figure of the page"
+    frame = compared.to_frame().set_index("name")
+    assert list(frame.index) == NAMES
+    assert frame.loc["lsc", "check_rmse_3d"] == compared.row("lsc")["check"]["rmse_3d"]
+    assert f"<td>{NAMES[-1]}</td>" in compared._repr_html_()
+    assert len(compared.plot().axes) == 3

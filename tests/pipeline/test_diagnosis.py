@@ -72,7 +72,12 @@ def test_a_second_run_with_its_simulator_finds_nothing_more(late, diagnosed, tmp
     "With the simulator that the first run wrote nothing is left to find"
     simulator = read_simulator(diagnosed / "simulator.toml")
     assert [effect.name for effect in simulator.effects] == ["time_offset"]
-    again = mlscorr.diagnose(mlscorr.read_survey(late), simulator).document
+    second = mlscorr.diagnose(mlscorr.read_survey(late), simulator)
+    again = second.document
+    assert again["verdict"]["sentence"] in second._repr_html_()
+    causes = {cause["effect"] for cause in again["causes"] if cause["parameters"]}
+    assert set(second.to_frame().get("effect", ())) == causes
+    assert second.plot("evidence").axes
     assert again["verdict"]["label"] == "none"
     assert again["simulator"]["effects"][0]["name"] == "time_offset"
     assert again["closure"]["shrink"] == 0.0

@@ -498,3 +498,16 @@ def test_two_passes_by_a_target_are_two_observations():
         passes = seen.observations.pass_number
         assert set(passes) == {1, 2}
         assert sorted(names[passes == 1]) == sorted(names[passes == 2])
+
+
+def test_a_notebook_shows_table_figure_and_data_frame(corrected):
+    "The RMSE that the report has, a figure of it, and the rows of targets.csv"
+    result, out, told = corrected
+    assert f"{told['check']['after']['rmse'][0]:.3f}" in result._repr_html_()
+    assert result.plot("residuals").axes
+    with (out / "targets.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    frame = result.to_frame()
+    assert frame["name"].tolist() == [row["name"] for row in rows]
+    height = [float(row["after_height"]) for row in rows]
+    assert np.allclose(frame["after_height"], height, atol=1e-4)

@@ -100,6 +100,8 @@ def test_what_ties_alone_cannot_tell_is_named(uncontrolled):
     sentences = result.calibration.warnings
     assert any("No control point takes part" in sentence for sentence in sentences)
     assert any("does not determine lever arm up" in sentence for sentence in sentences)
+    assert result.to_frame()["determined"].tolist() == result.calibration.determined.tolist()
+    assert "not determined by this site" in result._repr_html_()
 
 
 def test_one_pass_without_control_says_what_is_missing(tmp_path):

@@ -1,6 +1,8 @@
 """All figures of a correction."""
 
-from mlscorr.report import write_pictures
+import pytest
+
+from mlscorr.report import draw_figure, write_pictures
 from mlscorr.report.figures import drawings
 from tests.beds.reports import drive, fabricate
 from tests.beds.tied_reports import tied_report
@@ -26,3 +28,11 @@ def test_the_page_has_four_figures_as_svg():
     figures = drawings(*fabricate(drive())[1:])
     assert list(figures) == ["correction", "attitude", "map", "residuals"]
     assert all(b"<svg" in picture and len(picture) < 1e6 for picture in figures.values())
+
+
+def test_a_figure_by_name_shows_itself_in_a_notebook():
+    "A notebook is given a PNG; a name that is none is answered with those that are"
+    correction, report = fabricate(drive())[1:]
+    assert draw_figure("map", correction, report)._repr_png_().startswith(b"\x89PNG")
+    with pytest.raises(ValueError, match="no figure 'ties' of this correction: correction, att"):
+        draw_figure("ties", correction, report)

@@ -1,10 +1,12 @@
 """What a notebook shows of a survey: its parts and their sizes in a few words."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Matched, Survey
+from mlscorr.survey.summary import Summary, html_table
 from tests.beds.tied_passes import tied_passes
 
 
@@ -36,3 +38,20 @@ def test_a_survey_of_a_million_epochs_shows_in_a_line():
         assert len(repr(value)) < 250
     assert repr(survey.ties) == f"Ties({len(survey.ties)} rows)"
     assert f"gps_time=array ({len(survey.trajectory.gps_time)},)" in repr(survey.trajectory)
+
+
+def test_a_notebook_shows_a_survey_as_a_short_table():
+    "Name, coordinates, clouds, trajectory, points and mounting; names from files can do no harm"
+    nothing = Matched.none().surveyed
+    trajectory = tied_passes(1).trajectory
+    survey = Survey("<script>", Path("survey.toml"), None, (), trajectory, None, nothing, nothing)
+    shown = survey._repr_html_()
+    assert "&lt;script&gt;" in shown and "<script>" not in shown
+    assert "control and" in shown and len(shown) < 1000
+
+
+def test_a_sentence_covers_all_columns():
+    "A row of one cell is as wide as the table"
+    shown = html_table("Gap", [("One & all",), ("a", 1, None)])
+    assert '<td colspan="3">One &amp; all</td>' in shown
+    assert "<td>a</td><td>1</td><td>None</td>" in shown

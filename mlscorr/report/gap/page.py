@@ -1,9 +1,9 @@
 """The pages of a diagnosis, and of what a survey could diagnose before it is driven."""
 
-from mlscorr.effects.wording import DASH, joined, known
-from mlscorr.report.gap.innovations import channel_style, innovations_figure
+from mlscorr.effects.wording import DASH, joined
+from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
+from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.labels import family, lowered, title, titles
-from mlscorr.report.gap.ladder import ladder, ladder_figure
 from mlscorr.report.gap.numbers import percent
 from mlscorr.report.gap.rows import (
     bin_rows,
@@ -13,10 +13,7 @@ from mlscorr.report.gap.rows import (
     split_title,
     worst_rows,
 )
-from mlscorr.report.gap.separability import detectable_figure, heat_figure
 from mlscorr.report.gap.settings import SETTINGS
-from mlscorr.report.gap.site_map import site_map
-from mlscorr.report.gap.splits import closure_figure, where_figure
 from mlscorr.report.gap.verdict import (
     VerdictBox,
     advice,
@@ -67,14 +64,8 @@ def diagnosis_page(document: dict, name: str) -> Page:
     answer, detectable = document["verdict"], separability["detectable"]
     is_clean = is_judged(document) and family(answer["label"]) == "none"
     probable, unlikely = _by_probability(cause_rows(document))
-    figures = {
-        "where": _drawn(where_figure, document, document["where"]),
-        "innovations": _drawn(innovations_figure, document, document["innovations"]["gps_time"]),
-        "evidence": _drawn(ladder_figure, document, ladder(document)),
-        "closure": _drawn(closure_figure, document, is_closed(document)),
-        "map": _drawn(site_map, document, document["map"]["trajectory"]),
-    }
-    is_empty = {key: not figures[key] for key in ("where", "innovations", "evidence", "map")}
+    figures = _drawn(diagnosis_figures(document))
+    is_empty = {key: key not in figures for key in ("where", "innovations", "evidence", "map")}
     is_empty["separability"] = not separability["correlation"]["names"]
     is_empty |= {"closure": not is_judged(document), "causes": not document["causes"]}
     content = {
@@ -113,11 +104,8 @@ def plan_page(document: dict, name: str) -> Page:
     """
     rows = detectable_rows(document["detectable"])
     worst = worst_rows(rows)
-    figures = {
-        "detectable": _drawn(detectable_figure, worst, any(known(row.ratio) for row in worst)),
-        "map": _drawn(site_map, document, document["map"]["trajectory"]),
-    }
-    is_empty = {"map": not figures["map"], "left": not document.get("left_out")}
+    figures = _drawn(plan_figures(document))
+    is_empty = {"map": "map" not in figures, "left": not document.get("left_out")}
     content = {
         "figures": figures,
         "verdict": _plan_verdict(worst, document),
@@ -136,7 +124,6 @@ def _page(document, name, headline, summary, sections, separability, content):
     """The Page with what both have."""
     advice_title, sentences = advice(document)
     parameters = separability["correlation"]["names"]
-    content["figures"]["heat"] = _drawn(heat_figure, separability, len(parameters) > 1)
     common = {
         "document": document,
         "name": name,
@@ -152,9 +139,9 @@ def _page(document, name, headline, summary, sections, separability, content):
     return Page(headline, summary, sections, common | content, "gap-", ("gap.css",))
 
 
-def _drawn(draw, value, is_there):
-    """A figure of a value as the address of an image; None where there is nothing to show."""
-    return data_uri(svg(draw(value))) if is_there else None
+def _drawn(figures):
+    """Figures by name, each as the address of an image."""
+    return {name: data_uri(svg(draw())) for name, draw in figures.items()}
 
 
 def _by_probability(rows):

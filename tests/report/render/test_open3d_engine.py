@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from mlscorr.cli.installation import _rendering
+from mlscorr.pipeline.installation import _rendering
 from mlscorr.report.render import PictureOptions, draw, open3d_engine, sheet
 from tests.beds.street_of_points import SIZE
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from mlscorr.survey.summary import Summary
+
 PACKAGES = (
     "numpy",
     "scipy",
@@ -68,19 +70,53 @@ class InstalledPart:
     remedy: str = ""
     needed: bool = True
 
+    @property
+    def mark(self) -> str:
+        """Its state in a word."""
+        return "ok" if self.ok else "MISSING" if self.needed else "without"
 
-def examine() -> tuple[InstalledPart, ...]:
+
+@dataclass(frozen=True, repr=False)
+class Installation(Summary):
+    """What is installed, what is missing, and the lines that install it.
+
+    Parameters
+    ----------
+    parts : tuple of InstalledPart
+    """
+
+    parts: tuple[InstalledPart, ...]
+
+    @property
+    def remedies(self) -> list[str]:
+        """The lines that install all that is missing, one for each installer."""
+        return remedy(self.parts)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all that is needed is there."""
+        return all(part.ok or not part.needed for part in self.parts)
+
+    def _overview(self):
+        """What a notebook shows."""
+        return [(part.name, part.mark, part.state) for part in self.parts] + [
+            (line,) for line in self.remedies
+        ]
+
+
+def doctor() -> Installation:
     """Look at packages, system libraries, the off-screen driver and geoid grids.
 
     Returns
     -------
-    tuple of InstalledPart
+    Installation
+        It takes seconds, for a picture is drawn.
     """
     findings = [InstalledPart("python", sys.version_info >= (3, 11), platform.python_version())]
     findings += [_package(name) for name in PACKAGES]
     findings += [_library(name, package) for name, package in LIBRARIES.items()]
     findings += [_driver(), _rendering(), _geoids()]
-    return tuple(findings)
+    return Installation(tuple(findings))
 
 
 def remedy(parts: Iterable[InstalledPart]) -> list[str]:

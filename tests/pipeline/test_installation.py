@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mlscorr.cli.installation import LIBRARIES, PACKAGES, InstalledPart, remedy
+from mlscorr.pipeline.installation import LIBRARIES, PACKAGES, Installation, InstalledPart, remedy
 
 MLSCORR = Path(sys.executable).with_name("mlscorr")
 
@@ -112,3 +112,11 @@ def test_each_installer_has_its_line():
 def test_a_failure_without_a_remedy_gives_no_line():
     "A picture that can't be drawn is told, but the drivers' own finding says what to install"
     assert remedy([InstalledPart("off-screen picture", False, "failed", needed=False)]) == []
+
+
+def test_a_notebook_shows_state_and_remedy():
+    "Each part with its state in a word, and the lines that install what is missing"
+    shown = Installation((InstalledPart("lazrs", False, "none", "pip install lazrs"),))
+    assert not shown.is_complete
+    assert "<td>lazrs</td><td>MISSING</td><td>none</td>" in shown._repr_html_()
+    assert "pip install lazrs" in shown._repr_html_()

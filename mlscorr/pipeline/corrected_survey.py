@@ -1,0 +1,291 @@
+"""What a correction gives of a survey, and its files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mlscorr.correction import PointSigma
+from mlscorr.estimate import Estimate, NextControl, place_control
+from mlscorr.evaluate.model import model_section
+from mlscorr.evaluate.rows import PointCounts, Score, TargetRow
+from mlscorr.evaluate.scores import accuracy, score
+from mlscorr.evaluate.target_rows import surveyed_rows
+from mlscorr.evaluate.ties import tie_section
+from mlscorr.io.las import sha256
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.result_tables import write_targets_csv
+from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.io.trajectory_exports import check_exports, export_trajectory
+from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.finding import silent
+from mlscorr.survey import Matched, Survey, Trajectory
+from mlscorr.survey.data_frame import rows_frame
+from mlscorr.survey.summary import Summary
+from mlscorr.targets import FittedTarget
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+    from mlscorr.report.correction_report import CorrectionReport
+
+
+@dataclass(frozen=True, repr=False)
+class CorrectedSurvey(Summary):
+    """A corrected survey: the estimate, the targets, the statistics, and ``write``.
+
+    Parameters
+    ----------
+    survey : Survey
+    estimate : Estimate
+    matched_control, matched_check : Matched
+    missing : list of TargetRow
+        Surveyed points without an observation.
+    fitted : dict
+        The targets by (pass number, gps_time), for their figures.
+    warnings : tuple of str
+        On clouds and control, beside those of the estimate.
+    """
+
+    survey: Survey
+    estimate: Estimate
+    matched_control: Matched
+    matched_check: Matched
+    missing: list[TargetRow] = field(default_factory=list)
+    fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The corrected trajectory, with the sigmas after the estimate."""
+        return self.estimate.correction.corrected
+
+    @property
+    def control(self) -> dict:
+        """What remains at the control points, as report.json has it."""
+        return self._control.document() | PointCounts.of(self.targets, "control").document()
+
+    @property
+    def check(self) -> dict:
+        """What remains at the check points, as report.json has it."""
+        return self._check.document() | PointCounts.of(self.targets, "check").document()
+
+    @property
+    def _control(self) -> Score:
+        return score(self.matched_control, self.estimate.correction, self.estimate.left_out)
+
+    @property
+    def _check(self) -> Score:
+        return score(self.matched_check, self.estimate.correction)
+
+    @property
+    def targets(self) -> list[TargetRow]:
+        """Rows of every surveyed point and pass."""
+        estimate = self.estimate
+        points = self.matched_control, self.matched_check
+        rows = surveyed_rows(*points, estimate.correction, estimate.outliers, estimate.left_out)
+        return rows + self.missing
+
+    @property
+    def accuracy(self) -> dict[str, object]:
+        """Accuracy by ASPRS 2023, as report.json has it: mlscorr.evaluate.accuracy."""
+        return accuracy(
+            self.matched_check,
+            self.matched_control,
+            self.estimate.correction,
+            self.estimate.left_out,
+        )
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The rows of targets.csv as a data frame; pandas is needed for it."""
+        return rows_frame(row.document() for row in self.targets)
+
+    def plot(self, name: str = "correction") -> Figure:
+        """A figure of the report.
+
+        Parameters
+        ----------
+        name : str
+            ``correction`` over time, ``attitude``, ``map``, ``residuals``, or ``ties`` where
+            passes were tied.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            ``savefig`` writes it; a notebook shows it.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such figure.
+        """
+        from mlscorr.report import draw_figure
+
+        return draw_figure(name, self.estimate.correction, self.report, self.estimate.ties)
+
+    def _overview(self):
+        """What a notebook shows."""
+        rows = [("m", "", "n", "east", "north", "height", "3D")]
+        for name, part in (("check points", self._check), ("control points", self._control)):
+            states = {"before": part.before, "after": part.after, "left out": part.left_out}
+            for state, statistics in states.items():
+                if statistics is not None and statistics.n:
+                    rmse = (f"{value:.3f}" for value in statistics.rmse[[0, 1, 2, 4]])
+                    rows.append((name, state, statistics.n, *rmse))
+        return [(self.survey.name,), ("RMSE of the misclosures",), *rows]
+
+    def write(
+        self,
+        out: str | Path,
+        overwrite: bool = False,
+        progress: Callable | None = None,
+        sigma: bool = False,
+        page: bool = True,
+        trajectories: Sequence[str] = (),
+    ) -> dict:
+        """Write corrected clouds, trajectory, targets and report into a folder.
+
+        Parameters
+        ----------
+        out : path
+            The folder, which appears whole or not at all.
+        overwrite : bool
+            Whether files of the same name are replaced.
+        progress : function, optional
+        sigma : bool
+            Give each point the fields sigma_easting, sigma_northing and sigma_height.
+        page : bool
+            Draw report.html and the pictures too, which takes longer than all else where the
+            survey is short.
+        trajectories : sequence of str
+            Further files for the corrected trajectory: NAME.sbet or NAME.out with its smrmsg, or
+            NAME.tum.
+
+        Returns
+        -------
+        dict
+            The document of report.json.
+
+        Raises
+        ------
+        ValueError
+            When the folder holds an input, or holds anything without overwrite.
+        OSError
+            When writing fails.
+        """
+        from mlscorr.report import headline
+
+        check_exports(trajectories, self.survey.crs, is_read=True)
+        with output_folder(out, self.survey.inputs, overwrite) as folder:
+            files, uncontrolled = self._write_clouds(folder, progress or silent, sigma)
+            write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
+            exports = [
+                name
+                for export in trajectories
+                for name in export_trajectory(folder / export, self.trajectory, self.survey.crs)
+            ]
+            write_targets_csv(folder / "targets.csv", [row.document() for row in self.targets])
+            report = self._report(folder, files, uncontrolled, exports)
+            content = document("report", {"headline": headline(report), **report.document()})
+            write_json(folder / "report.json", content)
+            if page:
+                self._draw(folder, report, progress or silent)
+        return content
+
+    def _draw(self, folder, report, progress):
+        """Write report.html and the pictures."""
+        from mlscorr.report import view_cloud, write_pictures, write_report
+
+        correction, ties = self.estimate.correction, self.estimate.ties
+        views = view_cloud(self.survey, correction, report.targets, progress, ties)
+        page = folder / "report.html"
+        write_report(page, self.survey, correction, report, views, self.fitted, ties)
+        (folder / "pictures").mkdir()
+        write_pictures(folder / "pictures", correction, report, ties)
+
+    @cached_property
+    def next_control(self) -> tuple[NextControl, ...]:
+        """Where one more control point each would help most, the best first."""
+        return place_control(self.estimate)
+
+    def point_sigma(self, survey: Survey | None = None) -> PointSigma:
+        """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m.
+
+        Parameters
+        ----------
+        survey : Survey, optional
+            One of ``survey.by_scanner``, where there are several scanners.
+        """
+        survey = survey or self.survey
+        return PointSigma.of(self.estimate.correction, survey.scanner, survey.mounting)
+
+    def _write_clouds(self, folder, progress, sigma):
+        """Write the clouds: (path, points, outside) of each, and points outside of control and
+        extrapolated (2,).
+        """
+        first, last = self.estimate.span if self.estimate.used.any() else (np.inf, -np.inf)
+        uncontrolled = np.zeros(2, int)
+        done = progress("Writing the cloud", self.survey.points)
+
+        def watch(times):
+            is_outside = (times < first) | (times > last)
+            is_weak = self.estimate.support.contains(times)
+            uncontrolled[:] += np.count_nonzero([is_outside, is_weak], axis=1)
+            done(len(times))
+
+        sigmas = self.point_sigma if sigma else None
+        files = write_clouds(self.survey, folder, self.estimate.correction, watch, sigmas)
+        return files, uncontrolled.tolist()
+
+    def _report(self, folder, files, uncontrolled, exports):
+        """The CorrectionReport, once all that it names stands in the folder."""
+        from mlscorr.report.correction_report import FileRow
+
+        def described(what, path):
+            return FileRow(path.name, sha256(path), what, bytes=path.stat().st_size)
+
+        outside, total = (sum(file[k] for file in files) for k in (2, 1))
+        outside_control, extrapolated = uncontrolled
+        names = ["trajectory.csv", *exports]
+        outputs = [*(("corrected trajectory", name) for name in names), ("targets", "targets.csv")]
+        return replace(
+            self.report,
+            coverage=replace(
+                self.report.coverage,
+                points_outside_trajectory=outside,
+                points_outside_control=outside_control,
+                points_extrapolated=extrapolated,
+                points_corrected=total - outside,
+            ),
+            files=tuple(FileRow(path.name, sha256(path), points=n) for path, n, _ in files),
+            inputs=tuple(described(file.what, file.path) for file in self.survey.inputs),
+            outputs=tuple(described(what, folder / name) for what, name in outputs),
+        )
+
+    @cached_property
+    def report(self) -> CorrectionReport:
+        """All that is told of the correction, without the files that ``write`` makes."""
+        from mlscorr.report.correction_report import CorrectionReport, Coverage
+
+        epochs = np.unique(self.matched_control.gps_time[self.estimate.used])
+        longest = float(np.diff(epochs if len(epochs) else self.estimate.span).max(initial=0.0))
+        return CorrectionReport(
+            name=self.survey.name,
+            crs=self.survey.crs,
+            notes=(*self.survey.notes, *filter(None, [self.estimate.untied])),
+            targets=self.targets,
+            control=self._control,
+            check=self._check,
+            accuracy=self.accuracy,
+            model=model_section(self.estimate, self.warnings),
+            coverage=Coverage(self.estimate.span, longest),
+            support=self.estimate.support,
+            next_control=self.next_control,
+            ties=tie_section(self.estimate),
+        )

@@ -1,0 +1,75 @@
+"""The figures of a diagnosis and of a plan by name: those that have something to show."""
+
+from collections.abc import Callable
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from mlscorr.effects.wording import known
+from mlscorr.report.gap.innovations import innovations_figure
+from mlscorr.report.gap.ladder import ladder, ladder_figure
+from mlscorr.report.gap.rows import detectable_rows, worst_rows
+from mlscorr.report.gap.separability import detectable_figure, heat_figure
+from mlscorr.report.gap.site_map import site_map
+from mlscorr.report.gap.splits import closure_figure, where_figure
+from mlscorr.report.gap.verdict import is_closed
+
+Figures = dict[str, Callable[[], Figure]]
+
+
+def diagnosis_figures(document: dict) -> Figures:
+    """Functions that draw the figures of a diagnosis, by name.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json; what was not determined is None.
+    """
+    figures = {
+        "where": (where_figure, document["where"]),
+        "innovations": (innovations_figure, document["innovations"]["gps_time"]),
+        "evidence": (ladder_figure, ladder(document)),
+        "closure": (closure_figure, is_closed(document)),
+        "map": (site_map, document["map"]["trajectory"]),
+    }
+    drawn = {name: partial(draw, document) for name, (draw, content) in figures.items() if content}
+    return drawn | _separability(document["separability"])
+
+
+def plan_figures(document: dict) -> Figures:
+    """Functions that draw the figures of a plan, by name.
+
+    Parameters
+    ----------
+    document : dict
+        The content of plan.json.
+    """
+    figures, worst = {}, worst_rows(detectable_rows(document["detectable"]))
+    if any(known(row.ratio) for row in worst):
+        figures["detectable"] = partial(detectable_figure, worst)
+    if document["map"]["trajectory"]:
+        figures["map"] = partial(site_map, document)
+    return figures | _separability(document)
+
+
+def draw(figures: Figures, name: str) -> Figure:
+    """The figure of a name.
+
+    Parameters
+    ----------
+    figures : dict of functions
+    name : str
+
+    Raises
+    ------
+    ValueError
+        Where there is none.
+    """
+    if name not in figures:
+        raise ValueError(f"There is no figure '{name}' here: {', '.join(figures)}.")
+    return figures[name]()
+
+
+def _separability(document):
+    is_matrix = len(document["correlation"]["names"]) > 1
+    return {"separability": partial(heat_figure, document)} if is_matrix else {}
