@@ -19,6 +19,8 @@ from mlscorr.cli.terminal import (
 )
 from mlscorr.cli.work import print_json, work
 
+MARKS = {"green": "  ", "amber": "! ", "red": "!!"}
+
 
 def correct(
     survey: SurveyArgument,
@@ -78,23 +80,17 @@ def correct(
             out, overwrite, progress, sigma, page=not no_report, trajectories=trajectory
         )
     tell(report, out, as_json)
-    outside = report["coverage"]["points_outside_trajectory"]
-    if outside:
-        total = sum(file["points"] for file in report["files"])
-        warn(
-            f"{outside} of {total} points lie outside the trajectory or in its gaps "
-            f"[{recorded.trajectory.gps_time[0]:.3f}, {recorded.trajectory.gps_time[-1]:.3f}] s "
-            "and were left as they were."
-        )
     failed = failures(gates, report)
     for sentence in failed:
         warn(f"Quality gate failed: {sentence}")
-    if failed or outside:
+    if failed or report["coverage"]["points_untouched"]:
         raise typer.Exit(Exit.QUALITY_GATE if failed else Exit.IN_PART)
 
 
 def tell(report: dict, out: Path, as_json: bool) -> None:
-    """Say the headline, the RMSE of misclosures before and after, and where the results lie.
+    """Say what stands first in the report, the RMSE of misclosures, and where the results lie.
+
+    What is red is said in any case. Warnings were said when they arose.
 
     Parameters
     ----------
@@ -108,7 +104,11 @@ def tell(report: dict, out: Path, as_json: bool) -> None:
     from mlscorr.report.tie_words import tie_sentences
 
     print_json(report, as_json)
-    say(report["headline"])
+    for statement in report["statements"]:
+        speak = warn if statement["rating"] == "red" else say
+        speak(f"{MARKS[statement['rating']]} {statement['what']}: {statement['sentence']}")
+        for item in statement["items"] if statement["what"] != "Warnings" else ():
+            speak("    " + ": ".join(filter(None, (item["name"], item["text"]))))
     for sentence in tie_sentences(report["ties"], report["control"]["n_scored"]):
         say(sentence)
     say(f"{'RMSE of misclosures (m)':24s}{'n':>4s}  {'E before':>9s}{'N':>8s}{'H':>8s}"
@@ -127,14 +127,6 @@ def tell(report: dict, out: Path, as_json: bool) -> None:
             f"{'  ' * (i % 3 == 0)}{v:{9 - (i % 3 > 0)}.3f}" for i, v in enumerate(numbers)
         )
         say(f"{title:24s}{group['n']:4d}{text}")
-    for row in report["weak"]:
-        say(
-            f"Extrapolated: {row['from']:.1f} to {row['to']:.1f} s ({row['length_m']:.0f} m): "
-            f"{row['why']}; sigma up to {row['sigma']:.3f} m"
-        )
-    for target in report["targets"]:
-        if not target["used"] and target["reason"] != "check point":
-            say(f"Not used: {target['name']}: {target['reason']}")
     if (out / "report.html").exists():
         say(f"Report:    {out / 'report.html'}")
         say(f"Pictures:  {out / 'pictures'}")

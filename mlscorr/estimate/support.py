@@ -38,6 +38,8 @@ class WeakStretch:
     sigma : float
         The largest 3D sigma of the corrected position: the error to expect. Units: m.
     why : str
+    chainage : float
+        Of its start: the length of the path from the first epoch, straight across gaps. Units: m.
     """
 
     start: float
@@ -45,6 +47,7 @@ class WeakStretch:
     length_m: float
     sigma: float
     why: str
+    chainage: float = 0.0
 
     @property
     def seconds(self) -> float:
@@ -54,7 +57,7 @@ class WeakStretch:
     def document(self) -> dict[str, object]:
         """The row of ``weak[]`` in report.json."""
         row = {"from": self.start, "to": self.end, "length_m": self.length_m}
-        return {**row, "sigma": self.sigma, "why": self.why}
+        return {**row, "chainage": self.chainage, "sigma": self.sigma, "why": self.why}
 
 
 @dataclass(frozen=True)
@@ -197,4 +200,5 @@ def _stretches(codes, trajectory):
                 float(way[first : end - 1].sum()),
                 float(size[rows].max()),
                 REASONS[codes[first]],
+                float(way[:first].sum()),
             )

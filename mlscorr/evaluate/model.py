@@ -3,6 +3,7 @@
 import numpy as np
 
 from mlscorr.estimate import COMPONENTS, Estimate
+from mlscorr.survey import Trajectory
 
 
 def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[str, object]:
@@ -46,6 +47,21 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
         "longest_gap": list(estimate.guards.gap),
         "passes_without_control": [list(span) for span in estimate.guards.passes_without_control],
     }
+
+
+def largest_sigma(trajectory: Trajectory) -> dict[str, float] | None:
+    """3D sigma of a trajectory's position in m: ``median``, ``largest``, and the latter's ``time``.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        None is told of one without sigmas.
+    """
+    if trajectory.position_sigma is None:
+        return None
+    sigma = np.linalg.norm(trajectory.position_sigma, axis=1)
+    time = float(trajectory.gps_time[sigma.argmax()])
+    return {"median": float(np.median(sigma)), "largest": float(sigma.max()), "time": time}
 
 
 def _observations(estimate):

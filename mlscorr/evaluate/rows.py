@@ -209,8 +209,9 @@ class PointCounts:
         check points.
     missing : tuple of (str, str)
         Name and reason of each that has points of the cloud about it and no observation.
-    refused : tuple of (str, str)
-        Name and reason of each that was observed and not used.
+    refused, outside : tuple of (str, str)
+        Name and reason of each that was observed and not used, and of each about which nothing was
+        scanned.
     """
 
     surveyed: int
@@ -218,6 +219,7 @@ class PointCounts:
     scored: int
     missing: tuple[tuple[str, str], ...] = ()
     refused: tuple[tuple[str, str], ...] = ()
+    outside: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def of(cls, rows: Iterable[TargetRow], role: str) -> PointCounts:
@@ -240,7 +242,8 @@ class PointCounts:
         missing = {row.name for row in rows if row.scanned} - observed
         everything = {row.name for row in rows}
         counts = len(everything), len(observed), len(scored)
-        return cls(*counts, reasons(missing), reasons(observed - scored))
+        outside = everything - observed - missing
+        return cls(*counts, *map(reasons, (missing, observed - scored, outside)))
 
     def document(self) -> dict[str, object]:
         """What the sections ``control`` and ``check`` of report.json have of it."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from mlscorr.correction import PointSigma
 from mlscorr.estimate import Estimate, NextControl, place_control
-from mlscorr.evaluate.model import model_section
+from mlscorr.evaluate.model import largest_sigma, model_section
 from mlscorr.evaluate.rows import PointCounts, Score, TargetRow
 from mlscorr.evaluate.scores import accuracy, score
 from mlscorr.evaluate.target_rows import surveyed_rows
@@ -22,6 +22,7 @@ from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_targets_csv
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.io.trajectory_exports import check_exports, export_trajectory
+from mlscorr.io.weak_files import write_weak
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Survey, Trajectory
@@ -179,7 +180,7 @@ class CorrectedSurvey(Summary):
         OSError
             When writing fails.
         """
-        from mlscorr.report import headline
+        from mlscorr.report import first_screen
 
         check_exports(trajectories, self.survey.crs, is_read=True)
         with output_folder(out, self.survey.inputs, overwrite) as folder:
@@ -191,8 +192,10 @@ class CorrectedSurvey(Summary):
                 for name in export_trajectory(folder / export, self.trajectory, self.survey.crs)
             ]
             write_targets_csv(folder / "targets.csv", [row.document() for row in self.targets])
-            report = self._report(folder, files, uncontrolled, exports)
-            content = document("report", {"headline": headline(report), **report.document()})
+            weak = [stretch.document() for stretch in self.estimate.support.weak]
+            weak_names = write_weak(folder, weak, self.trajectory, self.survey.crs)
+            report = self._report(folder, files, uncontrolled, exports, weak_names)
+            content = document("report", first_screen(report) | report.document())
             write_json(folder / "report.json", content)
             if page:
                 self._draw(folder, report, progress or silent)
@@ -243,7 +246,7 @@ class CorrectedSurvey(Summary):
         files = write_clouds(self.survey, folder, self.estimate.correction, watch, sigmas)
         return files, uncontrolled.tolist()
 
-    def _report(self, folder, files, uncontrolled, exports):
+    def _report(self, folder, files, uncontrolled, exports, weak_names):
         """The CorrectionReport, once all that it names stands in the folder."""
         from mlscorr.report.correction_report import FileRow
 
@@ -254,6 +257,7 @@ class CorrectedSurvey(Summary):
         outside_control, extrapolated = uncontrolled
         names = ["trajectory.csv", *exports]
         outputs = [*(("corrected trajectory", name) for name in names), ("targets", "targets.csv")]
+        outputs += [("extrapolated stretches", name) for name in weak_names]
         return replace(
             self.report,
             coverage=replace(
@@ -288,4 +292,5 @@ class CorrectedSurvey(Summary):
             support=self.estimate.support,
             next_control=self.next_control,
             ties=tie_section(self.estimate),
+            position_sigma=largest_sigma(self.trajectory),
         )

@@ -4,5 +4,5 @@ from mlscorr.report.cloud import view_cloud
 from mlscorr.report.comparison_page import basis, comparison_figure, verdict, write_comparison
 from mlscorr.report.correction_page import write_report
 from mlscorr.report.figures import draw_figure, write_pictures
-from mlscorr.report.headline import headline
+from mlscorr.report.headline import first_screen
 from mlscorr.report.target_figures import write_contact_sheet

@@ -12,7 +12,7 @@ from mlscorr.report import tables
 from mlscorr.report.cloud import CloudViews, cloud_content
 from mlscorr.report.correction_report import GROUPS, CorrectionReport, ordered
 from mlscorr.report.figures import drawings
-from mlscorr.report.headline import headline
+from mlscorr.report.headline import statements, worst_rating
 from mlscorr.report.pages import Page, data_uri
 from mlscorr.report.provenance import coverage, files, systems
 from mlscorr.report.settings import SETTINGS
@@ -90,13 +90,13 @@ def write_report(
 
 def _content(survey, correction, report, ties):
     """Everything that the templates show, except of cloud and model."""
-    sentences, worse = tables.verdict(report)
+    screen = statements(report)
     figures = drawings(correction, report, ties).items()
     return {
         "survey": survey,
         "report": report,
-        "sentences": [headline(report), *sentences],
-        "worse": worse,
+        "statements": screen,
+        "rating": worst_rating(screen),
         "facts": key_figures(correction, report),
         "tie_sentences": tie_sentences(report.ties, report.points("control").scored),
         "tie_pairs": _largest(report.ties),
@@ -104,7 +104,6 @@ def _content(survey, correction, report, ties):
         "statistics": tables.statistics_rows(report),
         "figures": {name: data_uri(picture) for name, picture in figures},
         "groups": [(name, ordered(report.targets, name)) for name in GROUPS],
-        "missing": [*report.points("check").missing, *report.points("control").missing],
         "has_left_out": any(np.isfinite(row.left_out).all() for row in report.targets),
         "coverage": coverage(correction, report),
         "systems": systems(survey),
@@ -122,7 +121,7 @@ def _largest(ties):
 
 
 def _model(model):
-    """What the templates show of the model: pairs, tables, outliers and warnings."""
+    """What the templates show of the model: pairs, tables and outliers."""
     rest = {key: value for key, value in model.items() if key not in ("outliers", "warnings")}
     if rest["order"] < 0:
         rest["order"] = "none"
@@ -131,7 +130,6 @@ def _model(model):
         "model": [pair for key, value in rest.items() for pair in _pairs(key, value)],
         "outliers": model.get("outliers") or [],
         "model_tables": [(_title(key), rows) for key, rows in lists.items()],
-        "warnings": list(dict.fromkeys(model.get("warnings") or [])),
     }
 
 
@@ -183,8 +181,8 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
         share = f"{points} of {surveyed}" if points < surveyed else str(points)
         facts.append((share, f"{role} point{'s' * (points != 1)} {deed}{often}"))
     facts.append((f"{tables.number(float(change.max()))} m", "largest correction of the position"))
-    sigma = correction.corrected.position_sigma
+    sigma = report.position_sigma
     if sigma is not None:
-        typical = float(np.median(np.linalg.norm(sigma, axis=1)))
-        facts.append((f"{tables.number(typical)} m", "3D sigma of the corrected position, median"))
+        median = f"{tables.number(sigma['median'])} m"
+        facts.append((median, "3D sigma of the corrected position, median"))
     return [*facts, (tables.thousands(report.cloud_points), "points in the cloud files")]

@@ -105,6 +105,9 @@ class CorrectionReport:
         Where more control points would help most, the best first.
     ties : dict or None
         As mlscorr.evaluate.ties.tie_section has it.
+    position_sigma : dict or None
+        3D sigma of the corrected position, in m: ``median``, ``largest``, and the ``time`` (s) of
+        the latter.
     """
 
     name: str
@@ -122,6 +125,7 @@ class CorrectionReport:
     support: Support = field(default_factory=Support)
     next_control: tuple[NextControl, ...] = ()
     ties: dict | None = None
+    position_sigma: dict[str, float] | None = None
 
     def document(self) -> dict:
         """The content of report.json."""
@@ -144,6 +148,7 @@ class CorrectionReport:
                 "outages": [list(outage) for outage in self.support.outages],
                 "steps": list(self.support.steps),
             },
+            "position_sigma": self.position_sigma,
             "next_control": [place.document() for place in self.next_control],
             **{name: [row.document() for row in getattr(self, name)] for name in rows[1:]},
         }

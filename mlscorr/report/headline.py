@@ -1,12 +1,86 @@
-"""The first line of a report: what was tested, by what, and which part rests on extrapolation."""
+"""What a correction says first, wherever it is read: terminal, report.json and page."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 from mlscorr.evaluate.rows import PointCounts
 from mlscorr.report.correction_report import CorrectionReport
-from mlscorr.report.tables import length_in_words
+from mlscorr.report.tables import length_in_words, verdict
 
-NAMED = 6  # points that a sentence names; the others stand in the list below it
+NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
+RATINGS = ("green", "amber", "red")  # as it should be; mind it; not whole, or worse than before
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A fact on the first screen.
+
+    Parameters
+    ----------
+    what : str
+        What it is about.
+    rating : str
+        Of RATINGS.
+    sentence : str
+    items : tuple of (str, str)
+        What it names one by one, and what is said of each.
+    """
+
+    what: str
+    rating: str
+    sentence: str
+    items: tuple[tuple[str, str], ...] = ()
+
+    def document(self) -> dict[str, object]:
+        """The row of ``statements[]`` in report.json."""
+        items = [{"name": name, "text": text} for name, text in self.items]
+        return {**vars(self), "items": items}
+
+
+def first_screen(report: CorrectionReport) -> dict[str, object]:
+    """What report.json begins with: ``headline``, ``rating`` and ``statements``.
+
+    Parameters
+    ----------
+    report : CorrectionReport
+    """
+    facts = statements(report)
+    return {
+        "headline": headline(report),
+        "rating": worst_rating(facts),
+        "statements": [statement.document() for statement in facts],
+    }
+
+
+def worst_rating(facts: list[Statement]) -> str:
+    """The rating of a whole result: the worst of its statements.
+
+    Parameters
+    ----------
+    facts : list of Statement
+    """
+    return max((statement.rating for statement in facts), key=RATINGS.index)
+
+
+def statements(report: CorrectionReport) -> list[Statement]:
+    """All that stands on the first screen, in its order.
+
+    Parameters
+    ----------
+    report : CorrectionReport
+    """
+    return [
+        _result(report),
+        _points_moved(report),
+        _check(report.points("check")),
+        _control(report),
+        _weakest(report),
+        *_left_out(report),
+        *_sigma(report),
+        *_warnings(report),
+    ]
 
 
 def headline(report: CorrectionReport) -> str:
@@ -18,10 +92,90 @@ def headline(report: CorrectionReport) -> str:
     ----------
     report : CorrectionReport
     """
-    check, control = report.points("check"), report.points("control")
-    if control.surveyed == 0:
-        return " ".join([_uncontrolled(report), *_check(check)])
-    return " ".join([*_check(check), _control(control), _extrapolated(report)])
+    check, control = _check(report.points("check")).sentence, _control(report).sentence
+    if report.points("control").surveyed == 0:
+        return f"{control} {check}"
+    return f"{check} Control: {control} {_weakest(report).sentence}"
+
+
+def _result(report):
+    """How far off the cloud was and is."""
+    sentences, is_worse = verdict(report)
+    is_tested = report.judgement[2] == "check"
+    rating = "red" if is_worse else "green" if is_tested else "amber"
+    return Statement("Result", rating, sentences[0], tuple(("", text) for text in sentences[1:]))
+
+
+def _points_moved(report):
+    """Which share of the points was corrected, and on which grounds."""
+    coverage = report.coverage
+    left = coverage.points_outside_trajectory
+    total = max(coverage.points_corrected + left, 1)
+    held = coverage.points_corrected - coverage.points_extrapolated
+    sentence = (
+        f"{percent(held / total)} of the points corrected where control holds them, "
+        f"{percent(coverage.points_extrapolated / total)} by extrapolation, "
+        f"{percent(left / total)} left as they were."
+    )
+    if left:
+        sentence += (
+            f" {left} of {total} points lie outside the trajectory or in its gaps and were left "
+            "as they were."
+        )
+    return Statement("Points", "red" if left or not held else "green", sentence)
+
+
+def percent(share: float) -> str:
+    """A share (0 to 1) in percent, never rounded to nothing or to all.
+
+    >>> percent(0.0), percent(0.002), percent(0.5), percent(0.999)
+    ('0 %', 'less than 1 %', '50 %', 'more than 99 %')
+    """
+    if 0 < share < 0.01:
+        return "less than 1 %"
+    return "more than 99 %" if 0.99 < share < 1 else f"{100 * share:.0f} %"
+
+
+def _check(points: PointCounts):
+    """The check points that were scored, and those that were not."""
+    if points.surveyed == 0:
+        sentence = "No check point was surveyed, so nothing independent tests this result."
+        return Statement("Check points", "amber", sentence)
+    rating = "red" if points.missing else "green" if points.scored else "amber"
+    return Statement("Check points", rating, " ".join(_scored(points)), _named(points))
+
+
+def _scored(points):
+    """Sentences on the check points that were seen, and on those that were not."""
+    scored = f"{points.scored} of {points.surveyed} surveyed check points"
+    yield f"{scored} {'was' if points.scored == 1 else 'were'} seen and scored."
+    missing, n = points.missing, len(points.missing)
+    if n:
+        them = "1 check point was" if n == 1 else f"{n} check points were"
+        yield (
+            f"{them} not seen although the cloud covers {'its' if n == 1 else 'their'} "
+            f"surroundings ({_names(missing)}): the error there is unknown, and counts against "
+            "this result."
+        )
+    outside = len(points.outside)
+    if outside:
+        yield f"{outside} {'stands' if outside == 1 else 'stand'} where nothing was scanned."
+
+
+def _control(report):
+    """The control points that were used, refused and not seen."""
+    points = report.points("control")
+    if points.surveyed == 0:
+        return Statement("Control points", "red", _uncontrolled(report))
+    parts = [f"{points.scored} of {points.surveyed} surveyed points used"]
+    if points.refused:
+        parts.append(f"{len(points.refused)} refused ({_names(points.refused)})")
+    if points.missing:
+        parts.append(f"{len(points.missing)} not seen ({_names(points.missing)})")
+    if points.outside:
+        parts.append(f"{len(points.outside)} where nothing was scanned")
+    rating = "amber" if points.refused or points.missing else "green"
+    return Statement("Control points", rating, ", ".join(parts) + ".", _named(points))
 
 
 def _uncontrolled(report):
@@ -39,52 +193,78 @@ def _uncontrolled(report):
     return result
 
 
-def _check(points: PointCounts):
-    """Sentences on the check points that were seen, and on those that were not."""
-    if points.surveyed == 0:
-        yield "No check point was surveyed, so nothing independent tests this result."
-        return
-    scored = f"{points.scored} of {points.surveyed} surveyed check points"
-    yield f"{scored} {'was' if points.scored == 1 else 'were'} seen and scored."
-    missing, n = points.missing, len(points.missing)
-    if n:
-        them = "1 check point was" if n == 1 else f"{n} check points were"
-        yield (
-            f"{them} not seen although the cloud covers {'its' if n == 1 else 'their'} "
-            f"surroundings ({_names(missing)}): the error there is unknown, and counts against "
-            "this result."
-        )
-    outside = points.surveyed - points.observed - n
-    if outside:
-        yield f"{outside} {'stands' if outside == 1 else 'stand'} where nothing was scanned."
+def _weakest(report):
+    """The parts of the drive that no control point holds.
 
-
-def _control(points: PointCounts):
-    """A sentence on the control points that were used, refused and not seen."""
-    parts = [f"Control: {points.scored} of {points.surveyed} surveyed points used"]
-    if points.refused:
-        parts.append(f"{len(points.refused)} refused ({_names(points.refused)})")
-    if points.missing:
-        parts.append(f"{len(points.missing)} not seen ({_names(points.missing)})")
-    outside = points.surveyed - points.observed - len(points.missing)
-    if outside:
-        parts.append(f"{outside} where nothing was scanned")
-    return ", ".join(parts) + "."
-
-
-def _extrapolated(report: CorrectionReport):
-    """A sentence on the part of the drive that no control point holds."""
+    They are no matter where their sigma is below the largest residual that the verdict rests on.
+    """
     weak = report.support.weak
     if not weak:
-        return "Control points hold the whole drive."
-    share = 100 * report.coverage.share_extrapolated
-    percent = "less than 1" if 0 < share < 1 else f"{share:.0f}"
-    return (
+        return Statement("Weakest", "green", "Control points hold the whole drive.")
+    largest, after = max(stretch.sigma for stretch in weak), report.judgement[1]
+    sentence = (
         f"No control holds {report.seconds_extrapolated:.1f} s "
-        f"({report.metres_extrapolated:.0f} m) of the drive, {percent} % of the points: "
+        f"({report.metres_extrapolated:.0f} m) of the drive, "
+        f"{percent(report.coverage.share_extrapolated)} of the points: "
         "the correction is extrapolated there, and an error of up to "
-        f"{length_in_words(max(stretch.sigma for stretch in weak))} is to be expected (one sigma)."
+        f"{length_in_words(largest)} is to be expected (one sigma)."
     )
+    rating = "green" if after is not None and largest <= after.maximum[4] else "amber"
+    return Statement("Weakest", rating, sentence, _capped(_stretches(weak)))
+
+
+def _stretches(weak):
+    """Items of the weak stretches, the worst first."""
+    for stretch in sorted(weak, key=lambda stretch: -stretch.sigma):
+        yield (
+            f"{stretch.start:.1f} to {stretch.end:.1f} s, "
+            f"{stretch.chainage:.0f} to {stretch.chainage + stretch.length_m:.0f} m of the way",
+            f"{stretch.why}; sigma up to {length_in_words(stretch.sigma)}",
+        )
+
+
+def _left_out(report) -> Iterator[Statement]:
+    """What remains at control points that the others alone correct."""
+    left_out = report.control.left_out
+    if left_out is not None and left_out.n and report.judgement[2] == "check":
+        axes = ", ".join(length_in_words(value) for value in left_out.rmse[:3])
+        sentence = (
+            f"RMSE {length_in_words(left_out.rmse[4])} in 3D ({axes} in E, N, H) at control points "
+            "that the others alone correct."
+        )
+        yield Statement("Left out in turn", "green", sentence)
+
+
+def _sigma(report) -> Iterator[Statement]:
+    """What the estimate itself believes of its result."""
+    sigma = report.position_sigma
+    if sigma is not None:
+        sentence = (
+            f"Up to {length_in_words(sigma['largest'])} (at {sigma['time']:.1f} s), "
+            f"{length_in_words(sigma['median'])} at half of the epochs: one sigma in 3D of the "
+            "corrected position."
+        )
+        yield Statement("Sigma", "green", sentence)
+
+
+def _warnings(report) -> Iterator[Statement]:
+    """What was doubtful on the way."""
+    doubts = dict.fromkeys(report.model.get("warnings") or ())
+    if doubts:
+        count = "1 warning:" if len(doubts) == 1 else f"{len(doubts)} warnings:"
+        yield Statement("Warnings", "amber", count, tuple(("", text) for text in doubts))
+
+
+def _named(points):
+    """Items of the points that took no part although they were surveyed."""
+    return _capped([*points.refused, *points.missing, *points.outside])
+
+
+def _capped(items):
+    """The first of some items, and how many more there are."""
+    items = tuple(items)
+    more = len(items) - NAMED
+    return items if more <= 0 else (*items[:NAMED], ("", f"and {more} more"))
 
 
 def _names(points):

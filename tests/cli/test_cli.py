@@ -392,6 +392,7 @@ def test_paths_may_be_relative_with_spaces_and_umlauts(commanded):
     process, out = commanded
     assert process.returncode == 0, process.stderr
     names = {"pass-1.laz", "pictures", "report.html", "report.json", "targets.csv"}
+    names |= {"weak.csv", "weak.geojson"}
     names |= {"trajectory.csv", "drive.sbet", "smrmsg_drive.out", "drive.tum"}  # as asked for
     assert {path.name for path in out.iterdir()} == names
     assert [path.name for path in out.parent.iterdir()] == [out.name]
@@ -425,7 +426,7 @@ def test_points_without_a_pose_are_counted_and_the_rest_is_done(in_part):
     outside = report["coverage"]["points_outside_trajectory"]
     assert outside > 0
     assert f"{outside} of {report['files'][0]['points']} points lie outside" in process.stderr
-    assert "Not used: T02:" in process.stderr and "gap of the trajectory" in process.stderr
+    assert "    T02: " in process.stderr and "gap of the trajectory" in process.stderr
     assert process.stdout == ""
 
 
@@ -438,6 +439,7 @@ def test_few_control_points_lower_the_order_with_a_warning(kept, order, survey):
     process = mlscorr("correct", survey, "-o", out, "--order", order, "--no-report")
     assert process.returncode == 0, process.stderr
     names = ["pass-1.laz", "report.json", "targets.csv", "trajectory.csv"]
+    names += ["weak.csv", "weak.geojson"]
     assert sorted(path.name for path in out.iterdir()) == names
     assert "report.html" not in process.stderr
     warned = [line for line in process.stderr.splitlines() if f"trend of order {order}" in line]

@@ -99,7 +99,7 @@ def test_says_so_when_the_correction_made_it_worse(rise, worse, tmp_path):
     report.check.after.rmse[2] = report.check.before.rmse[2] + rise
     html = page(tmp_path, survey, correction, report)
     assert ("worse than before: H by 0.012 m" in words(html)) == worse
-    assert ('class="verdict worse"' in html) == worse
+    assert ('class="verdict red"' in html) == worse
 
 
 def test_warnings_come_before_the_tables(tmp_path):

@@ -53,12 +53,13 @@ def test_the_document_has_its_parts_in_order():
     content = report.document()
     assert list(content) == [
         *("name", "crs", "notes", "targets", "control", "check", "accuracy", "model"),
-        *("coverage", "ties", "weak", "drift", "next_control", "files", "inputs", "outputs"),
+        *("coverage", "ties", "weak", "drift", "position_sigma", "next_control"),
+        *("files", "inputs", "outputs"),
     ]
     assert list(content["targets"][0])[:4] == ["name", "pass", "gps_time", "role"]
     for role, n in (("control", 6), ("check", 2)):
         assert [content[role][key] for key in ("n_surveyed", "n_seen", "n_scored")] == [n, n, n]
-    assert list(content["weak"][0]) == ["from", "to", "length_m", "sigma", "why"]
+    assert list(content["weak"][0]) == ["from", "to", "length_m", "chainage", "sigma", "why"]
     assert content["coverage"]["points_untouched"] == 0
     assert content["coverage"]["share_extrapolated"] == pytest.approx(40_000 / 1_234_567)
     assert "leave_one_out" in content["control"] and "leave_one_out" not in content["check"]

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mlscorr.cli.correct import tell
 from mlscorr.estimate import Support, WeakStretch
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.report.headline import headline
+from mlscorr.report.headline import first_screen, headline, statements
 from tests.beds.reports import drive, fabricate, page, words
 
 
@@ -77,11 +78,46 @@ def test_without_control_the_first_words_are_that_only_the_pos_says_where_the_cl
     assert "0 of 0" not in text
 
 
-def test_the_page_begins_with_it_and_lists_what_was_not_seen(tmp_path):
-    "The headline before the verdict, and each missing point with its reason"
+def test_page_report_and_terminal_begin_with_the_same_statements(tmp_path, capsys):
+    "Each sentence and each named point stands in all three before any table, the worst is red"
     survey, correction, report = fabricate(drive())
-    report = replace(report, targets=[*report.targets, lost("C7")])
+    report.model["warnings"] = ["The clock may be wrong."]
+    rows = [replace(report.targets[0], used=False, reason="outlier"), *report.targets[1:]]
+    report = replace(report, targets=[*rows, lost("C7")])
+    content = {**first_screen(report), **report.document()}
     html = page(tmp_path, survey, correction, report)
-    text = words(html)
-    assert text.index(headline(report)) < text.index("The correction brought the cloud")
-    assert "C7 : C7 is hidden." in text and 'class="verdict worse"' in html
+    tell(content, tmp_path, as_json=False)
+    terminal, text = " ".join(capsys.readouterr().err.split()), words(html)
+    for row in content["statements"]:
+        assert row["sentence"] in text[: text.index("How far the cloud is")]
+        assert row["sentence"] in terminal[: terminal.index("RMSE of misclosures")]
+    assert "C7 : C7 is hidden." in text and "C7: C7 is hidden." in terminal
+    assert "T01 : outlier" in text and "T01: outlier" in terminal
+    assert "The clock may be wrong." in text
+    assert content["rating"] == "red" and 'class="verdict red"' in html
+
+
+def test_a_good_result_is_green_and_a_part_that_was_left_is_red():
+    "Nothing is amber without a reason; points that were left as they were can't be overlooked"
+    report = replace(fabricate(drive())[2], support=Support())
+    assert {row.rating for row in statements(report)} == {"green"}
+    left = replace(report, coverage=replace(report.coverage, points_outside_trajectory=7))
+    points = next(row for row in statements(left) if row.what == "Points")
+    assert points.rating == "red" and "7 of 1234574 points lie outside" in points.sentence
+    assert first_screen(left)["rating"] == "red"
+
+
+def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_what_was_tested():
+    "The worst first; where its sigma is below what was found at points, it changes nothing"
+    report = fabricate(drive())[2]
+    for sigma, rating in ((0.4, "amber"), (0.0001, "green")):
+        weak = (
+            WeakStretch(10.0, 20.0, 50.0, sigma / 2, "a"),
+            WeakStretch(50.0, 61.5, 60.0, sigma, "b", 300.0),
+        )
+        row = next(
+            row for row in statements(replace(report, support=Support(weak)))
+            if row.what == "Weakest"
+        )  # fmt: skip
+        assert row.rating == rating
+        assert row.items[0][0] == "50.0 to 61.5 s, 300 to 360 m of the way"
