@@ -238,7 +238,7 @@ def test_further_files_hold_the_corrected_trajectory(commanded, corrected):
     out, expected = commanded[1], corrected[0].trajectory
     outputs = [file["name"] for file in read_json(out)["outputs"]]
     names = ["drive.sbet", "smrmsg_drive.out", "drive.tum"]
-    assert outputs == ["trajectory.csv", *names, "targets.csv"]
+    assert outputs == ["trajectory.csv", *names, "targets.csv", "weak.csv", "weak.geojson"]
     sbet = read_trajectory(out / names[0], corrected[0].survey.crs, out / names[1])
     for written in (sbet, read_trajectory(out / names[2])):
         assert np.abs(written.position - expected.position).max() < 2e-5
