@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say, say_statements
 from mlscorr.cli.work import print_json, work
 
 
@@ -34,10 +34,11 @@ def calibrate(
     if "scanners" in content:
         _tell_scanners(content["scanners"])
     else:
+        say_statements(content["statements"])
         _tell_mounting(content)
         _tell_misclosures(content)
-        _tell_ties(content["ties"])
     say(f"Calibration: {out / 'calibration.json'}")
+    say(f"Page:        {out / 'calibration.html'}")
     say(f"Survey:      {out / 'survey.toml'}, with the calibrated mounting")
     if not clouds:
         say("Its clouds are still as the recorded mounting put them; --clouds writes them anew.")
@@ -77,21 +78,6 @@ def _tell_mounting(content):
             )
 
 
-def _tell_ties(ties):
-    """How far what two passes both saw lies apart before and after, by pairs of passes."""
-    if ties is None:
-        return
-    say(f"Planes and poles in two passes: {ties['used']} of {ties['n']} ties used")
-    for pair in ties["pairs"]:
-        if pair["used"]:
-            first, second = pair["passes"]
-            before, after = (1e3 * pair[state]["median"] for state in ("before", "after"))
-            say(
-                f"  passes {first} and {second}: {pair['used']} ties, median misfit "
-                f"{before:.1f} mm before, {after:.1f} mm after"
-            )
-
-
 def _tell_misclosures(content):
     say(f"{'RMSE of misclosures (m)':34s}{'n':>4s}{'E before':>11s}{'N':>8s}{'H':>8s}"
         f"{'E after':>10s}{'N':>8s}{'H':>8s}")  # fmt: skip
@@ -108,6 +94,3 @@ def _tell_misclosures(content):
             numbers = [*group["before"]["rmse"], *group["after"]["rmse"]]
             say(f"{title:34s}{group['n']:4d}" + "{:11.4f}{:8.4f}{:8.4f}{:10.4f}{:8.4f}{:8.4f}"
                 .format(*numbers))  # fmt: skip
-    for target in content["targets"]:
-        if not target["used"] and target["reason"] != "check point":
-            say(f"Not used: {target['name']}: {target['reason']}")

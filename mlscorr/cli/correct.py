@@ -15,11 +15,10 @@ from mlscorr.cli.terminal import (
     SurveyArgument,
     exit_code,
     say,
+    say_statements,
     warn,
 )
 from mlscorr.cli.work import print_json, work
-
-MARKS = {"green": "  ", "amber": "! ", "red": "!!"}
 
 
 def correct(
@@ -90,8 +89,6 @@ def correct(
 def tell(report: dict, out: Path, as_json: bool) -> None:
     """Say what stands first in the report, the RMSE of misclosures, and where the results lie.
 
-    What is red is said in any case. Warnings were said when they arose.
-
     Parameters
     ----------
     report : dict
@@ -104,11 +101,7 @@ def tell(report: dict, out: Path, as_json: bool) -> None:
     from mlscorr.report.tie_words import tie_sentences
 
     print_json(report, as_json)
-    for statement in report["statements"]:
-        speak = warn if statement["rating"] == "red" else say
-        speak(f"{MARKS[statement['rating']]} {statement['what']}: {statement['sentence']}")
-        for item in statement["items"] if statement["what"] != "Warnings" else ():
-            speak("    " + ": ".join(filter(None, (item["name"], item["text"]))))
+    say_statements(report["statements"])
     for sentence in tie_sentences(report["ties"], report["control"]["n_scored"]):
         say(sentence)
     say(f"{'RMSE of misclosures (m)':24s}{'n':>4s}  {'E before':>9s}{'N':>8s}{'H':>8s}"

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)
+MARKS = {"green": "  ", "amber": "! ", "red": "!!"}  # before a statement, by its rating
 _voice = {"quiet": False}  # of this process's stderr
 
 
@@ -161,3 +162,20 @@ def warn(text: object) -> None:
     """
     shown = "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in str(text))
     print(shown, file=sys.stderr)  # names of files and points may hold what moves the cursor
+
+
+def say_statements(statements: list[dict]) -> None:
+    """Print the first screen of a document; what is red is said in any case.
+
+    Parameters
+    ----------
+    statements : list of dict
+        Warnings among them are left out: they were said when they arose.
+    """
+    for row in statements:
+        if row["what"] == "Warnings":
+            continue
+        speak = warn if row["rating"] == "red" else say
+        speak(f"{MARKS[row['rating']]} {row['what']}: {row['sentence']}")
+        for item in row["items"]:
+            speak("    " + ": ".join(filter(None, (item["name"], item["text"]))))

@@ -83,7 +83,7 @@ class CalibratedSurvey(Summary):
         overwrite: bool = False,
         progress: Callable | None = None,
     ) -> dict:
-        """Write calibration.json, and survey.toml with the calibrated mounting, into a folder.
+        """Write calibration.json, its page, and survey.toml with the calibrated mounting.
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class CalibratedSurvey(Summary):
         drift = self.calibration.correction_with_drift if with_drift else None
         content = document("calibration", self.report(drift))
         with output_folder(out, self.survey.inputs, overwrite) as folder:
-            write_json(folder / "calibration.json", content)
+            write_calibration(folder, content)
             if with_drift:
                 write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
             if clouds:
@@ -142,7 +142,9 @@ class CalibratedSurvey(Summary):
         drift : Correction, optional
             Of mounting and POS error.
         """
-        calibration = self.calibration
+        from mlscorr.report import calibration_screen
+
+        calibration, rows = self.calibration, self._rows(self.calibration.correction())
         content = {
             "name": self.survey.name,
             "mounting": {
@@ -153,7 +155,7 @@ class CalibratedSurvey(Summary):
             "determined": calibration.determined.tolist(),
             "parameters": _parameters(calibration.parameters),
             "outliers": [vars(outlier) for outlier in calibration.outliers],
-            "targets": self._targets(calibration.correction()),
+            "targets": [row.document() for row in rows],
             "ties": misfit_section(calibration.ties),
             "warnings": list(calibration.warnings),
             "notes": list(self.survey.notes),
@@ -166,7 +168,7 @@ class CalibratedSurvey(Summary):
                 "position_rms": np.sqrt(np.mean(change**2, axis=0)).tolist(),
                 "position_largest": np.abs(change).max(axis=0).tolist(),
             }
-        return content
+        return calibration_screen(content, rows) | content
 
     def _method(self, method):
         estimate = getattr(self.calibration, method)
@@ -190,11 +192,25 @@ class CalibratedSurvey(Summary):
         used = self.matched_control[self.calibration.used]
         return score(used, correction).document()
 
-    def _targets(self, correction):
-        """Rows of every surveyed point and pass, as in report.json."""
+    def _rows(self, correction):
+        """Rows of every surveyed point and pass."""
         points = self.matched_control, self.matched_check
-        rows = surveyed_rows(*points, correction, self.calibration.outliers)
-        return [row.document() for row in rows + self.missing]
+        return surveyed_rows(*points, correction, self.calibration.outliers) + self.missing
+
+
+def write_calibration(folder: Path, content: dict) -> None:
+    """Write calibration.json and calibration.html.
+
+    Parameters
+    ----------
+    folder : Path
+    content : dict
+        The document.
+    """
+    from mlscorr.report import calibration_page
+
+    write_json(folder / "calibration.json", content)
+    calibration_page(content).write(folder / "calibration.html")
 
 
 def write_calibrated_survey(

@@ -12,8 +12,12 @@ import numpy as np
 
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.io.las import sample_gps_times
-from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, write_calibrated_survey
+from mlscorr.io.output import document, output_folder
+from mlscorr.pipeline.calibrated_survey import (
+    CalibratedSurvey,
+    write_calibrated_survey,
+    write_calibration,
+)
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
@@ -144,7 +148,7 @@ class CalibratedScanners(Summary):
         content = document("calibration", self.report())
         parts = list(self.by_scanner.values())
         with output_folder(out, self.survey.inputs, overwrite) as folder:
-            write_json(folder / "calibration.json", content)
+            write_calibration(folder, content)
             if clouds:
                 done = (progress or silent)("Writing the cloud", self.survey.points)
                 for part in parts:

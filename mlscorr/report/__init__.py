@@ -1,5 +1,6 @@
 """The report of a correction: figures and one self-contained page."""
 
+from mlscorr.report.calibration_page import calibration_page, calibration_screen
 from mlscorr.report.cloud import view_cloud
 from mlscorr.report.comparison_page import basis, comparison_figure, verdict, write_comparison
 from mlscorr.report.correction_page import write_report

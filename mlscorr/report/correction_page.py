@@ -12,7 +12,7 @@ from mlscorr.report import tables
 from mlscorr.report.cloud import CloudViews, cloud_content
 from mlscorr.report.correction_report import GROUPS, CorrectionReport, ordered
 from mlscorr.report.figures import drawings
-from mlscorr.report.headline import statements, worst_rating
+from mlscorr.report.headline import statements, statements_section
 from mlscorr.report.pages import Page, data_uri
 from mlscorr.report.provenance import coverage, files, systems
 from mlscorr.report.settings import SETTINGS
@@ -90,13 +90,11 @@ def write_report(
 
 def _content(survey, correction, report, ties):
     """Everything that the templates show, except of cloud and model."""
-    screen = statements(report)
     figures = drawings(correction, report, ties).items()
     return {
         "survey": survey,
         "report": report,
-        "statements": screen,
-        "rating": worst_rating(screen),
+        **statements_section(statements(report)),
         "facts": key_figures(correction, report),
         "tie_sentences": tie_sentences(report.ties, report.points("control").scored),
         "tie_pairs": _largest(report.ties),

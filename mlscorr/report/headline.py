@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from mlscorr.evaluate.rows import PointCounts
 from mlscorr.report.correction_report import CorrectionReport
-from mlscorr.report.tables import length_in_words, verdict
+from mlscorr.report.tables import length_in_words, percent, verdict
 
 NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
 RATINGS = ("green", "amber", "red")  # as it should be; mind it; not whole, or worse than before
@@ -46,22 +46,18 @@ def first_screen(report: CorrectionReport) -> dict[str, object]:
     ----------
     report : CorrectionReport
     """
-    facts = statements(report)
-    return {
-        "headline": headline(report),
-        "rating": worst_rating(facts),
-        "statements": [statement.document() for statement in facts],
-    }
+    return {"headline": headline(report), **statements_section(statements(report))}
 
 
-def worst_rating(facts: list[Statement]) -> str:
-    """The rating of a whole result: the worst of its statements.
+def statements_section(facts: list[Statement]) -> dict[str, object]:
+    """``statements`` of a document, and ``rating``: the worst of them.
 
     Parameters
     ----------
     facts : list of Statement
     """
-    return max((statement.rating for statement in facts), key=RATINGS.index)
+    rating = max((statement.rating for statement in facts), key=RATINGS.index)
+    return {"rating": rating, "statements": [statement.document() for statement in facts]}
 
 
 def statements(report: CorrectionReport) -> list[Statement]:
@@ -74,12 +70,12 @@ def statements(report: CorrectionReport) -> list[Statement]:
     return [
         _result(report),
         _points_moved(report),
-        _check(report.points("check")),
+        check_statement(report.points("check")),
         _control(report),
         _weakest(report),
         *_left_out(report),
         *_sigma(report),
-        *_warnings(report),
+        *warning_statements(report.model.get("warnings") or ()),
     ]
 
 
@@ -92,7 +88,7 @@ def headline(report: CorrectionReport) -> str:
     ----------
     report : CorrectionReport
     """
-    check, control = _check(report.points("check")).sentence, _control(report).sentence
+    check, control = check_statement(report.points("check")).sentence, _control(report).sentence
     if report.points("control").surveyed == 0:
         return f"{control} {check}"
     return f"{check} Control: {control} {_weakest(report).sentence}"
@@ -125,19 +121,14 @@ def _points_moved(report):
     return Statement("Points", "red" if left or not held else "green", sentence)
 
 
-def percent(share: float) -> str:
-    """A share (0 to 1) in percent, never rounded to nothing or to all.
+def check_statement(points: PointCounts) -> Statement:
+    """The check points that were scored, and those that were not.
 
-    >>> percent(0.0), percent(0.002), percent(0.5), percent(0.999)
-    ('0 %', 'less than 1 %', '50 %', 'more than 99 %')
+    Parameters
+    ----------
+    points : PointCounts
+        Of the check points.
     """
-    if 0 < share < 0.01:
-        return "less than 1 %"
-    return "more than 99 %" if 0.99 < share < 1 else f"{100 * share:.0f} %"
-
-
-def _check(points: PointCounts):
-    """The check points that were scored, and those that were not."""
     if points.surveyed == 0:
         sentence = "No check point was surveyed, so nothing independent tests this result."
         return Statement("Check points", "amber", sentence)
@@ -163,10 +154,21 @@ def _scored(points):
 
 
 def _control(report):
-    """The control points that were used, refused and not seen."""
+    """The control points, or what a result without any is relative to."""
     points = report.points("control")
     if points.surveyed == 0:
         return Statement("Control points", "red", _uncontrolled(report))
+    return control_statement(points)
+
+
+def control_statement(points: PointCounts) -> Statement:
+    """The control points that were used, refused and not seen.
+
+    Parameters
+    ----------
+    points : PointCounts
+        Of the control points.
+    """
     parts = [f"{points.scored} of {points.surveyed} surveyed points used"]
     if points.refused:
         parts.append(f"{len(points.refused)} refused ({_names(points.refused)})")
@@ -247,9 +249,14 @@ def _sigma(report) -> Iterator[Statement]:
         yield Statement("Sigma", "green", sentence)
 
 
-def _warnings(report) -> Iterator[Statement]:
-    """What was doubtful on the way."""
-    doubts = dict.fromkeys(report.model.get("warnings") or ())
+def warning_statements(warnings: Iterable[str]) -> Iterator[Statement]:
+    """What was doubtful on the way, if anything was.
+
+    Parameters
+    ----------
+    warnings : iterable of str
+    """
+    doubts = dict.fromkeys(warnings)
     if doubts:
         count = "1 warning:" if len(doubts) == 1 else f"{len(doubts)} warnings:"
         yield Statement("Warnings", "amber", count, tuple(("", text) for text in doubts))

@@ -63,7 +63,7 @@ def millimetres(value: float | None) -> str:
     >>> millimetres(0.00288), millimetres(0.42302), millimetres(None)
     ('2.9', '423', '–')
     """
-    return "–" if value is None else number(1000 * value, int(value < 0.01))
+    return "–" if value is None else number(1000 * value, int(abs(value) < 0.01))
 
 
 def thousands(value: int) -> str:
@@ -73,6 +73,22 @@ def thousands(value: int) -> str:
     '1 847 911'
     """
     return f"{value:,}".replace(",", " ")
+
+
+def percent(share: float) -> str:
+    """A share in percent, never rounded to nothing or to all.
+
+    Parameters
+    ----------
+    share : float
+        0 to 1.
+
+    >>> percent(0.0), percent(0.002), percent(0.5), percent(0.999)
+    ('0 %', 'less than 1 %', '50 %', 'more than 99 %')
+    """
+    if 0 < share < 0.01:
+        return "less than 1 %"
+    return "more than 99 %" if 0.99 < share < 1 else f"{100 * share:.0f} %"
 
 
 def rmse_rows(report: CorrectionReport) -> list[RmseRow]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mlscorr.report.tables import length_in_words, thousands
+from mlscorr.report.tables import length_in_words, percent, thousands
 
 
 def tie_sentences(section: dict[str, Any] | None, control: int) -> list[str]:
@@ -60,12 +60,10 @@ def _share(section, control):
             "part, and an error that all passes share stays in the cloud."
         )
         return
-    share = 100 * section["share"]["control"]
-    percent = "less than 1" if share < 1 else f"{share:.0f}"
-    rest = "more than 99" if share < 1 else f"{100 - round(share):.0f}"
+    share = section["share"]["control"]
     yield (
-        f"Of what the result knows of the drive, {percent} % comes from control points and "
-        f"{rest} % from these places."
+        f"Of what the result knows of the drive, {percent(share)} comes from control points and "
+        f"{percent(1 - share)} from these places."
     )
     sufficient = section["sufficient_control"]
     if sufficient is None or control < 2:

@@ -46,7 +46,7 @@ def commanded(tmp_path_factory):
     command = [MLSCORR, "calibrate", folder / "survey", "-o", folder / "out", "--json"]
     process = subprocess.run(map(str, command), capture_output=True, text=True)
     assert process.returncode == 0, process.stderr
-    assert "ties used" in process.stderr
+    assert "that two passes both saw are used" in process.stderr
     return lacks, json.loads((folder / "out" / "calibration.json").read_text())
 
 

@@ -1,0 +1,157 @@
+"""The page of a calibration, and what it says first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from mlscorr.estimate import SETTINGS
+from mlscorr.estimate.calibration import MOUNTING_COMPONENTS
+from mlscorr.evaluate.rows import PointCounts, TargetRow
+from mlscorr.report.headline import (
+    Statement,
+    check_statement,
+    control_statement,
+    statements_section,
+    warning_statements,
+)
+from mlscorr.report.pages import Page
+from mlscorr.report.tables import length_in_words, millimetres
+
+PARTS = ("lever_arm", "boresight")
+SECTIONS = {
+    "mounting": "What it lacks",
+    "misclosures": "How far off",
+    "targets": "Every target",
+    "correlation": "What looks alike",
+    "notes": "What was used",
+}
+
+
+def calibration_screen(content: dict[str, Any], rows: list[TargetRow]) -> dict[str, object]:
+    """``rating`` and ``statements`` of calibration.json.
+
+    Parameters
+    ----------
+    content : dict
+        The other content of calibration.json, of one scanner.
+    rows : list of TargetRow
+        One for each surveyed point and pass.
+    """
+    control = PointCounts.of(rows, "control")
+    facts = [_lack(content), _determined(content), _remainder(content)]
+    if control.surveyed:
+        facts.append(control_statement(control))
+    facts.append(check_statement(PointCounts.of(rows, "check")))
+    return statements_section([*facts, *_ties(content), *warning_statements(content["warnings"])])
+
+
+def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
+    """A row for each part of the mounting: recorded, what it lacks, sigma, by both methods.
+
+    Parameters
+    ----------
+    content : dict
+        Of one scanner. Units: m and deg.
+    """
+    names, known = iter(MOUNTING_COMPONENTS), iter(content["determined"])
+    return [
+        {
+            "name": next(names),
+            "unit": unit,
+            "recorded": content["mounting"]["recorded"][part][axis],
+            "calibrated": content["mounting"]["calibrated"][part][axis],
+            **{m: content[m][part]["correction"][axis] for m in ("lsc", "ls")},
+            **{f"{m}_sigma": content[m][part]["sigma"][axis] for m in ("lsc", "ls")},
+            "determined": next(known),
+        }
+        for part, unit in zip(PARTS, ("m", "deg"), strict=True)
+        for axis in range(3)
+    ]
+
+
+def _lack(content):
+    """What the recorded mounting lacks beyond its sigma."""
+    limit = SETTINGS.setup_sigmas
+    lacks = [
+        f"{row['name']} {_size(row['lsc'], row['lsc_sigma'], row['unit'])}"
+        for row in component_rows(content)
+        if abs(row["lsc"]) > limit * row["lsc_sigma"] and row["determined"]
+    ]
+    if not lacks:
+        sentence = f"The recorded mounting holds: it lacks nothing beyond {limit:g} sigmas."
+        return Statement("Mounting", "green", sentence)
+    return Statement("Mounting", "amber", f"The recorded mounting lacks {', '.join(lacks)}.")
+
+
+def _size(value, sigma, unit):
+    """A value with its sigma in mm or deg."""
+    if unit == "m":
+        return f"{millimetres(value)} ± {millimetres(sigma)} mm"
+    return f"{value:.3f} ± {sigma:.3f} deg"
+
+
+def _determined(content):
+    """Which parts this geometry tells."""
+    open_parts = [row["name"] for row in component_rows(content) if not row["determined"]]
+    count = len(MOUNTING_COMPONENTS)
+    if not open_parts:
+        return Statement("Determined", "green", f"All {count} parts by this geometry.")
+    sentence = (
+        f"{count - len(open_parts)} of {count} parts; this geometry does not tell "
+        f"{', '.join(open_parts)}, which stays open."
+    )
+    return Statement("Determined", "amber", sentence)
+
+
+def _remainder(content):
+    """How far targets were and are off, by check points where there are any."""
+    role = "check" if content["lsc"]["check"]["n"] else "control"
+    group = content["lsc"][role]
+    if group["n"] == 0:
+        return Statement("Result", "amber", "No target tells how good the calibration is.")
+    before, after = (group[state]["rmse_3d"] for state in ("before", "after"))
+    sentence = f"3D RMSE of {role} points {length_in_words(before)} → {length_in_words(after)}"
+    if role == "control":
+        return Statement("Result", "amber", f"{sentence}: the fit alone, which proves little.")
+    rating = "green" if after <= before else "red"
+    return Statement("Result", rating, f"{sentence}; they took no part.")
+
+
+def _ties(content) -> Iterator[Statement]:
+    """How far apart the passes lie where both saw the same."""
+    ties = content["ties"]
+    if ties is not None and ties["used"]:
+        before, after = (length_in_words(ties[state]["median"]) for state in ("before", "after"))
+        sentence = (
+            f"{ties['used']} of {ties['n']} places that two passes both saw are used: {before} "
+            f"apart before, {after} after (median)."
+        )
+        yield Statement("Two passes", "green", sentence)
+
+
+def calibration_page(content: dict[str, Any]) -> Page:
+    """The page of calibration.json.
+
+    Parameters
+    ----------
+    content : dict
+        The whole document, of one scanner or of several.
+    """
+    scanners = content.get("scanners") or {"": content}
+    parts = {name: part | {"components": component_rows(part)} for name, part in scanners.items()}
+    return Page(
+        title=f"{content['name']}: calibration of the mounting",
+        summary="calibration-summary.html",
+        sections=SECTIONS,
+        content={"name": content["name"], "scanners": parts, "components": MOUNTING_COMPONENTS,
+                 "norm3": _norm},
+        prefix="calibration-",
+    )  # fmt: skip
+
+
+def _norm(values):
+    """Length of a vector of a document; NaN without one."""
+    return float(np.linalg.norm(values)) if values and None not in values else np.nan

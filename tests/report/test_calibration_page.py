@@ -1,0 +1,60 @@
+"""The page of a calibration, made of a document."""
+
+from dataclasses import replace
+
+from mlscorr.report import calibration_page, calibration_screen
+from tests.beds.reports import drive, fabricate, score_of, words
+
+MOUNTING = {"lever_arm": [0.1, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0]}
+PARAMETERS = {"position_scale": 1.0, "position_time": 30.0}
+
+
+def calibrated(determined=True, worse=False):
+    "Content of calibration.json of a scanner whose lever arm lacks 9 cm to the left, and its rows"
+    rows = fabricate(drive())[2].targets
+    scores = {role: score_of([r for r in rows if r.group == role]) for role in ("control", "check")}
+    if worse:
+        scores = {role: replace(s, before=s.after, after=s.before) for role, s in scores.items()}
+    method = {role: score.document() for role, score in scores.items()}
+    method |= {
+        "lever_arm": {"correction": [-0.091, 0.001, 0.002], "sigma": [0.003, 0.003, 0.005]},
+        "boresight": {"correction": [0.001, 0.3, 0.0], "sigma": [0.01, 0.01, 0.01]},
+        "correlation": [[1.0 if i == j else 0.25 for i in range(6)] for j in range(6)],
+    }
+    content = {
+        "mounting": {"recorded": MOUNTING, "calibrated": MOUNTING},
+        "lsc": method,
+        "ls": method,
+        "determined": [True, True, determined, True, True, True],
+        "parameters": PARAMETERS,
+        "targets": [row.document() for row in rows],
+        "ties": None,
+        "warnings": [],
+        "notes": ["Coordinates are in EPSG:32650."],
+    }
+    return content | calibration_screen(content, rows)
+
+
+def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_tell():
+    "Only what exceeds its sigma threefold is named, with sigma, in one unit each"
+    content = calibrated(determined=False)
+    text = words(calibration_page({"name": "site", **content}).html())
+    lacks = "lacks lever arm right -91 ± 3.0 mm, boresight about forward 0.300 ± 0.010 deg."
+    assert lacks in text
+    assert "5 of 6 parts; this geometry does not tell lever arm up, which stays open" in text
+    assert content["rating"] == "amber"
+    assert text.index(lacks) < text.index("How far the cloud is")
+    assert all(row["sentence"] in text for row in content["statements"])
+
+
+def test_a_calibration_that_makes_check_points_worse_is_red():
+    "A surveyor must not go on with it unwarned"
+    assert calibrated(worse=True)["rating"] == "red"
+
+
+def test_each_scanner_has_its_part():
+    "Two scanners: two first screens, two rows of tables, under their names"
+    scanners = {"left": calibrated(), "right": calibrated()}
+    html = calibration_page({"name": "site", "scanners": scanners}).html()
+    assert html.count('class="verdict') == 2
+    assert html.count("Scanner left") == html.count("Scanner right") == 6
