@@ -1,9 +1,9 @@
-# Two commands do everything, set-up included: make demo, make test
+# Three commands do everything, set-up included: make demo, make docs, make test
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
 
-.PHONY: demo test faults bench tables examples clean
+.PHONY: demo test docs faults bench tables examples clean
 
 demo: $(VENV)/ready
 	$(RUN)/mlscorr demo -o demo --overwrite
@@ -13,6 +13,10 @@ test: $(VENV)/ready
 	$(RUN)/ruff format --check .
 	$(RUN)/mypy
 	$(RUN)/python -m pytest -n 2 --dist loadfile
+
+# The manual, build/manual/index.html; its notebook runs, and a warning is an error
+docs: $(VENV)/ready
+	$(RUN)/sphinx-build -q -W --keep-going -c docs -d build/doctrees . build/manual
 
 # The whole matrix of docs/faults.md, of which make test tries a part; SHARE=0.1 a tenth of it
 faults: $(VENV)/ready
@@ -41,4 +45,4 @@ $(VENV)/ready: pyproject.toml setup.sh
 	touch $@
 
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) build demo

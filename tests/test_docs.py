@@ -1,14 +1,22 @@
 """README and docs: what they name is there, and what they show can be used."""
 
+import json
 import re
+import shutil
 import tomllib
+from pkgutil import resolve_name
+from typing import get_args
 
 import pytest
+from pydantic import BaseModel
 from readme_tables import PAGES
 from typer.main import get_command
 
+import mlscorr
 from mlscorr.cli import app
+from mlscorr.effects import catalogue, known_effects
 from mlscorr.io.survey_sections import SurveyFile
+from mlscorr.simulate.simulator_file import SimulatorFile
 from tests.beds.places import ROOT
 
 NAMES = [page.name for page in PAGES]
@@ -46,9 +54,10 @@ def test_commands_and_scripts_exist(page):
 
 
 def test_every_survey_toml_can_be_read(page):
-    "The sections that the pages show are those that a survey has"
+    "The sections that the pages show are those that a survey has, or a simulator"
     for block in re.findall(r"```toml\n(.*?)```", page.read_text(), flags=re.S):
-        SurveyFile.model_validate(tomllib.loads(block))
+        document = tomllib.loads(block)
+        (SurveyFile if "cloud" in document else SimulatorFile).model_validate(document)
 
 
 def test_the_readme_is_short_and_leads_to_every_page():
@@ -58,3 +67,69 @@ def test_the_readme_is_short_and_leads_to_every_page():
     text = "".join(page.read_text() for page in PAGES)
     for name in NAMES[1:]:
         assert name in text
+
+
+def test_names_of_the_package_are_there(page):
+    "What a page names as mlscorr.room.function can be imported, every one"
+    for name in re.findall(r"`(mlscorr\.[a-z_.]+)`", page.read_text()):
+        resolve_name(name)
+
+
+@pytest.mark.parametrize("name", ["tutorial", "start", "own-simulator"])
+def test_python_of_the_manual_runs(name, street, tmp_path, monkeypatch):
+    "Each page's blocks run one after the other beside a survey.toml, or a FOLDER without one"
+    shutil.copytree(street, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(street, tmp_path / "FOLDER").joinpath("survey.toml").unlink()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(catalogue, "_registered", {})
+    text = (ROOT / "docs" / f"{name}.md").read_text()
+    exec("\n".join(re.findall(r"```python\n(.*?)```", text, flags=re.S)), {"__name__": name})
+
+
+def test_the_index_leads_to_every_page():
+    "Each page of docs/ stands once in the contents, which the manual is ordered by"
+    index = (ROOT / "docs" / "index.md").read_text()
+    pages = [path.name for end in ("md", "ipynb") for path in (ROOT / "docs").glob(f"*.{end}")]
+    for name in {*pages} - {"index.md"}:
+        assert index.count(f"]({name})") == 1, name
+
+
+def test_the_notebook_holds_no_results():
+    "Its outputs are made while the manual is built, and are nobody's data"
+    notebook = json.loads((ROOT / "docs" / "notebook.ipynb").read_text())
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert cells and not any(cell["outputs"] or cell["execution_count"] for cell in cells)
+
+
+def test_the_api_page_has_every_function():
+    "All that import mlscorr offers"
+    names = re.findall(r"autofunction:: (\w+)", (ROOT / "docs" / "api.md").read_text())
+    assert set(mlscorr.__all__) <= {*names, "simulate"}
+
+
+def test_every_effect_is_listed_with_its_unit_and_usual_size():
+    "docs/effects.md says what the library does"
+    text = (ROOT / "docs" / "effects.md").read_text()
+    for kind in known_effects():
+        (row,) = re.findall(rf"(?m)^\| `{kind.name}` \| (.*) \|$", text)
+        magnitude = kind.quantities()["magnitude"]
+        assert row.startswith(kind.meaning)
+        assert f"`magnitude` ({magnitude.unit})" in row and row.endswith(f"{magnitude.typical:g}")
+        assert all(f"`{name}`" in row for name in kind.circumstances())
+
+
+def keys_of(model):
+    "Names of the keys of a section of survey.toml, and of those in it"
+    for name, field in model.model_fields.items():
+        yield name
+        waiting = [field.annotation]
+        for annotation in waiting:
+            waiting += get_args(annotation)
+            if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+                yield from keys_of(annotation)
+
+
+def test_every_key_of_a_survey_is_explained():
+    "docs/survey.md knows what survey.toml may hold"
+    words = set(re.findall(r"\w+", (ROOT / "docs" / "survey.md").read_text()))
+    assert not set(keys_of(SurveyFile)) - words

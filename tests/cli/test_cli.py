@@ -15,6 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
+from tests.beds.documents import undocumented
 
 MLSCORR = Path(sys.executable).with_name("mlscorr")
 STARTED = 357700.0  # s of the week, when the street's trajectory starts
@@ -384,6 +385,7 @@ def test_json_is_one_document_on_stdout(commanded):
     document = json.loads(process.stdout)
     assert document == json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert document["schema"] == "mlscorr.report/1"
+    assert not undocumented(document)
     assert "RMSE" in process.stderr
 
 

@@ -25,6 +25,7 @@ from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.report.gap import diagnosis_page, plan_page
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator
+from tests.beds.documents import undocumented
 from tests.beds.gap_documents import gap_document, parameter
 
 
@@ -115,6 +116,7 @@ def test_the_diagnosis_differentiates_it(tmp_path):
     assert sign.jacobian[up, 0] == pytest.approx(expected, abs=0.02 * square.max())
 
     document = mlscorr.plan(survey).document
+    assert not undocumented(document)
     assert {"squat", "time_offset"} <= set(document["detectable"])
     assert document["detectable"]["squat"][0]["typical"] == 1e-4
     assert "Squatting vehicle" in words(plan_page(document, "street"))

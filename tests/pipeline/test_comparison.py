@@ -17,6 +17,7 @@ from mlscorr.io.las import read_chunks
 from mlscorr.io.las_copy import write_corrected
 from mlscorr.io.survey_file import read_survey
 from mlscorr.report import basis
+from tests.beds.documents import undocumented
 from tests.beds.places import EXAMPLES, MLSCORR
 from tests.beds.shared import shared
 
@@ -65,6 +66,7 @@ def test_all_methods_stand_in_the_document_in_their_order(compared):
     "compare.json names every method, with check, control and seconds as promised"
     document = compared.document
     assert next(iter(document.items())) == ("schema", "mlscorr.compare/1")
+    assert not undocumented(document)
     assert [row["name"] for row in document["methods"]] == NAMES
     for row in document["methods"]:
         determined = row["status"] == "determined"

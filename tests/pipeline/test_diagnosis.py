@@ -18,6 +18,7 @@ from mlscorr.gap.signatures.simulators import as_believed, with_cause
 from mlscorr.io.las import read_chunks
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator
+from tests.beds.documents import undocumented
 from tests.beds.shared import shared
 
 OFFSET = 0.02  # s
@@ -58,6 +59,7 @@ def test_the_effect_that_acts_is_named_with_its_size(diagnosed):
     told = json.loads((diagnosed / "gap.json").read_text())
     assert told["schema"] == "mlscorr.gap/1"
     assert set(told) == KEYS
+    assert not undocumented(told)
     assert told["verdict"]["label"] == "time_offset"
     (offset,) = told["causes"][0]["parameters"]
     assert abs(offset["estimate"] - OFFSET) < 1.96 * offset["sigma"]

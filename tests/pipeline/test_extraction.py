@@ -19,6 +19,7 @@ from mlscorr.pipeline.finding import fit_while_reading
 from mlscorr.survey import PointCloud, Survey, Trajectory
 from mlscorr.targets import SETTINGS, distinct, search_targets
 from mlscorr.targets.regions import bright_regions
+from tests.beds.documents import undocumented
 
 MLSCORR = Path(sys.executable).with_name("mlscorr")
 CORNER = np.array([532_000.0, 3_374_000.0, 42.0])
@@ -60,6 +61,7 @@ def test_extract_names_every_surveyed_target(street, extracted):
     assert process.returncode == 0, process.stderr
     document = json.loads(process.stdout)
     assert document["schema"] == "mlscorr.targets/1"
+    assert not undocumented(document)
     assert document["unseen"] == []
     survey = mlscorr.read_survey(street)
     names = [row["name"] for row in document["targets"] if row["matched"]]

@@ -10,6 +10,7 @@ import pytest
 
 import mlscorr
 from mlscorr.simulate import Scenario, simulate
+from tests.beds.documents import undocumented
 
 MLSCORR = Path(sys.executable).with_name("mlscorr")
 LACKS = [0.03, -0.02, 0.0]  # m, of the recorded lever arm
@@ -62,6 +63,7 @@ def uncontrolled(tmp_path_factory):
 def test_planes_sharpen_what_few_targets_tell(commanded):
     "3 control points and planes: boresight to 0.03 deg, lever arm across to 2 cm, and 3 sigma"
     lacks, content = commanded
+    assert not undocumented(content)
     lever, boresight = (content["lsc"][part] for part in ("lever_arm", "boresight"))
     error = np.degrees(lacks[3:]) - boresight["correction"]
     assert np.abs(error[:2]).max() < 0.03  # deg

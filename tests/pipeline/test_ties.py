@@ -15,6 +15,7 @@ from mlscorr.pipeline.ties import TiedSurvey
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.ties import search_ties
 from tests.beds import tie_streets as street
+from tests.beds.documents import undocumented
 
 MLSCORR = Path(sys.executable).with_name("mlscorr")
 
@@ -51,6 +52,7 @@ def test_the_command_writes_a_row_for_each_tie(tied):
     content = json.loads((out / "ties.json").read_text())
     assert content == json.loads(process.stdout)
     assert content["schema"] == "mlscorr.ties/1"
+    assert not undocumented(content)
     rows = list(table(out))
     assert len(rows) == content["ties"] > 50
     assert sum(pair["n"] for pair in content["pairs"]) == content["ties"]

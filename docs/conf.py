@@ -1,0 +1,93 @@
+"""How Sphinx builds the manual: the pages of docs/ and of the project as they stand on the forge.
+
+The root is the project's, so that links lead to the same files in both; the order of the pages is
+that of the links in docs/index.md; formulas become MathML, which needs no net and no script.
+"""
+
+import logging
+import os
+import re
+from importlib import metadata
+from pathlib import Path
+
+from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
+
+project, author, release = "mlscorr", "mlscorr's authors", metadata.version("mlscorr")
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
+root_doc = "docs/index"
+include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**"]
+exclude_patterns = [".*", "assets", "benchmarks", "build", "examples", "mlscorr*", "tests"]
+
+html_theme, html_title = "furo", "mlscorr"
+html_math_renderer = "mathml"
+html_copy_source = html_show_sourcelink = False
+html_static_path: list[str] = []
+highlight_language = "none"
+copybutton_exclude = ".linenos, .gp, .go"  # prompts and what is printed
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 4
+nb_execution_mode = "force"
+nb_execution_timeout = 300  # s; a fresh machine compiles first
+nb_execution_raise_on_error = True
+nb_output_stderr = "warn"
+# a profile of its own, in which the kernel does not warn that TCP is not encrypted
+PROFILE = Path(__file__).parents[1] / "build" / "ipython" / "profile_default"
+PROFILE.mkdir(parents=True, exist_ok=True)
+(PROFILE / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n")
+os.environ["IPYTHONDIR"] = str(PROFILE.parent)
+logging.getLogger("traitlets").setLevel(logging.ERROR)  # dash, which open3d loads, is not there
+
+autodoc_typehints = "none"  # the docstrings say them, with shapes and units
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True, "inherited-members": False}
+napoleon_use_rtype = False
+
+LINKS = re.compile(r"(?m)^- \[([^\]]+)\]\(([^)]+)\)|^## (.+)$")
+
+
+def add_contents(app, docname, source):
+    """Make the tree of pages from the headings and links of the index."""
+    if docname != root_doc:
+        return
+    groups: list[tuple[str, list[str]]] = []
+    for title, link, heading in LINKS.findall(source[0]):
+        if heading:
+            groups.append((heading, []))
+        else:
+            page = re.sub(r"\.(md|ipynb)$", "", link).replace("../", "/")
+            groups[-1][1].append(f"{title} <{page}>")
+    for caption, pages in groups:
+        lines = ["", "```{toctree}", ":hidden:", f":caption: {caption}", *pages, "```", ""]
+        source[0] += "\n".join(lines)
+
+
+def head_examples(app, what, name, obj, options, lines):
+    """Give the examples of a docstring, which end it without a heading, one of their own."""
+    first = next((i for i, line in enumerate(lines) if line.startswith(">>> ")), None)
+    if first is not None and "Examples" not in lines:
+        lines[first:first] = ["Examples", "--------"]
+
+
+def write_math(self, node):
+    """An element of MathML."""
+    is_block = isinstance(node, nodes.math_block)
+    math = tex2mathml(node.astext(), as_block=is_block)
+    self.body.append(f'<div style="padding: 0.5em 0">{math}</div>' if is_block else math)
+    raise nodes.SkipNode
+
+
+def lead_to_index(app, exception):
+    """Write index.html at the top, which leads to the manual's first page."""
+    if exception is None:
+        page = '<meta http-equiv="refresh" content="0; url=docs/index.html">\n'
+        Path(app.outdir, "index.html").write_text(page, encoding="utf-8")
+
+
+def setup(app):
+    """Connect the above."""
+    app.connect("source-read", add_contents)
+    app.connect("autodoc-process-docstring", head_examples, priority=1)  # before napoleon
+    app.connect("build-finished", lead_to_index)
+    app.add_html_math_renderer("mathml", (write_math, None), (write_math, None))
