@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from mlscorr.survey import TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
+from mlscorr.ties.thinning import direction_class
 
 
 def pair_features(
@@ -20,8 +21,9 @@ def pair_features(
     """Ties between features of two visits, by different passes or by one that came back.
 
     A feature has at most one partner in each other pass, and one in its own at another visit: the
-    nearest whose direction is parallel, each the other's. Call it again with a better correction,
-    smaller sigma, radius and angle.
+    nearest whose direction is parallel, each the other's. Two passes have none in a direction in
+    which half as many pair when they are displaced by twice their gates: those would be by chance.
+    Call it again with a better correction, smaller sigma, radius and angle.
 
     Parameters
     ----------
@@ -46,6 +48,7 @@ def pair_features(
     """
     present = features if turned is None else replace(features, direction=turned)
     pairs = _mutual(present, *candidate_pairs(present, correction, sigma, radius, angle))
+    pairs = pairs[_beyond_chance(present, correction, sigma, radius, angle, pairs)]
     first, second = present.direction[pairs.T]
     direction = first + second
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -67,6 +70,46 @@ def pair_features(
     )
 
 
+def _beyond_chance(features, correction, sigma, radius, angle, pairs):
+    """Which pairs (k,) are no chance for the most part, as are all of both passes and a direction.
+
+    Displaced by two gates, no two views of one thing are a pair. The correction chose the place
+    where most agree: so of the displaced ones the fullest counts.
+    """
+    is_chance = np.zeros(len(pairs), bool)
+    variance = 2 * (sigma**2 + features.variance + SETTINGS.surface_sigma**2)
+    gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))
+    way = features.direction.copy()
+    is_pole = features.kind == "pole"
+    way[is_pole] = _across(way[is_pole])[0]
+    for gates in (2.0, -2.0):
+        shift = gates * gate[:, None] * way
+        candidates = candidate_pairs(features, correction, sigma, radius, angle, shift)
+        chance = _mutual(features, *candidates)
+        for group in (_passes, _passes_and_direction):
+            own, displaced = group(features, pairs), np.sort(group(features, chance))
+            is_chance |= 2 * _count(own, displaced) >= _count(own, np.sort(own))
+    return ~is_chance
+
+
+def _passes(features, pairs):
+    """Number (k,) of both passes of pairs."""
+    first, second = features.pass_number[pairs].T
+    return first * (features.pass_number.max(initial=0) + 1) + second
+
+
+def _passes_and_direction(features, pairs):
+    """Number (k,) of both passes, the kind and the direction of pairs."""
+    bins = direction_class(features.direction[pairs[:, 0]])
+    kind = features.kind[pairs[:, 0]] == "pole"
+    return (_passes(features, pairs) * 14 + np.minimum(bins, 26 - bins)) * 2 + kind
+
+
+def _count(values, others):
+    """How often each of some values (n,) is among others (m,), which are sorted."""
+    return others.searchsorted(values, "right") - others.searchsorted(values, "left")
+
+
 def _across(axis):
     """Two unit vectors (n, 3) across axes and each other, the first of them horizontal."""
     side = np.cross(axis, [0.0, 1.0, 0.0])
@@ -80,15 +123,21 @@ def candidate_pairs(
     sigma: np.ndarray,
     radius: float,
     angle: float = SETTINGS.parallel,
+    shift: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs (k, 2) of parallel features within their gates, and distances (k,) in such units.
+
+    The earlier visit's stands first.
 
     Parameters
     ----------
     features, correction, sigma, radius, angle
         As of pair_features.
+    shift : (n, 3) array, optional
+        By which the later of two visits is displaced. Units: m.
     """
     place = features.centre + correction
+    shift = np.zeros_like(place) if shift is None else shift
     visits = _visits(features)
     limit = np.hypot(min(radius, 2 * SETTINGS.gate_sigmas * sigma.max(initial=0.0)), SETTINGS.cell)
     # directions that differ by the angle are as far apart as places may be; no pole is near a plane
@@ -100,20 +149,25 @@ def candidate_pairs(
         np.array([edge(place[rows], axis=0) for rows in visits]).reshape(-1, 3)
         for edge in (np.min, np.max)
     )
+    farthest = limit + np.abs(shift).max(initial=0.0)
     parts = [np.empty((0, 2), int)]
     for i, tree in enumerate(trees):
-        near = (low <= high[i] + limit) & (high >= low[i] - limit)
+        near = (low <= high[i] + farthest) & (high >= low[i] - farthest)
         for j in np.flatnonzero(near.all(axis=1)):
             if i != j:
+                moved = points[visits[j]]
+                moved[:, :3] += np.sign(j - i) * shift[visits[j]]
                 _, nearest = tree.query(
-                    points[visits[j]], range(1, SETTINGS.neighbours + 1),
+                    moved, range(1, SETTINGS.neighbours + 1),
                     distance_upper_bound=np.sqrt(2) * limit,
                 )  # fmt: skip
                 first, column = np.nonzero(nearest < len(visits[i]))
                 partner = visits[i][nearest[first, column]]
-                parts.append(np.sort(np.column_stack([visits[j][first], partner]), axis=1))
+                pairs = np.column_stack([partner, visits[j][first]])
+                parts.append(pairs if i < j else pairs[:, ::-1])
     pairs = np.unique(np.concatenate(parts), axis=0)
-    distance = _distance(features, place, sigma, radius, pairs)
+    apart = np.diff(place[pairs], axis=1)[:, 0] + shift[pairs[:, 1]]
+    distance = _distance(features, apart, sigma, radius, pairs)
     cosine = np.einsum("ni,ni->n", *features.direction[pairs.T])
     kept = np.isfinite(distance) & (cosine >= np.cos(angle))
     return pairs[kept], distance[kept]
@@ -128,12 +182,11 @@ def _visits(features):
     return np.split(order, np.flatnonzero(np.diff(number[order])) + 1) if len(order) else []
 
 
-def _distance(features, place, sigma, radius, pairs):
-    """Distances (k,) of pairs in units of gate and cell; infinite for what can't be a pair."""
+def _distance(features, apart, sigma, radius, pairs):
+    """Distances (k,) of pairs, ways (k, 3) apart, in units of gate and cell; infinite for none."""
     first, second = pairs.T
     axis = features.direction[first] + features.direction[second]
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    apart = place[second] - place[first]
     along = np.abs(np.einsum("ni,ni->n", apart, axis))
     across = np.sqrt(np.maximum((apart**2).sum(axis=1) - along**2, 0.0))
     is_pole = features.kind[first] == "pole"

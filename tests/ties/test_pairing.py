@@ -72,11 +72,38 @@ def test_a_correction_closes_what_it_should():
 
 
 def test_a_repeated_facade_is_not_paired_with_the_next_window():
-    "Reveals 1.2 m apart, of which each pass sees every other: no pair where sigma is 0.2 m"
+    """Reveals 1.2 m apart, of which each pass sees every other: none is near enough where sigma is
+    0.2 m, and where it is 0.6 m those beyond the next pair too
+    """
     places = [[1.2 * i, 8.0, 3.0] for i in range(20)]
     features = walls(places, [1 + i % 2 for i in range(20)])
     assert len(pair(features, 0.2)) == 0
-    assert len(pair(features, 0.6)) > 0
+    assert len(pair(features, 0.6)) == 0
+
+
+def test_a_street_that_changed_at_random_has_no_ties():
+    "Features of the second pass at random places: those that pair do so elsewhere too"
+    features = street.features()
+    rng, late = np.random.default_rng(1), features.pass_number == 2
+    low, high = (edge(features.centre, axis=0) for edge in (np.min, np.max))
+    centre = np.where(late[:, None], rng.uniform(low, high, features.centre.shape), features.centre)
+    assert len(pair(features, 0.4)) > 300
+    assert len(pair(replace(features, centre=centre), 0.4)) == 0
+
+
+def test_chance_in_one_direction_takes_nothing_from_another():
+    "Houses rebuilt beside the same road: its ties stay, in full, and hardly another one"
+    features = street.features()
+    rng, is_road = np.random.default_rng(1), features.direction[:, 2] > 0.9
+    gone = (features.pass_number == 2) & ~is_road
+    low, high = (edge(features.centre, axis=0) for edge in (np.min, np.max))
+    centre = np.where(gone[:, None], rng.uniform(low, high, features.centre.shape), features.centre)
+    is_road = [
+        pair(replace(features, centre=place), 0.4).direction[:, 2] > 0.9
+        for place in (features.centre, centre)
+    ]
+    assert is_road[1].sum() == is_road[0].sum()
+    assert (~is_road[1]).sum() < (~is_road[0]).sum() / 10
 
 
 def test_a_parallel_street_is_another():
