@@ -27,20 +27,20 @@ GNSS = 5.0  # s, at both ends of a pass
 NEAREST = 5.0  # m between two passes that are compared in a place
 
 
-def scenario():
+def scenario(duration=DURATION):
     """The canyon as a MEMS unit records it, with GNSS at the ends of the passes alone."""
     canyon = read_scenario(FOLDER / "canyon.toml")
-    starts = (0.0, DURATION + canyon.drive.passes[1].pause)
+    starts = (0.0, duration + canyon.drive.passes[1].pause)
     pos = {
         "grade": "mems",
         "sky_view": False,
-        "outages": tuple((start + GNSS, DURATION - 2 * GNSS) for start in starts),
+        "outages": tuple((start + GNSS, duration - 2 * GNSS) for start in starts),
     }
     scanner = canyon.scanner[0].model_copy(update={"points_per_line": POINTS_PER_LINE})
     return canyon.model_copy(
         update={
             "pos": canyon.pos.model_copy(update=pos),
-            "drive": canyon.drive.model_copy(update={"duration": DURATION, "stops": ()}),
+            "drive": canyon.drive.model_copy(update={"duration": duration, "stops": ()}),
             "scanner": (scanner,),
             "targets": canyon.targets.model_copy(update={"control": 16, "check": 4}),
         }
@@ -63,7 +63,7 @@ def measure(survey, true, ties):
     corrected = result.trajectory
     left = true.at(corrected.gps_time).position - corrected.position
     within = np.mean(np.abs(left) < 2 * corrected.position_sigma)
-    return _rms(left), float(within), _apart(true, corrected.gps_time, left)
+    return rms(left), float(within), _apart(true, corrected.gps_time, left)
 
 
 def _apart(true, gps_time, left):
@@ -76,10 +76,11 @@ def _apart(true, gps_time, left):
     )
     away = np.linalg.norm(place[there][:, None] - place[back], axis=2)
     near = away.min(axis=1) < NEAREST
-    return _rms((left[there] - left[back][away.argmin(axis=1)])[near])
+    return rms((left[there] - left[back][away.argmin(axis=1)])[near])
 
 
-def _rms(left):
+def rms(left):
+    """Root mean square (m) of the lengths of vectors (n, 3)."""
     return float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
 
 
@@ -99,7 +100,7 @@ def main():
             true = join_passes(simulated.true_passes)
             recorded = mlscorr.read_survey(Path(folder) / "survey")
             times = recorded.trajectory.gps_time
-            raw = _rms(true.at(times).position - recorded.trajectory.position)
+            raw = rms(true.at(times).position - recorded.trajectory.position)
             for number in arguments.control:
                 survey = with_control(recorded, number) if number else recorded
                 alone = measure(survey, true, "off") if number else (np.nan, np.nan)

@@ -1,10 +1,11 @@
 """What ties between passes add to control points, on simulated drives there and back.
 
-python benchmarks/ties_study.py [--seeds 6] [--control 3 6 12]
+python benchmarks/ties_study.py [--seeds 6] [--control 3 6 12] [--streets canyon]
 
 RMS in 3D of the whole trajectory by control alone and with ties, and the shares within 2 sigma.
 Drives, drift and sigmas are the simulator's canyon; ties are facades, road and cross walls at
 random places beside the way, as both passes saw them, with 10 mm of noise, a share of them wrong.
+Other streets have kerbs and eaves too, or road, poles, kerbs and markings alone.
 """
 
 import argparse
@@ -19,40 +20,67 @@ from mlscorr.frames import georeference, to_scanner
 from mlscorr.survey import Mounting, Ties
 
 NOISE = 0.010  # m, one sigma of a tie: what is left of a street that changes a little
-NUMBER = 1000  # ties of a drive
 FARTHEST = 30.0  # m from the vehicle
 WRONG_SIZE = (0.1, 1.0)  # m, of cars that moved, and facades shifted by one window
-NORMALS = {"facade": 0.6, "road": 0.3, "cross wall": 0.1}  # shares
+# Number of ties of a drive of 90 s there, by what they are of: what stays of a second, poles and
+# trees every 12 m, ends of dashes every 12 m. A pole or an end of a dash is known to 2 NOISE.
+CANYON = {"facade": 600, "road": 300, "cross wall": 100}
+ROAD = {"road": 300}
+STREETS = {
+    "canyon": CANYON,
+    "canyon with kerbs": {**CANYON, "kerb": 500},
+    "canyon with eaves": {**CANYON, "eaves": 500},
+    "canyon with markings": {**CANYON, "line": 500, "dash": 45},
+    "road": ROAD,
+    "road with kerbs": {**ROAD, "kerb": 500},
+    "road with markings": {**ROAD, "line": 500, "dash": 45},
+    "road with poles": {**ROAD, "pole": 45},
+    "road with poles and kerbs": {**ROAD, "pole": 45, "kerb": 500},
+    "road with poles and markings": {**ROAD, "pole": 45, "line": 500, "dash": 45},
+    "tunnel": {"facade": 600, "road": 300},
+    "tunnel with markings": {"facade": 600, "road": 300, "line": 500, "dash": 45},
+}
+# Along which a tie of it holds: right, forward or up.
+AXES = {
+    "facade": "r", "road": "u", "cross wall": "f", "kerb": "r", "eaves": "u", "line": "r",
+    "dash": "f", "pole": "rf",
+}  # fmt: skip
 
 
-def feature_ties(survey, seed, number=NUMBER, wrong=0.05):
-    """Ties of a FeatureSurvey's first two passes; a share of them wrong."""
+def feature_ties(survey, seed, street=CANYON, wrong=0.05):
+    """Ties of a FeatureSurvey's first two passes in a street; a share of them wrong."""
     rng = np.random.default_rng([seed, 2])
     true, recorded = survey.true, survey.recorded
     (first, last), (begin, end) = true.passes[:2]
-    times = rng.uniform(first + 1.0, last - 1.0, number)
-    pose, kind = true.at(times), rng.choice(list(NORMALS), number, p=list(NORMALS.values()))
+    kind = np.repeat(list(street), list(street.values()))
+    sigma = np.where(np.isin(kind, ["pole", "dash"]), 2 * NOISE, NOISE)
+    times = rng.uniform(first + 1.0, last - 1.0, len(kind))
+    pose = true.at(times)
     forward = pose.attitude.apply([0.0, 1.0, 0.0])
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right, axis=1, keepdims=True)
-    side = rng.choice([-1.0, 1.0], number) * np.where(
-        kind == "road", 3.0, rng.uniform(6, 12, number)
-    )
-    height = np.where(kind == "road", -2.0, rng.uniform(-1.0, 6.0, number))
+    low = np.isin(kind, ["road", "kerb", "line", "dash"])
+    side = rng.choice([-1.0, 1.0], len(kind)) * np.where(low, 3.0, rng.uniform(6, 12, len(kind)))
+    height = np.where(low, -2.0, rng.uniform(-1.0, 6.0, len(kind)))
+    height = np.where(kind == "eaves", 12.0, height)
     place = pose.position + side[:, None] * right + height[:, None] * [0.0, 0.0, 1.0]
-    normal = np.where((kind == "road")[:, None], [0.0, 0.0, 1.0], right)
-    normal = np.where((kind == "cross wall")[:, None], forward, normal)
+    row = np.repeat(np.arange(len(kind)), [len(AXES[name]) for name in kind])
+    axis = np.array(list("".join(AXES[name] for name in kind)))[:, None]
+    normal = np.where(axis == "u", [0.0, 0.0, 1.0], right[row])
+    normal = np.where(axis == "f", forward[row], normal)
+    times, place, sigma = times[row], place[row], sigma[row]
     back = (true.gps_time >= begin + 1.0) & (true.gps_time <= end - 1.0)
     away = np.linalg.norm(true.position[back] - place[:, None], axis=2)
     again, seen = true.gps_time[back][away.argmin(axis=1)], away.min(axis=1) < FARTHEST
     times, again, place, normal = times[seen], again[seen], place[seen], normal[seen]
+    sigma = sigma[seen]
     mounting = Mounting(np.zeros(3), Rotation.identity())
     views = [
         georeference(recorded, mounting, to_scanner(true, mounting, place, when), when)
         for when in (times, again)
     ]
     n = len(times)
-    error = NOISE * rng.standard_normal(n)
+    error = sigma * rng.standard_normal(n)
     bad = rng.random(n) < wrong
     error[bad] += rng.choice([-1.0, 1.0], bad.sum()) * rng.uniform(*WRONG_SIZE, bad.sum())
     views[1] = views[1] + error[:, None] * normal
@@ -61,7 +89,7 @@ def feature_ties(survey, seed, number=NUMBER, wrong=0.05):
         place=np.stack(views, axis=1),
         direction=normal,
         misclosure=np.einsum("ni,ni->n", normal, views[1] - views[0]),
-        variance=np.full(n, NOISE**2),
+        variance=sigma**2,
         kind=np.full(n, "plane"),
         pass_number=np.tile([1, 2], (n, 1)),
         feature=np.arange(2 * n).reshape(n, 2),
@@ -93,28 +121,33 @@ def main():
     parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--control", type=int, nargs="+", default=[3, 6, 12])
     parser.add_argument("--wrong", type=float, default=0.05, help="share of wrong ties")
+    parser.add_argument("--streets", nargs="+", default=["canyon"], choices=STREETS)
     parser.add_argument("--grade", default="mems", choices=("mems", "tactical"))
     arguments = parser.parse_args()
     scenario = scenarios()["canyon"]
     pos = scenario.pos.model_copy(update={"grade": arguments.grade})
     scenario = scenario.model_copy(update={"pos": pos})
-    print("control  seed     raw   alone  within    ties  within   ratio")
+    print("control  seed     raw   alone  within    ties  within   ratio  street")
     for number in arguments.control:
-        ratios = []
+        ratios = {street: [] for street in arguments.streets}
         for seed in range(arguments.seeds):
             survey = some_control(feature_survey(scenario, seed), number)
-            ties = feature_ties(survey, seed, wrong=arguments.wrong)
-            raw = np.sqrt(
-                np.mean(np.sum((survey.true.position - survey.recorded.position) ** 2, axis=1))
-            )
-            alone, tied = measure(survey, None), measure(survey, ties)
-            ratios.append(tied[0] / alone[0])
+            left = survey.true.position - survey.recorded.position
+            raw, alone = np.sqrt(np.mean(np.sum(left**2, axis=1))), measure(survey, None)
+            for street, values in ratios.items():
+                ties = feature_ties(survey, seed, STREETS[street], arguments.wrong)
+                tied = measure(survey, ties)
+                values.append(tied[0] / alone[0])
+                print(
+                    f"{number:7d}{seed:6d}{raw:8.3f}{alone[0]:8.3f}{alone[1]:8.0%}"
+                    f"{tied[0]:8.3f}{tied[1]:8.0%}{values[-1]:8.2f}  {street}",
+                    flush=True,
+                )
+        for street, values in ratios.items():
             print(
-                f"{number:7d}{seed:6d}{raw:8.3f}{alone[0]:8.3f}{alone[1]:8.0%}"
-                f"{tied[0]:8.3f}{tied[1]:8.0%}{ratios[-1]:8.2f}",
-                flush=True,
+                f"{number:7d} median ratio {np.median(values):.2f}, largest {max(values):.2f} "
+                f"in {street}"
             )
-        print(f"{number:7d} median ratio {np.median(ratios):.2f}, largest {max(ratios):.2f}")
 
 
 if __name__ == "__main__":
