@@ -55,7 +55,10 @@ class Page:
         """
         frame = {"versions": versions(), "written": now(), "window_title": self.title}
         frame |= {name: getattr(self, name) for name in ("summary", "sections", "prefix")}
-        frame |= {"styles": ("style.css", *self.styles), "scripts": ("sort.js", *self.scripts)}
+        frame |= {
+            "styles": ("style.css", *self.styles),
+            "scripts": ("fit.js", "sort.js", *self.scripts),
+        }
         return environment().get_template("skeleton.html").render(frame | self.content)
 
     def write(self, path: str | Path) -> None:

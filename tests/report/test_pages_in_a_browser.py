@@ -3,14 +3,10 @@
 import json
 import re
 import shutil
-import subprocess
-from html import unescape
 
 import pytest
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-BROWSER = next((path for name in NAMES if (path := shutil.which(name))), None)
-ITS_OWN = ("GL Driver Message", "software WebGL")  # what Chromium says of a machine without a GPU
+from tests.beds.browser import browse, need_browser
 
 # two frames: a phone with WebGL, and a wide screen without it
 WRAPPER = """<!DOCTYPE html><meta charset="utf-8"><pre id="result">not run</pre>
@@ -127,33 +123,10 @@ run().then(found => JSON.stringify(found), error => "failed: " + error.stack).th
 @pytest.fixture(scope="module")
 def opened(commanded, tmp_path_factory):
     "What Chromium found in the street's report: (results by frame, lines of its console, report)"
-    if BROWSER is None:
-        pytest.skip("No Chromium is installed, so the page was not opened in a browser.")
+    need_browser()
     folder = tmp_path_factory.mktemp("browser")
     shutil.copy(commanded[1] / "report.html", folder)
-    (folder / "wrapper.html").write_text(WRAPPER, encoding="utf-8")
-    command = [
-        BROWSER,
-        "--headless",
-        "--no-sandbox",
-        "--disable-background-networking",
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
-        "--allow-file-access-from-files",
-        f"--user-data-dir={folder / 'profile'}",
-        "--window-size=1700,1000",
-        "--virtual-time-budget=30000",
-        "--enable-logging=stderr",
-        "--dump-dom",
-        (folder / "wrapper.html").as_uri(),
-    ]
-    process = subprocess.run(command, capture_output=True, text=True, timeout=600)
-    text = re.search(r'<pre id="result">(.*?)</pre>', process.stdout, re.S)
-    assert text, process.stderr[-2000:]
-    text = unescape(text[1])
-    assert text.startswith("{"), text
-    console = [line for line in process.stderr.splitlines() if "CONSOLE" in line]
-    console = [line for line in console if not any(words in line for words in ITS_OWN)]
+    text, console = browse(folder, WRAPPER)
     report = json.loads((commanded[1] / "report.json").read_text(encoding="utf-8"))
     return json.loads(text), console, report
 

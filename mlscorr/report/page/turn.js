@@ -200,8 +200,9 @@
     e.preventDefault(); zoom(Math.exp(Math.sign(e.deltaY) * Math.min(Math.abs(e.deltaY), 100) * 0.0015));
   }, { passive: false });
   stage.addEventListener("keydown", e => {
-    const act = { ArrowLeft: () => turn(-15, 0), ArrowRight: () => turn(15, 0), ArrowUp: () => turn(0, 15), ArrowDown: () => turn(0, -15), "+": () => zoom(0.8), "-": () => zoom(1.25) }[e.key];
-    if (act) { e.preventDefault(); act(); }
+    const go = e.shiftKey ? (dx, dy) => pan(3 * dx, 3 * dy) : turn;
+    const act = { ArrowLeft: () => go(-15, 0), ArrowRight: () => go(15, 0), ArrowUp: () => go(0, 15), ArrowDown: () => go(0, -15), "+": () => zoom(0.8), "=": () => zoom(0.8), "-": () => zoom(1.25), Home: () => goTo(null) }[e.key];
+    if (act && !e.ctrlKey) { e.preventDefault(); act(); }
   });
   for (const input of view.querySelectorAll("input")) input.addEventListener("change", () => {
     if (input.name === "colour") { colour = input.value; paint(); redraw(); return; }

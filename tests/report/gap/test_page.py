@@ -2,8 +2,6 @@
 
 import json
 import re
-import shutil
-import subprocess
 from html import escape, unescape
 from html.parser import HTMLParser
 
@@ -13,10 +11,9 @@ from mlscorr.report.gap import diagnosis_page, plan_page
 from mlscorr.report.gap.numbers import signed
 from mlscorr.report.gap.verdict import advice, facts, smallest, verdict
 from mlscorr.report.tables import number
+from tests.beds.browser import browse, need_browser
 from tests.beds.gap_documents import KINDS, gap_document, plan_document
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-BROWSER = next((path for name in NAMES if (path := shutil.which(name))), None)
 DRAWN = ("effect", "none", "alike", "bump", "too little")  # a page takes a second
 ALONE = {"meta", "img", "br", "input"}  # tags that are not closed
 
@@ -206,24 +203,13 @@ SEEN += [("bump", 1600), ("plan", 1600)]
 @pytest.fixture(scope="module")
 def opened(pages, tmp_path_factory):
     "What Chromium found in the pages: (results by page and width, lines of its console)"
-    if BROWSER is None:
-        pytest.skip("No Chromium is installed, so the page was not opened in a browser.")
+    need_browser()
     folder = tmp_path_factory.mktemp("browser")
     for kind in {kind for kind, _ in SEEN}:
         (folder / f"{kind}.html").write_text(pages[kind], encoding="utf-8")
     frames = json.dumps([(f"{kind}.html", width) for kind, width in SEEN])
-    wrapper = folder / "wrapper.html"
-    wrapper.write_text(WRAPPER.replace("PAGES", frames), encoding="utf-8")
-    command = [
-        BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
-        "--allow-file-access-from-files", f"--user-data-dir={folder / 'profile'}",
-        "--window-size=1700,1000", "--virtual-time-budget=20000", "--enable-logging=stderr",
-        "--dump-dom", wrapper.as_uri(),
-    ]  # fmt: skip
-    process = subprocess.run(command, capture_output=True, text=True, timeout=600)
-    text = unescape(re.search(r'<pre id="result">(.*?)</pre>', process.stdout, re.S)[1])
-    assert text.startswith("{"), text
-    return json.loads(text), [line for line in process.stderr.splitlines() if "CONSOLE" in line]
+    text, console = browse(folder, WRAPPER.replace("PAGES", frames))
+    return json.loads(text), console
 
 
 def test_the_pages_fit_phone_and_desk(opened):

@@ -1,0 +1,37 @@
+"""Headless Chromium: what a wrapper page finds out about pages that it opens in frames."""
+
+import re
+import shutil
+import subprocess
+from html import unescape
+
+import pytest
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+BROWSER = next((path for name in NAMES if (path := shutil.which(name))), None)
+ITS_OWN = ("GL Driver Message", "software WebGL")  # what Chromium says of a machine without a GPU
+
+
+def need_browser():
+    "Skip with a sentence where there is none"
+    if BROWSER is None:
+        pytest.skip("No Chromium is installed, so the page was not opened in a browser.")
+
+
+def browse(folder, wrapper):
+    "The text of a wrapper page's result element, and the lines of the console"
+    path = folder / "wrapper.html"
+    path.write_text(wrapper, encoding="utf-8")
+    command = [
+        BROWSER, "--headless", "--no-sandbox", "--disable-background-networking",
+        "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--allow-file-access-from-files",
+        f"--user-data-dir={folder / 'profile'}", "--window-size=1700,1000",
+        "--virtual-time-budget=30000", "--enable-logging=stderr", "--dump-dom", path.as_uri(),
+    ]  # fmt: skip
+    process = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    text = re.search(r'<pre id="result">(.*?)</pre>', process.stdout, re.S)
+    assert text, process.stderr[-2000:]
+    text = unescape(text[1])
+    assert text.startswith("{"), text
+    console = [line for line in process.stderr.splitlines() if "CONSOLE" in line]
+    return text, [line for line in console if not any(words in line for words in ITS_OWN)]
