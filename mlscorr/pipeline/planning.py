@@ -143,7 +143,8 @@ class PlannedSurvey(Summary):
                 "next_control": places,
                 "advice": self._advice(content["detectable"]),
                 "left_out": self.left_out,
-                "warnings": list(self.survey.notes),
+                "notes": list(self.survey.notes),
+                "warnings": [],
             },
         )
 

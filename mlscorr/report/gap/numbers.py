@@ -20,6 +20,8 @@ def numbers(values: Iterable[float | None]) -> np.ndarray:
 def column(values: Sequence[float | None], unit: str) -> tuple[list[str], str]:
     """Numbers of a row of a table in the unit that suits the largest, and that unit.
 
+    Lengths below a metre are all in mm, so that rows can be compared.
+
     Parameters
     ----------
     values : sequence of float or None
@@ -27,15 +29,17 @@ def column(values: Sequence[float | None], unit: str) -> tuple[list[str], str]:
         Of the values.
 
     >>> column([-0.0045256, 0.000527, None], "s")
-    (['-4.526', '0.5270', '–'], 'ms')
+    (['-4.53', '0.527', '–'], 'ms')
     """
     large = max((abs(value) for value in values if known(value)), default=1.0)
     factor, word = scale(large, None, unit) if large < 1e4 else (1.0, unit)
+    if word == "cm":
+        factor, word = 1e3, "mm"
     return [plain(value, factor) for value in values], word
 
 
 def plain(value: float | None, factor: float = 1.0) -> str:
-    """A number for tables: four figures, a dash for none.
+    """A number for tables: three figures, a dash for none.
 
     Parameters
     ----------
@@ -44,12 +48,12 @@ def plain(value: float | None, factor: float = 1.0) -> str:
         By which it is multiplied.
 
     >>> plain(-0.0045256), plain(None), plain(357726.276)
-    ('-0.004526', '–', '357726.276')
+    ('-0.00453', '–', '357726.276')
     """
     if not known(value):
         return DASH
     value = factor * value
-    return f"{value:.3f}" if abs(value) >= 1e4 else figures(value, 4)
+    return f"{value:.3f}" if abs(value) >= 1e4 else figures(value, 3)
 
 
 def signed(value: float | None, unit: str = "mm") -> str:

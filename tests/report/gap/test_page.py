@@ -110,8 +110,8 @@ def test_what_was_not_determined_is_a_dash(pages):
 def test_every_number_of_the_causes_stands_in_the_table(pages):
     "Estimate, sigma and detectable size in the unit that suits"
     text = words(pages["effect"])
-    assert "Scanner clock offset 98.2 % 12.3 magnitude -4.526 0.5270 2.180 ms" in text
-    assert "12.3 right -93.20 4.100 16.30 mm" in text
+    assert "Scanner clock offset 98.2 % 12.3 magnitude -4.53 0.527 2.18 ms" in text
+    assert "12.3 right -93.2 4.10 16.3 mm" in text
 
 
 def test_the_gap_by_covariate_stands_in_the_table(pages):
@@ -147,8 +147,8 @@ def test_a_plan_says_what_it_can_see(pages):
     "Smallest and usual size of each parameter, and whether it shows, in words"
     text = words(pages["plan"])
     first = "4 kinds of error would show at the usual size, 4 would not."
-    expected = [first, "Scanner clock offset magnitude 1.200 8.100 ms yes"]
-    expected += ["Vertical datum magnitude 14.40 8.100 mm only if 1.8 times the usual"]
+    expected = [first, "Scanner clock offset magnitude 1.20 8.10 ms yes"]
+    expected += ["Vertical datum magnitude 14.4 8.10 mm only if 1.8 times the usual"]
     expected += ["Scanner clock drift magnitude 2400 – ppm –"]
     expected += ["Measure the same road at twice the speed.", "lever arm and vertical datum"]
     assert [piece for piece in expected if piece not in text] == []

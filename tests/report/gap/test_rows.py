@@ -45,7 +45,7 @@ def test_every_bin_and_every_parameter_has_a_row():
     document = gap_document()
     bins, causes = bin_rows(document), cause_rows(document)
     assert len(bins) == sum(len(split["count"]) for split in document["where"])
-    assert (bins[0].by, bins[0].bin) == ("Time since the start (s)", "0 to 25.00")
+    assert (bins[0].by, bins[0].bin) == ("Time since the start (s)", "0 to 25.0")
     assert [row.chosen for row in causes if row.title == "Scanner clock offset"] == [True]
     nothing = next(row for row in causes if row.title == "Nothing")
     assert (nothing.name, nothing.estimate, nothing.unit) == ("–", "–", "–")
