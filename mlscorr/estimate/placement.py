@@ -267,7 +267,8 @@ def _with_candidates(equations, candidates, sights):
     for name, values in new.items():
         columns[name][is_new] = values
     own, group = noise.own[at], noise.group[at]
-    own[is_new] = np.median(noise.own[:n], axis=0)
+    # of the variances alone: medians of whole matrices, element by element, can be no covariance
+    own[is_new] = np.diag(np.median(np.diagonal(noise.own[:n], axis1=1, axis2=2), axis=0))
     usual = np.median(noise.shared[noise.group[:n]], axis=0)
     group[is_new] = len(noise.shared) + number
     shared = np.vstack([noise.shared, np.tile(usual, (len(candidates), 1))])
