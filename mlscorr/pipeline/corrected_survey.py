@@ -128,7 +128,7 @@ class CorrectedSurvey(Summary):
         """
         from mlscorr.report import draw_figure
 
-        return draw_figure(name, self.estimate.correction, self.report, self.estimate.ties)
+        return draw_figure(name, self.estimate.correction, self._draft, self.estimate.ties)
 
     def _overview(self):
         """What a notebook shows."""
@@ -259,9 +259,9 @@ class CorrectedSurvey(Summary):
         outputs = [*(("corrected trajectory", name) for name in names), ("targets", "targets.csv")]
         outputs += [("extrapolated stretches", name) for name in weak_names]
         return replace(
-            self.report,
+            self._draft,
             coverage=replace(
-                self.report.coverage,
+                self._draft.coverage,
                 points_outside_trajectory=outside,
                 points_outside_control=outside_control,
                 points_extrapolated=extrapolated,
@@ -270,11 +270,12 @@ class CorrectedSurvey(Summary):
             files=tuple(FileRow(path.name, sha256(path), points=n) for path, n, _ in files),
             inputs=tuple(described(file.what, file.path) for file in self.survey.inputs),
             outputs=tuple(described(what, folder / name) for what, name in outputs),
+            next_control=self.next_control,
         )
 
     @cached_property
-    def report(self) -> CorrectionReport:
-        """All that is told of the correction, without the files that ``write`` makes."""
+    def _draft(self) -> CorrectionReport:
+        """What figures show of the correction: all but files, counts of points, next control."""
         from mlscorr.report.correction_report import CorrectionReport, Coverage
 
         epochs = np.unique(self.matched_control.gps_time[self.estimate.used])
@@ -290,7 +291,6 @@ class CorrectedSurvey(Summary):
             model=model_section(self.estimate, self.warnings),
             coverage=Coverage(self.estimate.span, longest),
             support=self.estimate.support,
-            next_control=self.next_control,
             ties=tie_section(self.estimate),
             position_sigma=largest_sigma(self.trajectory),
         )
