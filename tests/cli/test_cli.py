@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from mlscorr.cli import app
 from tests.beds.documents import undocumented
+from tests.beds.places import ROOT
 
 MLSCORR = Path(sys.executable).with_name("mlscorr")
 STARTED = 357700.0  # s of the week, when the street's trajectory starts
@@ -386,7 +387,14 @@ def test_json_is_one_document_on_stdout(commanded):
     assert document == json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert document["schema"] == "mlscorr.report/1"
     assert not undocumented(document)
-    assert "RMSE" in process.stderr
+    tutorial = (ROOT / "docs" / "tutorial.md").read_text()
+    shown = (
+        "Result:",
+        "Points:",
+        "RMSE of misclosures (m)    n   E before",
+        "each left out in turn",
+    )
+    assert all(words in process.stderr and words in tutorial for words in shown)
 
 
 def test_paths_may_be_relative_with_spaces_and_umlauts(commanded):
