@@ -1,25 +1,29 @@
 """What ties between passes add through files: clouds there and back, targets and ties found.
 
-python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--one-pass]
+python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--scanners 2]
 
 RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
 far apart the trajectories of both passes are left in a place. Without control only the latter is
 claimed. Drives are the simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each
-pass of 150 s alone: its smoothed drift is 0.6 to 1 m.
+pass of 150 s alone: its smoothed drift is 0.6 to 1 m. A second scanner is turned to the other side.
 """
 
 import argparse
 import tempfile
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from feature_surveys import FOLDER
 
 import mlscorr
+from mlscorr.estimate import believed_correction, estimate_correction
+from mlscorr.io.las import read_chunks
+from mlscorr.pipeline.finding import find_control
+from mlscorr.pipeline.tying import tie_passes
 from mlscorr.simulate import read_scenario, simulate
 from mlscorr.simulate.recording import join_passes
+from mlscorr.ties import TieCollector
 
 POINTS_PER_LINE = 400  # of 700: a survey takes two minutes
 DURATION = 150.0  # s of each pass
@@ -27,7 +31,7 @@ GNSS = 5.0  # s, at both ends of a pass
 NEAREST = 5.0  # m between two passes that are compared in a place
 
 
-def scenario(duration=DURATION):
+def scenario(scanners=1, duration=DURATION):
     """The canyon as a MEMS unit records it, with GNSS at the ends of the passes alone."""
     canyon = read_scenario(FOLDER / "canyon.toml")
     starts = (0.0, duration + canyon.drive.passes[1].pause)
@@ -36,31 +40,44 @@ def scenario(duration=DURATION):
         "sky_view": False,
         "outages": tuple((start + GNSS, duration - 2 * GNSS) for start in starts),
     }
-    scanner = canyon.scanner[0].model_copy(update={"points_per_line": POINTS_PER_LINE})
+    first = canyon.scanner[0].model_copy(update={"points_per_line": POINTS_PER_LINE})
+    turn = np.array([1.0, 1.0, -1.0])
+    second = first.model_copy(update={"boresight": tuple(turn * first.boresight)})
     return canyon.model_copy(
         update={
             "pos": canyon.pos.model_copy(update=pos),
             "drive": canyon.drive.model_copy(update={"duration": duration, "stops": ()}),
-            "scanner": (scanner,),
+            "scanner": (first, second)[:scanners],
             "targets": canyon.targets.model_copy(update={"control": 16, "check": 4}),
         }
     )
 
 
-def with_control(survey, number):
-    """The survey with control points evenly taken along the street; the others are forgotten."""
-    centred = survey.control.position - survey.control.position.mean(axis=0)
-    along = np.linalg.svd(centred)[2][0]  # their longest direction
-    order = np.argsort(centred @ along)
+def read(survey):
+    """The control points that are found in the clouds, and planes and poles; read once."""
+    collector = TieCollector(survey)
+
+    def chunks(file):
+        for chunk in read_chunks(file):
+            collector.add(file, chunk)
+            yield chunk
+
+    return find_control(survey, None, None, chunks)[0], collector.features()
+
+
+def some_control(matched, number):
+    """Observations of control points evenly taken along the street."""
+    names, rows = np.unique(matched.name, return_index=True)
+    place = matched.surveyed.position[rows]
+    along = np.linalg.svd(place - place.mean(axis=0))[2][0]  # their longest direction
+    order = np.argsort(place @ along)
     kept = np.unique(np.linspace(0, len(order) - 1, number).round().astype(int))
-    return replace(survey, control=survey.control[np.sort(order[kept])])
+    return matched[np.isin(matched.name, names[order[kept]])]
 
 
-def measure(survey, true, ties):
+def measure(true, estimate):
     """RMS (m) of what is left, the share within 2 sigma, RMS (m) of a pass from the other."""
-    with warnings.catch_warnings(action="ignore"):
-        result = mlscorr.correct(survey, ties=ties)
-    corrected = result.trajectory
+    corrected = estimate.correction.corrected
     left = true.at(corrected.gps_time).position - corrected.position
     within = np.mean(np.abs(left) < 2 * corrected.position_sigma)
     return rms(left), float(within), _apart(true, corrected.gps_time, left)
@@ -88,9 +105,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--scanners", type=int, choices=(1, 2), default=1)
     parser.add_argument("--control", type=int, nargs="+", default=[0, 3, 6, 12])
     arguments = parser.parse_args()
-    drive = scenario()
+    drive = scenario(arguments.scanners)
     print("control  seed     raw   alone  within    ties  within   apart   ratio")
     ratios = {number: [] for number in arguments.control}
     for seed in range(arguments.first, arguments.first + arguments.seeds):
@@ -98,19 +116,25 @@ def main():
             simulated = simulate(drive, np.random.default_rng(seed))
             simulated.write(Path(folder) / "survey")
             true = join_passes(simulated.true_passes)
-            recorded = mlscorr.read_survey(Path(folder) / "survey")
-            times = recorded.trajectory.gps_time
-            raw = rms(true.at(times).position - recorded.trajectory.position)
-            for number in arguments.control:
-                survey = with_control(recorded, number) if number else recorded
-                alone = measure(survey, true, "off") if number else (np.nan, np.nan)
-                tied = measure(survey, true, "auto" if number else "only")
-                ratios[number].append(tied[0] / alone[0])
-                print(
-                    f"{number:7d}{seed:6d}{raw:8.3f}{alone[0]:8.3f}{alone[1]:8.0%}"
-                    f"{tied[0]:8.3f}{tied[1]:8.0%}{tied[2]:8.4f}{ratios[number][-1]:8.2f}",
-                    flush=True,
-                )
+            with warnings.catch_warnings(action="ignore"):
+                survey = mlscorr.read_survey(Path(folder) / "survey")
+                found, features = read(survey)
+        recorded = survey.trajectory
+        raw = rms(true.at(recorded.gps_time).position - recorded.position)
+        for number in arguments.control:
+            if number:
+                control = some_control(found, number)
+                start = estimate_correction(recorded, control, survey.pos)
+                alone = measure(true, start)
+            else:
+                start, alone = believed_correction(recorded, survey.pos), (np.nan, np.nan)
+            tied = measure(true, tie_passes(survey, start, features))
+            ratios[number].append(tied[0] / alone[0])
+            print(
+                f"{number:7d}{seed:6d}{raw:8.3f}{alone[0]:8.3f}{alone[1]:8.0%}"
+                f"{tied[0]:8.3f}{tied[1]:8.0%}{tied[2]:8.4f}{ratios[number][-1]:8.2f}",
+                flush=True,
+            )
     for number, values in ratios.items():
         if number:
             print(f"{number:7d} median {np.median(values):.2f}, largest {max(values):.2f}")

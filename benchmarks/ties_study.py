@@ -92,6 +92,7 @@ def feature_ties(survey, seed, street=CANYON, wrong=0.05):
         variance=sigma**2,
         kind=np.full(n, "plane"),
         pass_number=np.tile([1, 2], (n, 1)),
+        scanner=np.zeros((n, 2), int),
         feature=np.arange(2 * n).reshape(n, 2),
     )
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ties_files_study import rms, scenario, with_control
+from ties_files_study import rms, scenario
 
 import mlscorr
 from mlscorr.frames import georeference, to_scanner
@@ -159,6 +159,15 @@ def changed(survey, case, seed):
     return ChangedSurvey(**known, later=(mesh, number))
 
 
+def with_control(survey, number):
+    """The survey with control points evenly taken along the street; the others are forgotten."""
+    centred = survey.control.position - survey.control.position.mean(axis=0)
+    along = np.linalg.svd(centred)[2][0]  # their longest direction
+    order = np.argsort(centred @ along)
+    kept = np.unique(np.linspace(0, len(order) - 1, number).round().astype(int))
+    return replace(survey, control=survey.control[np.sort(order[kept])])
+
+
 def measure(survey, true, ties):
     """RMS (m) of what is left of the trajectory, and the estimate."""
     with warnings.catch_warnings(action="ignore"):
@@ -199,7 +208,7 @@ def main():
     names = ["clean", "fifth", "window", "lorry", "rebuilt", "parallel"]
     parser.add_argument("--cases", nargs="+", choices=names, default=names)
     arguments = parser.parse_args()
-    drive = scenario(DURATION)
+    drive = scenario(duration=DURATION)
     print("case      seed   alone    ties   used  wrong  offered wrong  largest", flush=True)
     for seed in range(arguments.first, arguments.first + arguments.seeds):
         simulated = simulate(drive, np.random.default_rng(seed))

@@ -16,7 +16,7 @@ what they leave open of them is a part of the stated sigmas.
 from mlscorr.estimate.calibration import Calibration, MountingEstimate
 from mlscorr.estimate.guards import COMPONENTS
 from mlscorr.estimate.mounting import believed_mounting, estimate_mounting
-from mlscorr.estimate.mounting_check import MountingCheck, find_mounting_error
+from mlscorr.estimate.mounting_check import MountingCheck, find_mounting_error, scanner_warnings
 from mlscorr.estimate.placement import (
     NextControl,
     PlannedAccuracy,
@@ -63,6 +63,7 @@ __all__ = [
     "predict_accuracy",
     "previewed_correction",
     "previewed_mounting",
+    "scanner_warnings",
     "tie_value",
     "with_ties",
 ]

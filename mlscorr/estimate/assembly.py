@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.collocation import Noise
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.equations import NO_TREND, Equations
 from mlscorr.frames import mounting_partials, pose_partials
 from mlscorr.pos import SETTINGS as POS_SETTINGS
 from mlscorr.pos import Steps, stated_sigma
@@ -108,26 +108,54 @@ def mounting_equations(
     weak : (6,) array
         One sigma of what is known of the mounting without the survey. Units: m and rad.
     """
-    n, times = len(matched), matched.gps_time
-    trajectory, position = equations.trajectory, matched.observations.position
-    held = times[0] if n else trajectory.gps_time[0]
-    with_holds = np.append(times, [held, held])
-    stated = stated_sigma(trajectory, equations.pos, with_holds, equations.stated.starts)
-    partials = mounting_partials(trajectory, mounting, position, times)
-    noise, blocks = _noise(matched), [np.diag(part**2) for part in weak.reshape(2, 3)]
-    groups = len(noise.shared)
+    times, position = matched.gps_time, matched.observations.position
+    bare = replace(
+        equations,
+        gps_time=times,
+        misclosure=matched.misclosure,
+        noise=_noise(matched),
+        partials=pose_partials(equations.trajectory, position, times),
+        order=NO_TREND,
+    )
+    columns = mounting_partials(equations.trajectory, mounting, position, times)
+    return with_mountings(bare, columns, -corrected, weak)
+
+
+def with_mountings(
+    equations: Equations, columns: np.ndarray, lacking: np.ndarray, sigma: np.ndarray
+) -> Equations:
+    """The equations with mountings beside the trend, and below the targets what is known of them.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of n targets, and of fall-backs.
+    columns : (n, 3, 6 k) array
+        Partial derivatives of the targets by k mountings (Eq. 16-18).
+    lacking, sigma : (6 k,) array
+        What is believed to be missing in each lever arm and boresight, and how well. Units: m, rad.
+    """
+    n, number = len(equations.names), len(sigma) // 3
+    times, noise, groups = equations.gps_time, equations.noise, len(equations.noise.shared)
+    held = times[0] if n else equations.trajectory.gps_time[0]
+    times = np.insert(times, n, np.full(number, held))
+    stated = stated_sigma(equations.trajectory, equations.pos, times, equations.stated.starts)
+    mounting = np.zeros((len(times), 3, len(sigma)))
+    mounting[:n] = columns
+    mounting[n : n + number] = np.eye(len(sigma)).reshape(number, 3, -1)
+    variance = sigma.reshape(-1, 3, 1) ** 2 * np.eye(3)
     return replace(
         equations,
-        gps_time=with_holds,
-        misclosure=np.vstack([matched.misclosure, -corrected.reshape(2, 3)]),
+        gps_time=times,
+        misclosure=np.insert(equations.misclosure, n, lacking.reshape(-1, 3), axis=0),
         noise=Noise(
-            np.vstack([noise.own, blocks]),
-            np.append(noise.group, [groups, groups + 1]),
-            np.vstack([noise.shared, np.zeros((2, 3))]),
+            np.insert(noise.own, n, variance, axis=0),
+            np.insert(noise.group, n, groups + np.arange(number)),
+            np.vstack([noise.shared, np.zeros((number, 3))]),
         ),
-        partials=np.vstack([pose_partials(trajectory, position, times), np.zeros((2, 3, 6))]),
+        partials=np.insert(equations.partials, n, np.zeros((number, 3, 6)), axis=0),
         stated=replace(stated, history=equations.stated.history),
-        mounting=np.vstack([partials, np.eye(6).reshape(2, 3, 6)]),
+        mounting=mounting,
     )
 
 

@@ -44,8 +44,8 @@ class Equations(Summary):
     order : int
         Of the polynomial trend of the position (Eq. 11).
     mounting : (n + h, 3, p) array, optional
-        A in its place: partial derivatives by lever arm (m) and boresight (rad) about the body
-        axes (Eq. 16-18). Columns beyond the sixth are differences between coordinate systems.
+        Further columns of A, before those of the trend: partial derivatives by lever arm (m) and
+        boresight (rad) about the body axes (Eq. 16-18), of each mounting whose error is estimated.
     prior : function of Equations
         What is believed of the parameters before the misclosures: a Prior.
     trajectory : Trajectory
@@ -196,12 +196,10 @@ class Equations(Summary):
 
     @property
     def design(self) -> np.ndarray:
-        """A (n + h, 3, p) of the observations; fall-backs tell nothing of a trend."""
-        if self.mounting is not None:
-            return self.mounting
-        design = self._trend(self.gps_time)
-        design[len(design) - self.fallbacks :] = 0.0
-        return design
+        """A (n + h, 3, p) of the observations; no epoch without a target tells of a trend."""
+        trend = self._trend(self.gps_time)
+        trend[len(self.names) :] = 0.0
+        return trend if self.mounting is None else np.concatenate([self.mounting, trend], axis=2)
 
     def pose_design(self, gps_time: np.ndarray) -> np.ndarray:
         """A (q, 6, p) of position and rotation at any epochs; a mounting moves no pose.
@@ -211,10 +209,11 @@ class Equations(Summary):
         gps_time : (q,) array
             Units: s.
         """
-        if self.mounting is not None:
-            return np.zeros((len(gps_time), 6, self.mounting.shape[2]))
         position = self._trend(gps_time)
-        return np.concatenate([position, np.zeros_like(position)], axis=1)
+        columns = 0 if self.mounting is None else self.mounting.shape[2]
+        pose = np.zeros((len(gps_time), 6, columns + position.shape[2]))
+        pose[:, :3, columns:] = position
+        return pose
 
     def _trend(self, gps_time):
         """A (q, 3, p) of the position."""

@@ -8,6 +8,7 @@ Eq. 13-18). Nothing in the estimate changes.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.estimate.tie_equations import mounting_columns
 from mlscorr.frames import mounting_partials
 from mlscorr.survey import Matched, Mounting
 
@@ -79,8 +80,8 @@ def find_mounting_error(
     if equations.ties is None or residuals is None:
         return None
     used, targets = residuals.ties[residuals.used], matched[estimate.used]
-    trajectory, pos, starts = equations.trajectory, equations.pos, equations.stated.starts
-    ties = TieEquations.of(trajectory, pos, used, starts, mounting).mounting
+    trajectory = equations.trajectory
+    ties = mounting_columns(trajectory, {0: mounting}, used)
     control = np.zeros((len(equations.gps_time), 3, 6))
     control[: len(targets)] = mounting_partials(
         trajectory, mounting, targets.observations.position, targets.gps_time
@@ -95,6 +96,41 @@ def find_mounting_error(
     critical = float(chi2.isf(SETTINGS.significance, len(correction)))
     sigma = np.sqrt(np.diag(covariance))
     return MountingCheck(correction, sigma, float(right @ correction), critical)
+
+
+def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
+    """Sentences on scanners that see the street elsewhere than the first, as ties tell it.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        With ties between scanners.
+    names : sequence of str
+        Of all scanners.
+    """
+    equations = estimate.equations
+    if equations.ties is None or equations.mounting is None:
+        return
+    solved = equations.solve(estimate.parameters)
+    scale = np.append(np.full(3, 1000.0), np.full(3, np.degrees(1.0)))
+    least = np.repeat(SETTINGS.determined_sigma, 3)
+    for number, name in enumerate(names[1:]):
+        of_it = slice(6 * number, 6 * number + 6)
+        lacks, covariance = solved.trend[of_it], solved.trend_covariance[of_it, of_it]
+        sigma = np.sqrt(np.diag(covariance))
+        statistic = lacks @ np.linalg.solve(covariance, lacks)
+        is_large = np.abs(lacks) > np.maximum(SETTINGS.setup_sigmas * sigma, least)
+        if statistic > chi2.isf(SETTINGS.significance, len(lacks)) and is_large.any():
+            both = list(zip(scale * lacks, scale * sigma, strict=True))
+            arm = ", ".join(f"{a:.0f} ± {s:.0f}" for a, s in both[:3])
+            turn = ", ".join(f"{a:.2f} ± {s:.2f}" for a, s in both[3:])
+            yield (
+                f"Scanner {name} puts what both see elsewhere than {names[0]} does: beside that "
+                f"its lever arm lacks {arm} mm to the right, forward, up, and its boresight "
+                f"{turn} deg about them. No drift is made of it, "
+                "but its points keep it. Run mlscorr calibrate first, and correct with the "
+                "mountings that it writes."
+            )
 
 
 def _weights(estimate, control, ties):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,10 +11,11 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.correction import Correction
-from mlscorr.estimate.assembly import position_equations, with_fallbacks
+from mlscorr.estimate.assembly import position_equations, with_fallbacks, with_mountings
 from mlscorr.estimate.equations import NO_TREND, Equations
 from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_warnings
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
+from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.orders import (
     Alternative,
     affordable_order,
@@ -32,7 +34,7 @@ from mlscorr.estimate.support import Support, find_support
 from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.estimate.tied import TieResiduals, graduated, screen_with_ties
-from mlscorr.survey import Matched, Pos, Ties, Trajectory
+from mlscorr.survey import Matched, Mounting, Pos, Ties, Trajectory
 from mlscorr.survey.summary import Summary
 
 
@@ -189,17 +191,19 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def with_ties(estimate: Estimate, ties: Ties) -> Estimate:
-    """The estimate by control points and by what two passes both saw.
+def with_ties(estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()) -> Estimate:
+    """The estimate by control points and by what two passes, or two scanners, both saw.
 
     Parameters
     ----------
     estimate : Estimate
         By control points alone.
     ties : Ties
+    mountings : sequence of Mounting
+        Of all scanners where ties between two of them are among these: what each lacks beside the
+        first is estimated with the drift, so that it doesn't pass for drift.
     """
-    before = estimate.equations
-    rows = _tie_equations(before, ties)
+    before, rows = _tie_equations(estimate.equations, ties, mountings)
     kept, screening, is_used = screen_with_ties(before, estimate.screening, rows)
     names = np.full(len(estimate.used), "", dtype=object)
     names[estimate.used] = before.names
@@ -209,24 +213,34 @@ def with_ties(estimate: Estimate, ties: Ties) -> Estimate:
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def previewed_correction(estimate: Estimate, ties: Ties) -> Correction:
+def previewed_correction(
+    estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
+) -> Correction:
     """The correction with ties that were paired so far, under the parameters of control alone.
 
     Parameters
     ----------
     estimate : Estimate
         By control points alone.
-    ties : Ties
+    ties, mountings : Ties, sequence of Mounting
+        As of with_ties.
     """
-    rows = _tie_equations(estimate.equations, ties)
-    tied = graduated(estimate.equations, estimate.parameters, rows)
+    before, rows = _tie_equations(estimate.equations, ties, mountings)
+    tied = graduated(before, estimate.parameters, rows)
     pose = predict_under(tied, estimate.parameters)
     return Correction.by_pose_error(estimate.correction.recorded, *pose)
 
 
-def _tie_equations(equations, ties):
-    """TieEquations whose drift grows as that of the control points."""
-    return TieEquations.of(equations.trajectory, equations.pos, ties, equations.stated.starts)
+def _tie_equations(equations, ties, mountings):
+    """Equations with all mountings but the first, and TieEquations with the same drift."""
+    others = dict(enumerate(mountings[1:], start=1))
+    rows = TieEquations.of(equations.trajectory, equations.pos, ties, equations.stated, others)
+    if not others:
+        return equations, rows
+    sigma = np.array([prior_sigma(mounting) for mounting in mountings])
+    between = np.hypot(sigma[0], sigma[1:]).ravel()
+    nothing = np.zeros((len(equations.names), 3, len(between)))
+    return with_mountings(equations, nothing, np.zeros(len(between)), between), rows
 
 
 def _estimate(trajectory, names, kept, screening, notes):

@@ -40,6 +40,7 @@ class Settings:
     # Ties
     tie_cut: float = 4.0  # sigmas; of a thousand honest ties one in sixteen surveys is farther off
     tie_majority: float = 0.5  # of the ties; with fewer nobody knows which of them are right
+    tie_epoch: float = 0.1  # s: in half of it a drift of 3 cm/s makes 1.5 mm
     tie_sample: int = 100  # ties that choose parameters: a scale to a tenth
     sufficient_ratio: float = 1.1  # of a median sigma: a difference that no check point shows
     tie_points: int = 12  # as points below, each with a solution of all ties

@@ -6,12 +6,13 @@ control target is the case in which one of both sides is surveyed. A mounting is
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mlscorr.collocation import Noise, SparseRows
+from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.frames import mounting_partials, pose_partials
 from mlscorr.pos import StatedSigma, stated_sigma
@@ -27,7 +28,7 @@ class TieEquations:
     Parameters
     ----------
     gps_time : (n, 2) array
-        Units: s.
+        Views within SETTINGS.tie_epoch share their mean time. Units: s.
     misclosure, variance : (n,) array
         Units: m, m^2.
     partials : (n, 2, 6) array
@@ -36,9 +37,9 @@ class TieEquations:
         At the 2 n views.
     weight : (n,) array
         By which the variance is divided: what robust estimation makes of each.
-    mounting : (n, 6) array, optional
-        n^T (M of the first view - M of the second): partial derivatives by the mounting, where it
-        is the trend (Eq. 16-18).
+    mounting : (n, p) array, optional
+        n^T (M of the first view - M of the second): partial derivatives by mountings that are
+        estimated, six columns each (Eq. 16-18).
     """
 
     gps_time: np.ndarray
@@ -55,8 +56,8 @@ class TieEquations:
         trajectory: Trajectory,
         pos: Pos,
         ties: Ties,
-        starts: np.ndarray,
-        mounting: Mounting | None = None,
+        stated: StatedSigma,
+        mountings: Mapping[int, Mounting] | None = None,
     ) -> TieEquations:
         """The equations of ties.
 
@@ -66,25 +67,23 @@ class TieEquations:
             As recorded.
         pos : Pos
         ties : Ties
-        starts : (k,) array
-            When drift begins to grow in each segment. Units: s.
-        mounting : Mounting, optional
-            With which the ties were georeferenced, where the equations are those of its error.
+        stated : StatedSigma
+            Of the control points, whose segments and whose growth of drift the ties share.
+        mountings : dict, optional
+            Those with which the ties were georeferenced and whose errors are estimated, by the
+            number of their scanner.
         """
         times, places = ties.gps_time.ravel(), ties.place.reshape(-1, 3)
         along = _along(ties.direction, pose_partials(trajectory, places, times))
-        of_mounting = None
-        if mounting is not None:
-            partials = mounting_partials(trajectory, mounting, places, times)
-            of_mounting = _along(ties.direction, partials).sum(axis=1)
+        epochs = _epochs(times, stated.history)
         return cls(
-            gps_time=ties.gps_time,
+            gps_time=epochs.reshape(-1, 2),
             misclosure=ties.misclosure,
             variance=ties.variance,
             partials=along,
-            stated=stated_sigma(trajectory, pos, times, starts),
+            stated=stated_sigma(trajectory, pos, epochs, stated.starts),
             weight=np.ones(len(ties)),
-            mounting=of_mounting,
+            mounting=mounting_columns(trajectory, mountings, ties) if mountings else None,
         )
 
     def __len__(self) -> int:
@@ -126,8 +125,8 @@ class TieEquations:
         ----------
         parameters : SignalParameters
         pose_design : function of times
-            A (q, 6, p) of position and rotation; zero where the trend is the mounting's, whose
-            columns beyond the sixth no tie sees.
+            A (q, 6, p) of position and rotation, where the columns of mountings come first: they
+            move no pose. What comes behind them no tie sees.
         """
         n, times = len(self), self.gps_time.ravel()
         views = self.partials.reshape(2 * n, 1, 6)
@@ -142,6 +141,41 @@ class TieEquations:
             design=design,
             signals=pose_signals(self.stated, parameters, views),
         )
+
+
+def mounting_columns(
+    trajectory: Trajectory, mountings: Mapping[int, Mounting], ties: Ties
+) -> np.ndarray:
+    """Partial derivatives (n, 6 k) of ties by the errors of k mountings  (Eq. 16-18).
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    mountings : dict
+        By the number of their scanner.
+    ties : Ties
+    """
+    times, places = ties.gps_time.ravel(), ties.place.reshape(-1, 3)
+    columns = []
+    for number, mounting in mountings.items():
+        partials = mounting_partials(trajectory, mounting, places, times)
+        is_its = (ties.scanner == number)[:, :, None]
+        columns.append((_along(ties.direction, partials) * is_its).sum(axis=1))
+    return np.hstack(columns)
+
+
+def _epochs(gps_time, history):
+    """Mean time (q,) of the views of each short stretch of a segment. Units: s.
+
+    Each epoch is an unknown of the noise of GNSS: with those of all views a survey of two scanners
+    takes 17 times as long to solve.
+    """
+    since = gps_time - gps_time.min(initial=np.inf)
+    stretch = np.floor(since / SETTINGS.tie_epoch)
+    keys = np.column_stack([history.segment(gps_time), stretch])
+    number = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    mean = np.bincount(number, since) / np.bincount(number)
+    return (gps_time - since) + mean[number]
 
 
 def _along(direction, partials):

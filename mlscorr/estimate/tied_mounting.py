@@ -118,5 +118,4 @@ def georeferenced_ties(
     place = place.reshape(-1, 2, 3)
     misclosure = np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
     moved = replace(ties, place=place, misclosure=misclosure)
-    starts = equations.stated.starts
-    return TieEquations.of(trajectory, equations.pos, moved, starts, mountings[1])
+    return TieEquations.of(trajectory, equations.pos, moved, equations.stated, {0: mountings[1]})

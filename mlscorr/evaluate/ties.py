@@ -52,6 +52,8 @@ def misfit_section(residuals: TieResiduals | None) -> dict[str, object] | None:
 def pair_rows(residuals: TieResiduals) -> list[dict[str, object]]:
     """Numbers of ties of each two passes, and their misclosures before and after.
 
+    Each scanner's passes have numbers of their own; scanners count from 1, as in survey.toml.
+
     Parameters
     ----------
     residuals : TieResiduals
@@ -63,6 +65,7 @@ def pair_rows(residuals: TieResiduals) -> list[dict[str, object]]:
         rows.append(
             {
                 "passes": passes.tolist(),
+                "scanners": (ties.scanner[inside][0] + 1).tolist(),
                 "n": int(inside.sum()),
                 "used": int(both.sum()),
                 "before": misfit(ties.misclosure[both]),

@@ -15,6 +15,7 @@ from mlscorr.estimate import (
     estimate_correction,
     find_mounting_error,
     previewed_correction,
+    scanner_warnings,
     with_ties,
 )
 from mlscorr.io.las import read_chunks
@@ -105,6 +106,9 @@ def estimate_survey(
 
 def _with_mounting_checked(survey, estimate, control):
     """The estimate with a note where its ties tell of a wrong mounting."""
+    if survey.scanners:
+        warned = scanner_warnings(estimate, list(survey.by_scanner))
+        return replace(estimate, notes=(*estimate.notes, *warned))
     if survey.mounting is None:
         return estimate
     check = find_mounting_error(estimate, control, survey.mounting)
@@ -129,36 +133,25 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     sigma = placed_sigma(correction, survey, features)
     radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
     moved = _moved(correction, features)
+    mountings = [part.mounting for part in survey.by_scanner.values()]
+    mountings = [] if None in mountings else mountings
     moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
     while True:
         pairs = pair_features(features, moved, sigma, radius)
-        ties = agreeing_ties(pairs[of_one_scanner(survey, features, pairs)], moved)
+        ties = agreeing_ties(pairs if mountings else pairs[_of_one_scanner(pairs)], moved)
         if len(ties) == 0:
             return _untied(estimate, features, radius)
-        moved = _moved(previewed_correction(estimate, ties), features)
+        moved = _moved(previewed_correction(estimate, ties, mountings), features)
         limit = narrowest_gate(ties, moved)
         if radius <= limit:
             unheld = _unheld(estimate, features, ties)
-            return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties)
+            return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
         radius = max(radius / 2, limit)
 
 
-def of_one_scanner(survey: Survey, features: TieFeatures, ties: Ties) -> np.ndarray:
-    """Which ties (n,) are two views of one scanner.
-
-    Those of two scanners tell of their mountings as much as of drift, and link so many epochs that
-    the solution takes four times as long.
-
-    Parameters
-    ----------
-    survey : Survey
-    features : TieFeatures
-    ties : Ties
-    """
-    scanner = np.empty(len(features), int)
-    for number, (_, rows) in enumerate(survey.rows_by_scanner(features.source)):
-        scanner[rows] = number
-    return scanner[ties.feature[:, 0]] == scanner[ties.feature[:, 1]]
+def _of_one_scanner(ties):
+    """Which ties (n,) are two views of one scanner."""
+    return ties.scanner[:, 0] == ties.scanner[:, 1]
 
 
 def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) -> np.ndarray:
@@ -172,7 +165,7 @@ def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) 
     features : TieFeatures
     """
     sigma = np.empty(len(features))
-    for part, rows in survey.rows_by_scanner(features.source):
+    for part, rows in survey.rows_by_scanner(features.scanner):
         of_part = PointSigma.of(correction, part.scanner, part.mounting)
         sigma[rows] = of_part.at(features.centre[rows], features.gps_time[rows]).max(axis=1)
     return sigma
@@ -252,6 +245,9 @@ def _unheld(estimate, features, ties):
         return ((control >= times.min()) & (control <= times.max())).any()
 
     for part, axis in unheld_directions(ties):
+        earlier, later = part.gps_time.T
+        if earlier.max() > later.min():  # two scanners of one pass: the POS holds them
+            continue
         if not all(map(controlled, part.pass_number[0])):
             yield unheld_sentence(part, axis)
 

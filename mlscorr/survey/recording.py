@@ -168,22 +168,29 @@ class Survey(Summary):
         parts = self.by_scanner.values()
         return next((part for part in parts if file in part.clouds), self)
 
-    def rows_by_scanner(self, source: np.ndarray) -> Iterator[tuple[Survey, np.ndarray | slice]]:
+    @cached_property
+    def scanner_numbers(self) -> np.ndarray:
+        """Number of the scanner of each cloud file, from 0."""
+        numbers = np.zeros(len(self.clouds), int)
+        for number, part in enumerate(self.by_scanner.values()):
+            numbers[[self.clouds.index(file) for file in part.clouds]] = number
+        return numbers
+
+    def rows_by_scanner(self, scanner: np.ndarray) -> Iterator[tuple[Survey, np.ndarray | slice]]:
         """The survey of each scanner, and which rows it saw.
 
         Parameters
         ----------
-        source : (n,) int array
-            Number of the cloud file of each row, from 0.
+        scanner : (n,) int array
+            Number of the scanner of each row, from 0.
 
         Yields
         ------
         survey : Survey
         rows : (n,) bool array, or a slice of all
         """
-        for part in self.by_scanner.values():
-            numbers = [self.clouds.index(file) for file in part.clouds]
-            yield part, np.isin(source, numbers) if self.scanners else slice(None)
+        for number, part in enumerate(self.by_scanner.values()):
+            yield part, scanner == number if self.scanners else slice(None)
 
     def check_one_scanner(self, verb: str) -> None:
         """Refuse several scanners, for what rests on one mounting.

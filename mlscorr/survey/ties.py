@@ -17,8 +17,8 @@ class TieFeatures(Columns):
     ----------
     pass_number : (n,) int array
         Passes count from 1 in time.
-    source : (n,) int array
-        Number of the cloud file, from 0: two scanners write two files.
+    scanner : (n,) int array
+        Number of the scanner, from 0.
     kind : (n,) str array
         ``plane`` or ``pole``.
     gps_time : (n,) array
@@ -42,7 +42,7 @@ class TieFeatures(Columns):
     """
 
     pass_number: np.ndarray
-    source: np.ndarray
+    scanner: np.ndarray
     kind: np.ndarray
     gps_time: np.ndarray
     centre: np.ndarray
@@ -98,6 +98,8 @@ class Ties(Columns):
     kind : (n,) str array
         ``plane`` or ``pole``.
     pass_number : (n, 2) int array
+    scanner : (n, 2) int array
+        Numbers of the scanners, from 0.
     feature : (n, 2) int array
         Rows of both in the TieFeatures.
     """
@@ -109,6 +111,7 @@ class Ties(Columns):
     variance: np.ndarray
     kind: np.ndarray
     pass_number: np.ndarray
+    scanner: np.ndarray
     feature: np.ndarray
 
     @classmethod
@@ -155,6 +158,7 @@ class Ties(Columns):
             variance=variance,
             kind=features.kind[pairs[:, 0]],
             pass_number=features.pass_number[pairs],
+            scanner=features.scanner[pairs],
             feature=pairs,
         )
 

@@ -63,11 +63,15 @@ class TieCollector:
     def _shapes(self, rows):
         """Features of cells (count,), each seen from the scanner of its file."""
         cells = self._cells.of(rows)
-        source = cells[2] // len(self._segments)
+        scanner = self._scanner(cells[2])
         return TieFeatures.concatenate(
             find_shapes(part, *(column[inside] for column in cells))
-            for part, inside in self._survey.rows_by_scanner(source)
+            for part, inside in self._survey.rows_by_scanner(scanner)
         )
+
+    def _scanner(self, group):
+        """Number of the scanner of groups."""
+        return self._survey.scanner_numbers[group // len(self._segments)]
 
     def features(self) -> TieFeatures:
         """Features of all chunks so far, in order of pass and time; chunks may still follow."""
@@ -77,6 +81,6 @@ class TieCollector:
         number = np.empty(self._starts.size, int)
         number[np.argsort(self._starts.ravel(), kind="stable")] = np.arange(1, number.size + 1)
         group = features.pass_number
-        features = replace(features, pass_number=number[group], source=group // len(self._segments))
+        features = replace(features, pass_number=number[group], scanner=self._scanner(group))
         keys = (*features.centre.T, features.gps_time, features.pass_number)
         return features[np.lexsort(keys)]

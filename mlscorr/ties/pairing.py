@@ -18,12 +18,12 @@ def pair_features(
     angle: float = SETTINGS.parallel,
     turned: np.ndarray | None = None,
 ) -> Ties:
-    """Ties between features of two visits, by different passes or by one that came back.
+    """Ties between features of two visits, or of two scanners that saw a thing on the same pass.
 
-    A feature has at most one partner in each other pass, and one in its own at another visit: the
-    nearest whose direction is parallel, each the other's. Two passes have none in a direction in
-    which half as many pair when they are displaced by twice their gates: those would be by chance.
-    Call it again with a better correction, smaller sigma, radius and angle.
+    A feature has at most one partner in each other pass of each scanner, and one in its own at
+    another visit: the nearest whose direction is parallel, each the other's. Two passes have none
+    in a direction in which half as many pair when they are displaced by twice their gates: those
+    would be by chance. Call it again with a better correction, smaller sigma, radius and angle.
 
     Parameters
     ----------
@@ -193,8 +193,9 @@ def _distance(features, apart, sigma, radius, pairs):
     misfit, beside = np.where(is_pole, [across, along], [along, across])
     variance = (sigma**2 + features.variance)[pairs].sum(axis=1) + 2 * SETTINGS.surface_sigma**2
     gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))
-    # a pass starts with each file too: tiles of one drive see the street at one visit
+    # a pass starts with each file too: tiles of one scanner see the street at one visit
     is_pair = np.abs(np.diff(features.gps_time[pairs])[:, 0]) > SETTINGS.pause
+    is_pair |= features.scanner[first] != features.scanner[second]
     is_pair &= (features.kind[first] == features.kind[second]) & (misfit <= gate)
     is_pair &= beside <= SETTINGS.cell
     return np.where(is_pair, np.hypot(misfit / gate, beside / SETTINGS.cell), np.inf)

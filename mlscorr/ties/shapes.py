@@ -84,7 +84,7 @@ def find_shapes(
     begin : (n,) array
         Of the cells' moments. Units: s.
     group : (n,) int array
-        Of each cell; it stands for pass_number and source in what is returned.
+        Of each cell; it stands for pass_number and scanner in what is returned.
     moments : (n, 22) array
         See mlscorr.ties.cells.
     """
@@ -113,7 +113,7 @@ def find_shapes(
     kind = np.repeat(["plane", "pole"], [len(planes), len(poles)])
     return TieFeatures(
         pass_number=group[rows],
-        source=group[rows],
+        scanner=group[rows],
         kind=kind,
         gps_time=time[rows],
         centre=middle[rows] + (local[rows] + shapes.shift),

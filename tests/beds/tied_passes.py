@@ -97,5 +97,6 @@ def _ties(number, wrong, apart, shared, rng, seed):
         variance=np.full(number, NOISE**2),
         kind=np.full(number, "plane"),
         pass_number=np.tile([1, 2], (number, 1)),
+        scanner=np.zeros((number, 2), int),
         feature=np.arange(2 * number).reshape(number, 2),
     )

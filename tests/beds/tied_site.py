@@ -131,5 +131,6 @@ def _ties(true, is_wrong, look, rng):
         variance=np.full(number, TIE_NOISE**2),
         kind=np.full(number, "plane"),
         pass_number=np.tile([1, 2], (number, 1)),
+        scanner=np.zeros((number, 2), int),
         feature=np.arange(2 * number).reshape(number, 2),
     )

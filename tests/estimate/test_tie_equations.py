@@ -17,8 +17,8 @@ def survey():
 
 @pytest.fixture(scope="module")
 def equations(survey):
-    starts = stated_sigma(survey.trajectory, Pos()).starts
-    return TieEquations.of(survey.trajectory, Pos(), survey.ties, starts)
+    stated = stated_sigma(survey.trajectory, Pos())
+    return TieEquations.of(survey.trajectory, Pos(), survey.ties, stated)
 
 
 def test_partials_are_what_a_changed_pose_does_to_the_misclosure(survey, equations):

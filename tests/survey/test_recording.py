@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from mlscorr.survey import CloudFile, MountedScanner, Scanner, Survey
 from tests.beds.drives import MOUNTING, drive
@@ -52,20 +51,13 @@ def test_a_file_is_seen_by_the_scanner_that_wrote_it():
     assert SURVEY.of(CLOUDS[0]) is SURVEY.by_scanner[""] is SURVEY
 
 
-def test_rows_are_parted_by_the_scanner_of_their_file():
-    "What files 0, 1, 1 saw is one row of the right scanner and two of the left one"
-    source = np.array([0, 1, 1])
-    (_, left), (_, right) = with_scanners().rows_by_scanner(source)
+def test_rows_are_parted_by_scanner():
+    "Of three rows the first file's is the right scanner's, those of the second the left one's"
+    survey = with_scanners()
+    assert survey.scanner_numbers.tolist() == [1, 0]
+    scanner = survey.scanner_numbers[[0, 1, 1]]
+    (_, left), (_, right) = survey.rows_by_scanner(scanner)
     assert left.tolist() == [False, True, True]
     assert right.tolist() == [True, False, False]
-    ((survey, rows),) = SURVEY.rows_by_scanner(source)
-    assert survey is SURVEY and len(source[rows]) == 3
-
-
-def test_what_rests_on_one_mounting_refuses_several_scanners():
-    "The sentence names them and the way out; one scanner is let through"
-    SURVEY.check_one_scanner("a plan")
-    with pytest.raises(
-        ValueError, match=r"2 scanners \(left, right\), and a plan .*of each scanner"
-    ):
-        with_scanners().check_one_scanner("a plan")
+    ((survey, rows),) = SURVEY.rows_by_scanner(scanner)
+    assert survey is SURVEY and len(scanner[rows]) == 3

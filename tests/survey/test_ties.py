@@ -14,7 +14,7 @@ def wall():
     centre = np.array([[447_000.3, 5_410_000.0, 120.0], [447_000.0, 5_410_000.4, 120.2]])
     return TieFeatures(
         pass_number=np.array([2, 1]),
-        source=np.array([1, 0]),
+        scanner=np.array([0, 0]),
         kind=np.array(["plane", "plane"]),
         gps_time=np.array([414_100.0, 413_200.0]),
         centre=centre,

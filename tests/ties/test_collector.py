@@ -57,13 +57,12 @@ def test_features_move_with_the_origin():
 
 
 def test_passes_count_in_time_whatever_the_order_of_the_files():
-    "The file that was recorded first holds pass 1, and each feature knows its file"
+    "The file that was recorded first holds pass 1"
     survey = street.survey()
     survey = replace(survey, clouds=survey.clouds[::-1])
     features = street.collect(survey, street.clouds()[::-1])
     early = features.gps_time < street.START + street.PAUSE / 2
     assert np.array_equal(features.pass_number, np.where(early, 1, 2))
-    assert np.array_equal(features.source, np.where(early, 1, 0))
 
 
 def test_clouds_without_features_have_none():
@@ -104,7 +103,7 @@ def test_each_file_is_seen_from_its_own_scanner():
     for number, scanner in enumerate(mounted):
         alone = replace(survey, mounting=scanner.mounting, scanner=scanner.scanner)
         other = street.collect(alone, parts)
-        inside, same = features.source == number, other.source == number
+        inside, same = features.scanner == number, other.pass_number == number + 1
         np.testing.assert_array_equal(features.centre[inside], other.centre[same])
         np.testing.assert_array_equal(features.variance[inside], other.variance[same])
     from_one = street.collect(replace(survey, mounting=mounted[0].mounting), parts)

@@ -18,7 +18,7 @@ def walls(place, number, normal=(1.0, 0.0, 0.0), time=None):
     n = len(place)
     return TieFeatures(
         pass_number=number,
-        source=number - 1,
+        scanner=np.zeros(n, int),
         kind=np.full(n, "plane"),
         gps_time=street.START + 100.0 * number if time is None else np.array(time),
         centre=place,
@@ -69,6 +69,15 @@ def test_a_correction_closes_what_it_should():
         ties = pair_features(features, correction, np.full(2, 0.3), 1.0)
         assert np.isclose(ties.misclosure, 0.4, atol=1e-9).all()
         assert np.isclose(residuals(ties, correction), 0.4 - believed, atol=1e-9).all()
+
+
+def test_two_scanners_see_a_wall_on_the_same_pass():
+    "One that was seen again after a second is a tie if another scanner did, none if the same did"
+    features = walls([[0, 0, 0], [0.1, 0.2, 0.1]], [1, 2], time=street.START + np.array([0.0, 1.0]))
+    assert len(pair(features, 0.1)) == 0
+    ties = pair(replace(features, scanner=np.array([1, 0])), 0.1)
+    assert ties.scanner.tolist() == [[1, 0]]  # the earlier view first
+    assert np.isclose(ties.misclosure, 0.1, atol=1e-9).all()
 
 
 def test_a_repeated_facade_is_not_paired_with_the_next_window():

@@ -52,6 +52,7 @@ def tie_at(scouted, normal, passes=(3, 5), used=True):
         variance=np.array([1e-5]),
         kind=np.array(["plane"]),
         pass_number=np.array([passes]),
+        scanner=np.zeros((1, 2), int),
         feature=np.array([[0, 1]]),
     )
     return TieResiduals(tie, np.array([used]), np.zeros(1))
