@@ -21,7 +21,7 @@ exclude_patterns = [".*", "assets", "benchmarks", "build", "examples", "mlscorr*
 
 html_theme, html_title = "furo", "mlscorr"
 html_math_renderer = "mathml"
-html_copy_source = html_show_sourcelink = False
+html_copy_source = html_show_sourcelink = html_show_copyright = False
 html_static_path: list[str] = []
 highlight_language = "none"
 copybutton_exclude = ".linenos, .gp, .go"  # prompts and what is printed

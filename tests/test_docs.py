@@ -16,6 +16,7 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import catalogue, known_effects
 from mlscorr.io.survey_sections import SurveyFile
+from mlscorr.simulate import Scenario
 from mlscorr.simulate.simulator_file import SimulatorFile
 from tests.beds.places import ROOT
 
@@ -129,7 +130,8 @@ def keys_of(model):
                 yield from keys_of(annotation)
 
 
-def test_every_key_of_a_survey_is_explained():
-    "docs/survey.md knows what survey.toml may hold"
-    words = set(re.findall(r"\w+", (ROOT / "docs" / "survey.md").read_text()))
-    assert not set(keys_of(SurveyFile)) - words
+@pytest.mark.parametrize(("name", "model"), [("survey", SurveyFile), ("scenarios", Scenario)])
+def test_every_key_of_a_file_is_explained(name, model):
+    "docs/survey.md knows what survey.toml may hold, docs/scenarios.md what a scenario"
+    words = set(re.findall(r"\w+", (ROOT / "docs" / f"{name}.md").read_text()))
+    assert not set(keys_of(model)) - words
