@@ -37,6 +37,14 @@ bench: $(VENV)/ready
 tables: $(VENV)/ready
 	$(RUN)/python benchmarks/readme_tables.py $(TABLES) $(if $(CHECK),--check $(CHECK))
 
+# Draws the pictures of README and docs anew and says which have changed; PICTURES="--write" keeps them
+assets: $(VENV)/ready
+	$(RUN)/python benchmarks/assets.py $(PICTURES)
+
+# Every kind of page in headless Chromium: widths, print, contrast, keys
+pages: $(VENV)/ready
+	$(RUN)/python -m pytest -rs tests/report/test_every_page_in_a_browser.py tests/report/test_pages_in_a_browser.py tests/report/gap/test_page.py
+
 examples: $(VENV)/ready
 	for script in examples/*.py examples/real/*_gap.py; do $(RUN)/python $$script || exit 1; done
 

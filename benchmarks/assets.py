@@ -1,0 +1,76 @@
+"""Draw the pictures of README.md and docs anew, and say which ones no longer look like that.
+
+    python benchmarks/assets.py [NAME ...] [--write]
+
+Without names those are drawn that need nothing from elsewhere, some minutes; the others can be
+named: the paper's take hours, the real ones the data that their scripts name. The same code draws
+the same file, byte for byte, on one machine; letters and the last figure of a sum may differ on
+another. So a picture has changed where its size has, or where more than 1 % of its pixels differ
+by more than 16 of 255 in a channel: a moved letter is less, a moved curve more. --write keeps the
+new ones; without it the exit code is 1 where one has changed.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+ROOT = Path(__file__).parents[1]
+ASSETS = ROOT / "assets"
+SCRIPTS = {  # picture: (script, whether it is drawn without being named)
+    "correct_a_survey": ("correct_a_survey.py", True),
+    "compare_methods": ("compare_methods.py", True),
+    "render_before_after": ("render_before_after.py", True),
+    "calibrate_mounting": ("calibrate_mounting.py", True),
+    "diagnose": ("diagnose_gap.py", True),
+    "pos_error": ("pos_error.py", False),
+    "paper_car": ("paper/car.py", False),
+    "paper_boat": ("paper/boat.py", False),
+    "paper_calibration": ("paper/calibration.py", False),
+    "real_pos_gap": ("real/pos_gap.py", False),
+    "two_pass_gap": ("real/two_pass_gap.py", False),
+}
+CHANNEL, SHARE = 16, 0.01  # of 255, of the pixels: see above
+
+
+def share_changed(old: Path, new: Path) -> float:
+    """Share of the pixels that differ between two pictures; all where the size does."""
+    pixels = [np.asarray(Image.open(path).convert("RGB"), dtype=int) for path in (old, new)]
+    if pixels[0].shape != pixels[1].shape:
+        return 1.0
+    return float((np.abs(pixels[0] - pixels[1]).max(axis=2) > CHANNEL).mean())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(SCRIPTS))
+    parser.add_argument("--write", action="store_true", help="keep those that have changed")
+    arguments = parser.parse_args()
+    if unknown := set(arguments.names) - set(SCRIPTS):
+        parser.error(f"{', '.join(sorted(unknown))}: none of {', '.join(SCRIPTS)}")
+    names = arguments.names or [name for name, (_, usual) in SCRIPTS.items() if usual]
+    with tempfile.TemporaryDirectory() as folder:
+        changed = [draw(name, Path(folder), arguments.write) for name in names]
+    sys.exit(any(changed) and not arguments.write)
+
+
+def draw(name, folder, write):
+    """Draw a picture and compare it: whether it has changed."""
+    new, old = folder / f"{name}.png", ASSETS / f"{name}.png"
+    option = [] if name == "diagnose" else ["--picture"]
+    command = [sys.executable, ROOT / "examples" / SCRIPTS[name][0], *option, new]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
+    share = share_changed(old, new)
+    word = "has changed" if share > SHARE else "looks the same"
+    print(f"{name}: {word} ({100 * share:.2f} % of its pixels)", flush=True)
+    if write and share > SHARE:
+        old.write_bytes(new.read_bytes())
+    return share > SHARE
+
+
+if __name__ == "__main__":
+    main()
