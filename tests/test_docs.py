@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import tomllib
 from pkgutil import resolve_name
 from typing import get_args
@@ -76,12 +75,10 @@ def test_names_of_the_package_are_there(page):
         resolve_name(name)
 
 
-@pytest.mark.parametrize("name", ["tutorial", "start", "own-simulator"])
-def test_python_of_the_manual_runs(name, street, tmp_path, monkeypatch):
-    "Each page's blocks run one after the other beside a survey.toml, or a FOLDER without one"
-    shutil.copytree(street, tmp_path, dirs_exist_ok=True)
-    shutil.copytree(street, tmp_path / "FOLDER").joinpath("survey.toml").unlink()
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.parametrize("name", ["tutorial", "own-simulator"])
+def test_python_of_the_manual_runs(name, street, monkeypatch):
+    "The blocks of a page run one after the other beside a survey.toml"
+    monkeypatch.chdir(street)
     monkeypatch.setattr(catalogue, "_registered", {})
     text = (ROOT / "docs" / f"{name}.md").read_text()
     exec("\n".join(re.findall(r"```python\n(.*?)```", text, flags=re.S)), {"__name__": name})
