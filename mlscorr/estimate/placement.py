@@ -198,9 +198,9 @@ def _reason(equations, time, drive, share, limit, passes):
         where = f"{side} control point, {names[near]}, by {abs(time - times[near]):.0f} s"
     often = f", seen by {passes} passes" if passes > 1 else ""
     return (
-        f"{where}{often}: along the drive the 3D sigma falls from {drive[0]:.3f} to "
-        f"{drive[1]:.3f} m (RMS), and {100 * share[1]:.0f} % of it instead of "
-        f"{100 * share[0]:.0f} % are below {limit:.3f} m."
+        f"{where}{often}: along the drive the 3D sigma falls from {1e3 * drive[0]:.1f} to "
+        f"{1e3 * drive[1]:.1f} mm (RMS), and {100 * share[1]:.0f} % of it instead of "
+        f"{100 * share[0]:.0f} % are below {1e3 * limit:.1f} mm."
     )
 
 

@@ -7,7 +7,7 @@ from matplotlib.patches import Patch
 from mlscorr.effects.wording import known
 from mlscorr.report.gap.labels import OTHERS, family, title
 from mlscorr.report.gap.settings import SETTINGS
-from mlscorr.report.style import BLUE, GREEN, GREY, ORANGE, label, new_figure, styled
+from mlscorr.report.style import BLUE, GREEN, GREY, ORANGE, label, legend_above, new_figure, styled
 
 FAMILIES = {  # colour, hatch, words
     "none": (GREY, "", "nothing wrong"),
@@ -48,7 +48,7 @@ def ladder_figure(document: dict) -> Figure:
     panel.grid(axis="y", visible=False)
     panel.tick_params(axis="y", length=0)
     panel.set_xlabel("Powers of ten by which it explains the data better than nothing wrong")
-    panel.legend(handles=_legend(rungs), loc="lower right", frameon=True, framealpha=0.9)
+    legend_above(figure, _legend(rungs), columns=4)
     return figure
 
 

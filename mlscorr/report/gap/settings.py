@@ -37,7 +37,7 @@ class Settings:
     """
 
     ladder_rows: int = 26
-    ladder_letters: int = 34
+    ladder_letters: int = 44
     class_correlation: float = 0.9
     written_correlation: float = 0.5
     excess_share: float = 1.3

@@ -161,9 +161,8 @@ def _overview_title(rows):
     )
     points = len({row.name for row in rows})
     often = "" if points == len(rows) else f", seen {len(rows)} times"
-    return (
-        f"{points} {role} points{often}: {before:.2f} m off before, {after:.2f} m after (3D RMSE)"
-    )
+    were, are = tables.length_in_words(before), tables.length_in_words(after)
+    return f"{points} {role} points{often}: {were} off before, {are} after (3D RMSE)"
 
 
 def _symbols(rows, state, times) -> Iterator[Mark]:
@@ -233,10 +232,8 @@ def _target_title(rows):
     often = f" in {len(rows)} passes" if len(rows) > 1 else ""
     made = " (the correction was made with it)" if group == "control" else ""
     at_most = " at most" if len(rows) > 1 else ""
-    return (
-        f"{rows[0].name}, {role}{often}:{at_most} {before:.2f} m off before, {after:.2f} m after"
-        f"{made}"
-    )
+    were, are = tables.length_in_words(before), tables.length_in_words(after)
+    return f"{rows[0].name}, {role}{often}:{at_most} {were} off before, {are} after{made}"
 
 
 def _facing(normal, to_vehicle):
