@@ -29,7 +29,7 @@ copybutton_exclude = ".linenos, .gp, .go"  # prompts and what is printed
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
-nb_execution_timeout = 300  # s; a fresh machine compiles first
+nb_execution_timeout = 900  # s a cell; a fresh machine compiles first, a busy one slowly
 nb_execution_raise_on_error = True
 nb_output_stderr = "warn"
 # a profile of its own, in which the kernel does not warn that TCP is not encrypted
