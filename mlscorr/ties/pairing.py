@@ -22,7 +22,7 @@ def pair_features(
 
     A feature has at most one partner in each other pass of each scanner, and one in its own at
     another visit: the nearest whose direction is parallel, each the other's. Two passes have none
-    in a direction in which half as many pair when they are displaced by twice their gates: those
+    in a direction in which more than half as many pair when they are displaced by two gates: those
     would be by chance. Call it again with a better correction, smaller sigma, radius and angle.
 
     Parameters
@@ -73,22 +73,26 @@ def pair_features(
 def _beyond_chance(features, correction, sigma, radius, angle, pairs):
     """Which pairs (k,) are no chance for the most part, as are all of both passes and a direction.
 
-    Displaced by two gates, no two views of one thing are a pair. The correction chose the place
-    where most agree: so of the displaced ones the fullest counts.
+    Chance is judged within gates as wide as sigmas make them, whatever the radius, and displaced by
+    two of them, where no two views of one thing are a pair: nearer, a rough surface pairs with
+    itself. The correction chose the place where most agree: so of the displaced the fullest counts.
     """
-    is_chance = np.zeros(len(pairs), bool)
+    radius = max(radius, SETTINGS.least_gate)
+    sigma = np.maximum(sigma, SETTINGS.roughest)
     variance = 2 * (sigma**2 + features.variance + SETTINGS.surface_sigma**2)
     gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))
     way = features.direction.copy()
     is_pole = features.kind == "pole"
     way[is_pole] = _across(way[is_pole])[0]
-    for gates in (2.0, -2.0):
-        shift = gates * gate[:, None] * way
-        candidates = candidate_pairs(features, correction, sigma, radius, angle, shift)
-        chance = _mutual(features, *candidates)
-        for group in (_passes, _passes_and_direction):
-            own, displaced = group(features, pairs), np.sort(group(features, chance))
-            is_chance |= 2 * _count(own, displaced) >= _count(own, np.sort(own))
+    here, *displaced = (
+        _mutual(features, *candidate_pairs(features, correction, sigma, radius, angle, shift))
+        for shift in np.multiply.outer([0.0, 2.0, -2.0], gate[:, None] * way)
+    )
+    is_chance = np.zeros(len(pairs), bool)
+    for group in (_passes, _passes_and_direction):
+        own, number = group(features, pairs), group(features, here)
+        for chance in displaced:
+            is_chance |= 2 * _count(own, group(features, chance)) > _count(own, number)
     return ~is_chance
 
 
@@ -106,7 +110,8 @@ def _passes_and_direction(features, pairs):
 
 
 def _count(values, others):
-    """How often each of some values (n,) is among others (m,), which are sorted."""
+    """How often each of some values (n,) is among others (m,)."""
+    others = np.sort(others)
     return others.searchsorted(values, "right") - others.searchsorted(values, "left")
 
 

@@ -115,6 +115,16 @@ def test_chance_in_one_direction_takes_nothing_from_another():
     assert (~is_road[1]).sum() < (~is_road[0]).sum() / 10
 
 
+def test_a_rough_surface_is_no_chance():
+    "Ground that varies by 3 cm from metre to metre pairs with itself, within a gate of 2 cm too"
+    rng = np.random.default_rng(1)
+    east, north = np.mgrid[:20, :20].reshape(2, -1) / 2
+    places = np.column_stack([east, north, 0.03 * rng.standard_normal(400)])
+    again = places + 0.005 * rng.standard_normal((400, 3))
+    features = walls([*places, *again], [1] * 400 + [2] * 400, (0.0, 0.0, 1.0))
+    assert len(pair(features, 0.005, radius=0.02)) > 300
+
+
 def test_a_parallel_street_is_another():
     "Facades of the next street, 40 m aside and beyond any radius, are no partners"
     features = walls([[0, 0, 2], [40.0, 0, 2]], [1, 2])
