@@ -13,14 +13,15 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.correction import PointSigma
+from mlscorr.estimate import believed_correction
 from mlscorr.estimate.mounting import corrected_mounting
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.calibration import CalibratedScanners
-from mlscorr.pipeline.tying import of_one_scanner
+from mlscorr.pipeline.tying import tie_passes
 from mlscorr.report.provenance import systems
 from mlscorr.simulate import Scenario, simulate
-from mlscorr.ties import TieCollector, pair_features
+from mlscorr.ties import TieCollector
 
 LACKS = np.array(  # right, forward, up: m and deg, of each scanner's recorded mounting
     [[0.03, -0.02, 0.0, 0.3, -0.3, 0.4], [-0.02, 0.0, 0.0, -0.4, 0.2, -0.3]]
@@ -154,20 +155,18 @@ def test_beams_are_judged_by_the_mounting_of_their_file(survey, corrected):
     assert len(list(check.warnings())) == 2
 
 
-def test_ties_are_views_of_one_scanner(survey):
-    "Of all pairs of two passes those of two scanners are left out: they tell of both mountings"
-    collector = TieCollector(survey)
+def test_two_scanners_tie_a_pass_to_itself(commanded):
+    "Calibrated, both see the walls of one pass within seconds, and most such ties hold"
+    survey = replace(mlscorr.read_survey(commanded[0]), search_radius=0.1)  # m, for speed
+    there, collector = survey.trajectory.passes[0, 1], TieCollector(survey)
     for file in survey.clouds:
         for chunk in read_chunks(file):
-            collector.add(file, chunk)
-    features = collector.features()
-    still, sigma = np.zeros((len(features), 3)), np.full(len(features), 0.5)
-    ties = pair_features(features, still, sigma, 1.5)
-    kept = of_one_scanner(survey, features, ties)
-    files = np.array([file.path.name for file in survey.clouds])[features.source[ties.feature]]
-    is_second = np.char.find(files, "scanner-2") > 0
-    np.testing.assert_array_equal(kept, is_second[:, 0] == is_second[:, 1])
-    assert 0 < kept.sum() < len(ties)
+            collector.add(file, chunk[chunk.gps_time < there])
+    believed = believed_correction(survey.trajectory, survey.pos)
+    tied = tie_passes(survey, believed, collector.features()).ties
+    assert tied.used.sum() > 20
+    assert (np.sort(tied.ties.scanner) == [0, 1]).all()
+    assert np.diff(tied.ties.gps_time).max() < 10.0  # s
 
 
 def test_what_takes_one_scanner_says_so(survey):
