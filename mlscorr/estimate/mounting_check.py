@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from mlscorr.estimate.calibration import MOUNTING_COMPONENTS
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.settings import SETTINGS
@@ -42,20 +43,29 @@ class MountingCheck:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence where a wrong boresight is significant, and large enough to matter."""
-        angle, sigma = self.correction[3:], self.sigma[3:]
-        limit = np.maximum(SETTINGS.setup_sigmas * sigma, SETTINGS.determined_sigma[1])
-        if self.statistic <= self.critical or not (np.abs(angle) > limit).any():
+        """A sentence where a wrong mounting is significant, and large enough to matter."""
+        size, sigma = np.abs(self.correction), self.sigma
+        least = np.repeat(SETTINGS.determined_sigma, 3)
+        is_wrong = size > np.maximum(SETTINGS.setup_sigmas * sigma, least)
+        if self.statistic <= self.critical or not is_wrong.any():
             return ()
-        values = ", ".join(
-            f"{a:.2f} ± {s:.2f} about {axis}"
-            for a, s, axis in zip(
-                *np.degrees([angle, sigma]), ("right", "forward", "up"), strict=True
+        scale = np.repeat([1.0, np.degrees(1.0)], 3)
+        values = [
+            f"{part} {a:.{decimals}f} ± {s:.{decimals}f} {unit}"
+            for part, a, s, decimals, unit in zip(
+                MOUNTING_COMPONENTS,
+                self.correction * scale,
+                sigma * scale,
+                [3] * 3 + [2] * 3,
+                ["m"] * 3 + ["deg"] * 3,
+                strict=True,
             )
-        )
+        ]
+        lacks = ", ".join(value for value, wrong in zip(values, is_wrong, strict=True) if wrong)
         return (
-            "Passes disagree by their direction of travel, as a wrong boresight makes them: it "
-            f"lacks {values} deg (chi-squared {self.statistic:.0f}, critical {self.critical:.0f}). "
+            "Passes disagree by their direction of travel (arrows of opposite passes are "
+            f"opposite), as a wrong mounting makes them: it lacks {lacks} "
+            f"(chi-squared {self.statistic:.0f}, critical {self.critical:.0f}). "
             "This correction takes that for drift. Run mlscorr calibrate first, and correct with "
             "the mounting that it writes.",
         )

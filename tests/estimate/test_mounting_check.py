@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import estimate_correction, find_mounting_error, with_ties
+from mlscorr.estimate import MountingCheck, estimate_correction, find_mounting_error, with_ties
 from mlscorr.survey import Mounting
 from tests.beds.tied_passes import tied_passes
 
@@ -47,6 +47,15 @@ def test_a_boresight_of_a_degree_is_named():
     error = np.degrees(check.correction[3:]) - [0.0, 1.0, 0.0]
     assert (np.abs(error) < 3 * np.degrees(check.sigma[3:])).all()
     assert abs(error[1]) < 0.2  # deg
+
+
+def test_a_lever_arm_is_named_where_it_exceeds_its_sigma_and_alone():
+    "As two passes of a good POS tell of 9 cm; up, which they don't tell, is not named"
+    lacks, sigma = [-0.087, 0.004, 0.094, 0.0, 0.0, 0.0], [0.011, 0.011, 0.129, 4e-4, 3e-4, 2e-4]
+    check = MountingCheck(np.array(lacks), np.array(sigma), 68.6, 22.5)
+    (sentence,) = check.warnings
+    assert "it lacks lever arm right -0.087 ± 0.011 m (chi-squared 69" in sentence
+    assert replace(check, statistic=20.0).warnings == ()
 
 
 def test_without_ties_nothing_is_tested():
