@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
 
-.PHONY: demo test docs faults bench tables examples clean
+.PHONY: demo test docs wheel faults bench tables assets pages examples clean
 
 demo: $(VENV)/ready
 	$(RUN)/mlscorr demo -o demo --overwrite
@@ -17,6 +17,14 @@ test: $(VENV)/ready
 # The manual, build/manual/index.html; its notebook runs, and a warning is an error
 docs: $(VENV)/ready
 	$(RUN)/sphinx-build -q -W --keep-going -c docs -d build/doctrees . build/manual
+
+# The wheel, installed by itself in an environment that knows nothing else, runs the demo
+wheel: $(VENV)/ready
+	rm -rf build/lib build/wheel
+	$(RUN)/python -m pip wheel --quiet --no-deps -w build/wheel .
+	$(PYTHON) -m venv build/wheel/venv
+	build/wheel/venv/bin/python -m pip install --quiet build/wheel/mlscorr-*.whl
+	cd build/wheel && venv/bin/mlscorr demo -o demo
 
 # The whole matrix of docs/faults.md, of which make test tries a part; SHARE=0.1 a tenth of it
 faults: $(VENV)/ready

@@ -1,7 +1,9 @@
 """What all commands share: options, exit codes, and sentences on stderr."""
 
+import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
@@ -10,9 +12,12 @@ from typing import Annotated
 
 import typer
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)
+HANGUP = getattr(signal, "SIGHUP", None)  # Windows knows none
+SIGNALS = tuple(filter(None, (signal.SIGINT, signal.SIGTERM, HANGUP)))
+AGAIN = 1.0  # s, after which an interruption is repeated: libraries load faster, a user waits
 MARKS = {"green": "  ", "amber": "! ", "red": "!!"}  # before a statement, by its rating
 _voice = {"quiet": False}  # of this process's stderr
+_repeats: list[threading.Timer] = []  # of interruptions, until one is heeded
 
 
 def be_quiet(quiet: bool) -> bool:
@@ -71,14 +76,24 @@ def interrupt(number: int, frame: object) -> None:
     ------
     KeyboardInterrupt
     """
-    signal.setitimer(signal.ITIMER_REAL, 1.0)
+    _repeats.append(threading.Timer(AGAIN, _interrupt_again))
+    _repeats[-1].daemon = True
+    _repeats[-1].start()
     raise KeyboardInterrupt
+
+
+def _interrupt_again():
+    """Send this process the signal of Ctrl-C; where the system has no such, to this thread."""
+    if os.name == "posix":  # so that it wakes the main thread
+        os.kill(os.getpid(), signal.SIGINT)
+    else:
+        signal.raise_signal(signal.SIGINT)
 
 
 def listen() -> None:
     """End in order when the user, a scheduler or a closed terminal interrupts."""
     for number in SIGNALS:
-        if signal.getsignal(number) != signal.SIG_IGN or number != signal.SIGHUP:  # nohup
+        if signal.getsignal(number) != signal.SIG_IGN or number != HANGUP:  # nohup
             signal.signal(number, interrupt)
 
 
@@ -87,7 +102,8 @@ def deafen() -> None:
     for number in SIGNALS:
         if signal.getsignal(number) is interrupt:
             signal.signal(number, signal.SIG_IGN)
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    while _repeats:
+        _repeats.pop().cancel()
 
 
 @contextmanager
@@ -110,7 +126,7 @@ def exit_code(code: Exit, has_results: Callable[[], bool] = lambda: False) -> It
     except KeyboardInterrupt:
         _stop(has_results())
     except (OSError, ImportError, ValueError, SystemError) as error:
-        if signal.getitimer(signal.ITIMER_REAL)[0]:  # a library made it of an interruption
+        if _repeats:  # a library made it of an interruption
             _stop(has_results())
         _tell(error, code)
 

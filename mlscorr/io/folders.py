@@ -26,7 +26,8 @@ def take_along(out: Path, part: Path) -> None:
 
 def exchange(out: Path, part: Path) -> None:
     """Exchange two folders, at once where the system can."""
-    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    library = None if os.name == "nt" else ctypes.CDLL(None, use_errno=True)
+    rename = getattr(library, "renameat2", None)
     here, swap = -100, 2  # AT_FDCWD and RENAME_EXCHANGE of linux/fs.h
     if rename is None or rename(here, os.fsencode(part), here, os.fsencode(out), swap):
         move_into(out, part)

@@ -1,7 +1,6 @@
 """Results: a folder that appears whole or not at all, and JSON documents."""
 
 import errno
-import fcntl
 import glob
 import json
 import math
@@ -15,6 +14,11 @@ from pathlib import Path
 from mlscorr.io.folders import exchange, move_into, remove, take_along
 from mlscorr.io.inputs import check_unchanged
 from mlscorr.survey import InputFile
+
+try:
+    import fcntl
+except ImportError:  # Windows: no folder has a lock, and what killed runs leave stays
+    fcntl = None
 
 PART = ".part"  # ends the name of what isn't whole yet
 
@@ -178,6 +182,8 @@ def _locked(part):
         ends.callback(remove, part)
         while not part.exists():  # at first, and where another run took it for an abandoned one
             part.mkdir()
+            if fcntl is None:
+                break
             lock = os.open(part, os.O_RDONLY)
             ends.callback(os.close, lock)
             with suppress(OSError):  # a disk that knows no locks
@@ -187,6 +193,8 @@ def _locked(part):
 
 def _remove_abandoned(out, place):
     """Remove what runs into the same folder left that were killed: nobody holds its lock."""
+    if fcntl is None:
+        return
     for part in place.glob(f"{glob.escape(_prefix(out))}*{PART}"):
         with suppress(OSError):
             lock = os.open(part, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

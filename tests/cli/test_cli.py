@@ -527,6 +527,28 @@ def test_a_killed_process_leaves_no_folder_under_the_name(survey):
     assert not (survey.parent / "out").exists()
 
 
+# ---- elsewhere
+
+AS_WINDOWS = """
+import signal, sys
+sys.modules["fcntl"] = None
+for name in ("SIGHUP", "SIGALRM", "setitimer", "getitimer", "ITIMER_REAL", "pthread_kill"):
+    delattr(signal, name)
+from mlscorr.cli import app
+app(sys.argv[1:])
+"""
+
+
+def test_a_system_without_locks_and_hangups_corrects(survey):
+    "Windows knows no fcntl, SIGHUP and timers: a survey is corrected there, nothing else is left"
+    out = survey.parent / "out"
+    command = [sys.executable, "-c", AS_WINDOWS, "correct", survey, "-o", out, "--no-report"]
+    process = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    assert process.returncode == 0, process.stderr
+    assert (out / "report.json").is_file()
+    assert sorted(survey.parent.iterdir()) == sorted([out, survey])
+
+
 # ---- quick to start
 
 
