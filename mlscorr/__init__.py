@@ -7,6 +7,7 @@ if TYPE_CHECKING:  # what editors and type checkers see of the names that are lo
     from mlscorr import simulate
     from mlscorr.io.survey_file import read_survey
     from mlscorr.pipeline import (
+        apply,
         calibrate,
         check,
         compare,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:  # what editors and type checkers see of the names that are lo
     from mlscorr.simulate.simulator_file import read_simulator
 
 __all__ = [
+    "apply",
     "calibrate",
     "check",
     "compare",

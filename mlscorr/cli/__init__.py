@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from mlscorr.cli.apply import apply
 from mlscorr.cli.blind import blind
 from mlscorr.cli.calibrate import calibrate
 from mlscorr.cli.check import check
@@ -25,7 +26,7 @@ from mlscorr.cli.ties import ties
 
 COMMANDS = (
     *(init, check, correct, extract, ties, calibrate, compare, render, demo),
-    *(simulate, diagnose, plan, doctor),
+    *(simulate, diagnose, apply, plan, doctor),
 )
 
 app = typer.Typer(

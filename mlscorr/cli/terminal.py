@@ -14,7 +14,7 @@ import typer
 
 HANGUP = getattr(signal, "SIGHUP", None)  # Windows knows none
 SIGNALS = tuple(filter(None, (signal.SIGINT, signal.SIGTERM, HANGUP)))
-AGAIN = 1.0  # s, after which an interruption is repeated: libraries load faster, a user waits
+REPEAT_AFTER = 1.0  # s until an interruption is repeated: libraries load faster
 MARKS = {"green": "  ", "amber": "! ", "red": "!!"}  # before a statement, by its rating
 _voice = {"quiet": False}  # of this process's stderr
 _repeats: list[threading.Timer] = []  # of interruptions, until one is heeded
@@ -76,7 +76,7 @@ def interrupt(number: int, frame: object) -> None:
     ------
     KeyboardInterrupt
     """
-    _repeats.append(threading.Timer(AGAIN, _interrupt_again))
+    _repeats.append(threading.Timer(REPEAT_AFTER, _interrupt_again))
     _repeats[-1].daemon = True
     _repeats[-1].start()
     raise KeyboardInterrupt

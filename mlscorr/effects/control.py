@@ -29,7 +29,10 @@ class MapRotation(Effect):
     sentence: ClassVar = (
         "The frame of the surveyed targets is turned {side} by {size} against that of the cloud."
     )
-    remedy: ClassVar = "Check CRS and datum of control and trajectory."
+    remedy: ClassVar = (
+        "Check CRS and datum of control and trajectory; where the control's is meant, mlscorr "
+        "apply survey.toml gap.json -o applied moves the cloud to it."
+    )
     sides: ClassVar = ("counter-clockwise", "clockwise")
     magnitude: float = quantity(
         "rad",
@@ -134,7 +137,10 @@ class VerticalDatum(Effect):
         "The surveyed heights of the targets lie {size} {side} those of the cloud: two height "
         "systems."
     )
-    remedy: ClassVar = "Check the heights' datum and geoid of control and trajectory."
+    remedy: ClassVar = (
+        "Check the heights' datum and geoid of control and trajectory; where the control's is "
+        "meant, mlscorr apply survey.toml gap.json -o applied moves the cloud to it."
+    )
     sides: ClassVar = ("above", "below")
     magnitude: float = quantity(
         "m",

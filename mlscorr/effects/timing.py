@@ -28,8 +28,8 @@ class TimeOffset(Effect):
     meaning: ClassVar = "The clocks of scanner and POS differ by a constant."
     sentence: ClassVar = "The clock of the scanner is {size} {side} the clock of the POS."
     remedy: ClassVar = (
-        "Have the time synchronisation of the scanner checked; until then, shift its time "
-        "stamps by the size found."
+        "Have the time synchronisation of the scanner checked; until then, mlscorr apply "
+        "survey.toml gap.json -o applied takes the size found out of the cloud."
     )
     sides: ClassVar = ("ahead of", "behind")
     magnitude: float = quantity(

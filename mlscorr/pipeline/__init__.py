@@ -1,5 +1,6 @@
 """The story from files to files, one module a command."""
 
+from mlscorr.pipeline.applying import AppliedSurvey, apply
 from mlscorr.pipeline.calibration import CalibratedScanners, CalibratedSurvey, calibrate
 from mlscorr.pipeline.checking import CheckedSurvey, check
 from mlscorr.pipeline.compared_survey import ComparedSurvey

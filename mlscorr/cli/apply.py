@@ -1,0 +1,45 @@
+"""The command that takes out of a survey what was found wrong with it."""
+
+from typing import Annotated
+
+import typer
+
+import mlscorr
+from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyArgument, exit_code, say
+from mlscorr.cli.work import print_json, work
+
+
+def apply(
+    survey: SurveyArgument,
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="EFFECT",
+            help="gap.json or calibration.json, or NAME=SIZE: time_offset=0.005 (s), "
+            "lever_arm=0,0.1,0 (m: right,forward,up), boresight=0.1,0,0 (deg), "
+            "horizontal_datum=0.2,-0.1 (m: E,N), vertical_datum=15.3 (m).",
+        ),
+    ],
+    out: Out,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Take a clock offset, datum or mounting that was found out of clouds and trajectory."""
+    import numpy as np
+
+    from mlscorr.pipeline.applying import read_effects
+
+    with exit_code(Exit.USAGE):
+        effects = [effect for source in sources for effect in read_effects(source)]
+    with work(out, overwrite, survey) as progress:
+        applied = mlscorr.apply(mlscorr.read_survey(survey), effects)
+        content = applied.write(out, overwrite, progress)
+    print_json(content, as_json)
+    for effect in applied.effects:
+        sizes = ", ".join(f"{size:.4g}" for size in np.atleast_1d(effect.magnitude))
+        say(f"Taken out: {effect.name} {sizes} {effect.quantities()['magnitude'].unit}")
+    untouched = sum(file["untouched"] for file in content["files"])
+    if untouched:
+        say(f"{untouched} points outside the trajectory were left as they were.")
+    say(f"Survey:    {out / 'survey.toml'}, with the clouds beside it")

@@ -1,0 +1,241 @@
+"""``apply``: what was found wrong with clock, datum or mounting, taken out of the clouds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.correction import Correction
+from mlscorr.effects import Effect, effect_class, make_effect
+from mlscorr.effects.wording import joined
+from mlscorr.estimate.mounting import corrected_mounting
+from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.survey_copy import write_survey_copy
+from mlscorr.io.survey_file import FILE_NAME
+from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.finding import silent
+from mlscorr.survey import Survey
+from mlscorr.survey.summary import Summary
+
+CLOCK = "time_offset"
+MOUNTING = ("lever_arm", "boresight")
+DATUM = ("horizontal_datum", "vertical_datum")
+TAKEN_OUT = (CLOCK, *MOUNTING, *DATUM)
+
+
+def apply(survey: Survey, effects: Iterable[Effect]) -> AppliedSurvey:
+    """Take effects of known size out of a survey: clock offset, mounting, datum.
+
+    Parameters
+    ----------
+    survey : Survey
+        As recorded, with the effects in it.
+    effects : iterable of Effect
+        ``mlscorr.effects.make_effect`` makes them, ``read_effects`` reads what was found.
+
+    Returns
+    -------
+    AppliedSurvey
+        A clock offset goes into the trajectory (on the scanner's clock from then on) and moves the
+        points; a datum moves trajectory and points to the control; a mounting moves the points.
+
+    Raises
+    ------
+    ValueError
+        For effects that nothing can take out, and for a mounting where there is none, or several.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.effects import make_effect
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> late = {"name": "time_offset", "magnitude": 0.02}
+    >>> line = {"lines_per_second": 50, "points_per_line": 200}
+    >>> short = Scenario(
+    ...     drive={"duration": 4.0},
+    ...     targets={"control": 2, "check": 1},
+    ...     scanner=[line],
+    ...     effects=[late],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> applied = mlscorr.apply(mlscorr.read_survey(folder), [make_effect(**late)])
+    >>> way = applied.correction.corrected.position - applied.correction.recorded.position
+    >>> round(float(np.median(np.linalg.norm(way, axis=1))), 2)  # m, at 4 m/s
+    0.08
+    """
+    effects = tuple(effects)
+    stubborn = [effect for effect in effects if effect.name not in TAKEN_OUT]
+    if not effects:
+        raise ValueError(f"No effect is given: {joined(TAKEN_OUT)} can be taken out.")
+    if stubborn:
+        names = joined([effect.name for effect in stubborn])
+        remedies = " ".join(effect.remedy for effect in stubborn)
+        raise ValueError(
+            f"{names} can't be taken out of clouds and trajectory; {joined(TAKEN_OUT)} can. "
+            f"{remedies}"
+        )
+    if any(effect.name in MOUNTING for effect in effects):
+        survey.check_one_scanner("a mounting that is applied")
+        if survey.mounting is None:
+            raise ValueError(
+                f"{survey.path} has no [mounting], which {joined(MOUNTING, 'or')} could change. "
+                "Add the lever_arm (m) and boresight (deg) that the cloud was georeferenced with."
+            )
+    return AppliedSurvey(survey, effects, _correction(survey, effects))
+
+
+def read_effects(source: str | Path) -> tuple[Effect, ...]:
+    """Effects that were found: by a document of diagnose or calibrate, or one by name and size.
+
+    Parameters
+    ----------
+    source : str or path
+        gap.json, calibration.json, or ``NAME=SIZE`` with three numbers for a vector, two for a
+        horizontal one: ``boresight=0.1,0,-0.2`` (deg).
+
+    Raises
+    ------
+    ValueError
+        Where it is neither, or names nothing that was found.
+    OSError
+        Where a document can't be read.
+    """
+    name, equals, size = str(source).partition("=")
+    if equals and name in TAKEN_OUT:
+        try:
+            values = [float(value) for value in size.split(",")]
+        except ValueError:
+            raise ValueError(f"{source}: {size!r} is no number, nor several with commas.") from None
+        return (make_effect(name, magnitude=values if len(values) > 1 else values[0]),)
+    if not Path(source).is_file():
+        raise ValueError(
+            f"{source} is neither a gap.json or calibration.json nor NAME=SIZE with one of "
+            f"{joined(TAKEN_OUT, 'or')}, as time_offset=0.005 (s)."
+        )
+    try:
+        content = json.loads(Path(source).read_text(encoding="utf-8"))
+        return {"mlscorr.gap/1": _of_gap, "mlscorr.calibration/1": _of_calibration}[
+            content["schema"]
+        ](content)
+    except (KeyError, TypeError, json.JSONDecodeError):
+        raise ValueError(
+            f"{source} is no gap.json or calibration.json of mlscorr, or not one of a single "
+            "scanner; calibrate --clouds writes the clouds of several anew."
+        ) from None
+
+
+def _of_gap(content):
+    """The effects of the most probable cause; a ValueError where there is none."""
+    label, cause = content["verdict"]["label"], content["causes"][0] if content["causes"] else None
+    if cause is None or cause["effect"] != label:
+        raise ValueError(f"The diagnosis names no cause but {label}: nothing can be taken out.")
+    effects = []
+    for name in label.split("+"):
+        kind = effect_class(name)
+        if name not in TAKEN_OUT:
+            raise ValueError(f"{name}, a cause, can't be taken out of the cloud. {kind.remedy}")
+        sizes = {row["name"].removeprefix(f"{name} "): row for row in cause["parameters"]}
+        values = [sizes[part]["estimate"] for part in kind.parts]
+        effects.append(make_effect(name, magnitude=values if len(values) > 1 else values[0]))
+    return tuple(effects)
+
+
+def _of_calibration(content):
+    """What the recorded mounting lacks."""
+    lacks = content["lsc"]
+    return tuple(make_effect(name, magnitude=lacks[name]["correction"]) for name in MOUNTING)
+
+
+def _correction(survey, effects):
+    """From the survey with the effects to that without."""
+    recorded, late, shift, lacks = survey.trajectory, 0.0, np.zeros(3), np.zeros(6)
+    for effect in effects:
+        size = np.atleast_1d(effect.magnitude)
+        if effect.name == CLOCK:
+            late += float(size[0])
+        elif effect.name == "lever_arm":
+            lacks[:3] += size
+        elif effect.name == "boresight":
+            lacks[3:] += np.radians(size)
+        elif effect.name == "horizontal_datum":
+            shift[:2] += size
+        else:
+            shift[2] += size[0]
+    times = recorded.gps_time  # a stamp t of the scanner was t - late by the clock of the POS
+    known = recorded.segment(times - late) == recorded.segment(times)
+    here, there = recorded.at(times[known]), recorded.at(times[known] - late)
+    moved = replace(there, gps_time=here.gps_time, position=there.position + shift)
+    if not lacks.any():
+        return Correction(here, moved)
+    return Correction(here, moved, survey.mounting, corrected_mounting(survey.mounting, lacks))
+
+
+@dataclass(frozen=True, repr=False)
+class AppliedSurvey(Summary):
+    """A survey without what was found wrong, and ``write``.
+
+    Parameters
+    ----------
+    survey : Survey
+        As recorded.
+    effects : tuple of Effect
+        That are taken out.
+    correction : Correction
+        Of trajectory and mounting.
+    """
+
+    survey: Survey
+    effects: tuple[Effect, ...]
+    correction: Correction
+
+    def write(
+        self, out: str | Path, overwrite: bool = False, progress: Callable | None = None
+    ) -> dict:
+        """Write clouds, survey.toml, applied.json and, if it moves, trajectory.csv into a folder.
+
+        Parameters
+        ----------
+        out : path
+            The folder, which appears whole or not at all.
+        overwrite : bool
+        progress : function, optional
+
+        Returns
+        -------
+        dict
+            The document of applied.json.
+
+        Raises
+        ------
+        ValueError, OSError
+            As ``CorrectedSurvey.write`` does.
+        """
+        survey, correction = self.survey, self.correction
+        mounting, files = correction.corrected_mounting, []
+        with output_folder(out, survey.inputs, overwrite) as folder:
+            done = (progress or silent)("Writing the cloud", survey.points)
+            for path, points, outside in write_clouds(
+                survey, folder, correction, lambda times: done(len(times))
+            ):
+                files.append({"name": path.name, "points": points, "untouched": outside})
+            trajectory = None
+            if any(effect.name not in MOUNTING for effect in self.effects):
+                trajectory = "trajectory.csv"
+                write_trajectory_csv(folder / trajectory, correction.corrected)
+            parts = survey.by_scanner.values()
+            write_survey_copy(
+                survey.path,
+                folder / FILE_NAME,
+                out,
+                [] if mounting is None else [mounting],
+                [[file.path.name for file in part.clouds] for part in parts],
+                trajectory,
+            )
+            effects = [effect.document() for effect in self.effects]
+            content = document("applied", {"name": survey.name, "effects": effects, "files": files})
+            write_json(folder / "applied.json", content)
+        return content

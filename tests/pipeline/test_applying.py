@@ -1,0 +1,134 @@
+"""What was found wrong, taken out of clouds, trajectory and survey.toml."""
+
+import json
+import tomllib
+import warnings
+
+import laspy
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import mlscorr
+from mlscorr.cli import app
+from mlscorr.effects import make_effect
+from mlscorr.pipeline.applying import read_effects
+from mlscorr.simulate import Scenario, simulate
+from tests.beds.documents import undocumented
+
+WRONG = {"time_offset": 0.05, "boresight": [0.2, -0.1, 0.3], "vertical_datum": 1.5}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    "Folder of a short drive with a late clock, a wrong boresight and heights of another datum"
+    scenario = Scenario(
+        drive={"duration": 5.0, "turns": 20.0},
+        targets={"control": 3, "check": 1},
+        scanner=[{"lines_per_second": 50, "points_per_line": 200, "range_noise": 0.0}],
+        effects=[{"name": name, "magnitude": size} for name, size in WRONG.items()],
+    )
+    folder = tmp_path_factory.mktemp("site")
+    simulate(scenario, np.random.default_rng(2)).write(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def applied(site, tmp_path_factory):
+    "Folder that the command writes by name and size, and its document"
+    out = tmp_path_factory.mktemp("applied") / "out"
+    sizes = ["time_offset=0.05", "boresight=0.2,-0.1,0.3", "vertical_datum=1.5"]
+    done = CliRunner().invoke(app, ["apply", str(site), *sizes, "-o", str(out), "--json"])
+    assert done.exit_code == 0, done.output
+    return out, json.loads(done.stdout)
+
+
+def test_points_come_to_where_they_were_measured(site, applied):
+    "But for POS drift of a few mm: each is where it is, 1.5 m higher in the control's datum"
+    truth = np.load(site / "truth.npz")["point_xyz"]
+    las = laspy.read(applied[0] / "pass-1.laz")
+    left = las.xyz - truth - [0.0, 0.0, 1.5]
+    before = laspy.read(site / "pass-1.laz").xyz - truth
+    assert np.median(np.linalg.norm(before, axis=1)) > 0.15  # m
+    assert np.median(np.linalg.norm(left, axis=1)) < 0.02  # m
+
+
+def test_the_written_survey_is_consistent(site, applied):
+    "Trajectory, mounting and clouds agree: taking nothing more out would move no point"
+    described = tomllib.loads((applied[0] / "survey.toml").read_text())
+    assert described["trajectory"]["file"] == "trajectory.csv"
+    before, after = mlscorr.read_survey(site), mlscorr.read_survey(applied[0])
+    turn = (after.mounting.boresight * before.mounting.boresight.inv()).as_rotvec(degrees=True)
+    assert np.allclose(turn, WRONG["boresight"], atol=1e-5)  # deg
+    times = after.trajectory.gps_time[5:-5]
+    then = before.trajectory.at(times - WRONG["time_offset"]).position
+    assert np.allclose(after.trajectory.at(times).position - then, [0, 0, 1.5], atol=1e-4)  # m
+
+
+def test_the_document_says_what_was_done(applied):
+    "Effects and files, every field explained in the manual"
+    content = applied[1]
+    assert {e["name"]: e["magnitude"] for e in content["effects"]} == WRONG
+    (file,) = content["files"]
+    assert file["untouched"] < 0.01 * file["points"]
+    assert not undocumented(content)
+
+
+def test_what_was_found_is_read_from_documents(tmp_path):
+    "Of a diagnosis the named causes, single or paired; of a calibration both parts of the mounting"
+    path = tmp_path / "found.json"
+    rows = [{"name": "time_offset magnitude", "estimate": -0.004}]
+    rows += [{"name": f"boresight {part}", "estimate": 0.1} for part in ("right", "forward", "up")]
+    label = "time_offset+boresight"
+    gap = {"schema": "mlscorr.gap/1", "verdict": {"label": label}}
+    path.write_text(json.dumps({**gap, "causes": [{"effect": label, "parameters": rows}]}))
+    late, turned = read_effects(path)
+    assert late == make_effect("time_offset", magnitude=-0.004)
+    assert turned.magnitude == (0.1, 0.1, 0.1)
+    lacks = {"lever_arm": {"correction": [0, 0.1, 0]}, "boresight": {"correction": [0, 0, 0.2]}}
+    path.write_text(json.dumps({"schema": "mlscorr.calibration/1", "lsc": lacks}))
+    assert [effect.name for effect in read_effects(path)] == ["lever_arm", "boresight"]
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ({"verdict": {"label": "none"}, "causes": []}, "names no cause but none"),
+        ({"verdict": {"label": "range_walk"}, "causes": [{"effect": "range_walk"}]}, "range_walk,"),
+        ({}, "is no gap.json or calibration.json"),
+    ],
+)
+def test_a_document_that_names_nothing_to_take_out_is_refused(content, sentence, tmp_path):
+    "With the reason, not with a traceback"
+    path = tmp_path / "gap.json"
+    path.write_text(json.dumps({"schema": "mlscorr.gap/1", **content}))
+    with pytest.raises(ValueError, match=sentence):
+        read_effects(path)
+
+
+@pytest.mark.parametrize(
+    ("found", "sentence"),
+    [
+        ("time_offset=late", "'late' is no number"),
+        ("nosuch.json", "neither a gap.json or calibration.json nor NAME=SIZE"),
+        ("range_bias=0.1", "neither a gap.json"),
+        ("boresight=40,0,0", "exceeds 10 deg"),
+    ],
+)
+def test_a_wrong_size_is_refused_by_the_command(found, sentence, site, tmp_path):
+    "Exit code 2 and a sentence, and no folder"
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, ["apply", str(site), found, "-o", str(out)])
+    assert done.exit_code == 2
+    assert sentence in " ".join(done.output.split())
+    assert not out.exists()
+
+
+def test_what_cannot_be_taken_out_is_named(site):
+    "With what its effect says to do"
+    with warnings.catch_warnings(action="ignore"):
+        survey = mlscorr.read_survey(site)
+    with pytest.raises(ValueError, match="range_bias can't be taken out"):
+        mlscorr.apply(survey, [make_effect("range_bias", magnitude=0.01)])
+    with pytest.raises(ValueError, match="No effect is given"):
+        mlscorr.apply(survey, [])
