@@ -263,9 +263,9 @@ def _with_candidates(equations, candidates, sights):
         "misclosure": np.zeros((len(rows), 3)),
         "partials": partials,
     }
-    columns = {name: getattr(equations, name)[at] for name in new}
-    for name, values in new.items():
-        columns[name][is_new] = values
+    if equations.mounting is not None:  # the first scanner's: the others lack something beside it
+        new["mounting"] = np.zeros((len(rows), *equations.mounting.shape[1:]))
+    columns = {name: np.insert(getattr(equations, name), n, new[name], axis=0) for name in new}
     own, group = noise.own[at], noise.group[at]
     # of the variances alone: medians of whole matrices, element by element, can be no covariance
     own[is_new] = np.diag(np.median(np.diagonal(noise.own[:n], axis1=1, axis2=2), axis=0))

@@ -245,8 +245,7 @@ def _unheld(estimate, features, ties):
         return ((control >= times.min()) & (control <= times.max())).any()
 
     for part, axis in unheld_directions(ties):
-        earlier, later = part.gps_time.T
-        if earlier.max() > later.min():  # two scanners of one pass: the POS holds them
+        if np.median(np.diff(part.gps_time)) < SETTINGS.pause:  # of one pass: the POS holds it
             continue
         if not all(map(controlled, part.pass_number[0])):
             yield unheld_sentence(part, axis)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import estimate_correction, scanner_warnings, with_ties
+from mlscorr.estimate import estimate_correction, place_control, scanner_warnings, with_ties
 from mlscorr.estimate.mounting import corrected_mounting, georeferenced_anew
 from mlscorr.survey import Mounting
 from tests.beds.tied_passes import LENGTH, NOISE, ORIGIN, SPEED, START, drift, tied_passes
@@ -75,6 +75,15 @@ def test_what_the_second_scanner_lacks_beside_the_first_is_estimated(tied):
     sigma = np.sqrt(np.diag(solved.trend_covariance)[:6])
     assert (np.abs(solved.trend[:6] - lacks) < 4 * sigma).all()
     assert (sigma < np.repeat([0.02, np.radians(0.1)], 3)).all()
+
+
+def test_what_follows_an_estimate_knows_its_mountings(survey, tied):
+    "Where the next target belongs, what holds the drive and other orders are found as ever"
+    estimate = tied[0]
+    places = place_control(estimate)
+    assert places and all(place.drive_after < place.drive_before for place in places)
+    assert not estimate.support.contains(survey.matched.gps_time).any()
+    assert estimate.alternatives
 
 
 def test_a_second_scanner_that_lacks_something_is_named(tied):
