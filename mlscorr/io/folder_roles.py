@@ -11,13 +11,14 @@ from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanin
 from mlscorr.io.control_lists import lacking, unnamed_columns
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
+from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.text_files import shown
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
 CLOUDS, MESHES = (".las", ".laz"), (".ply",)
 TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
-TRAJECTORIES = (".sbet", ".trj", ".pof", ".pofx")
+TRAJECTORIES = (".sbet", ".trj", POF_SUFFIX, ".pofx")
 RECORDS = (".out", ".smrmsg", ".bin")
 RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json", "truth.json")
 
@@ -67,6 +68,8 @@ def _role(path) -> FileRole:
         return FileRole(path, "reference", "a mesh")
     if suffix in TRAJECTORIES:
         return FileRole(path, "trajectory", f"its suffix is {path.suffix}")
+    if suffix == POQ_SUFFIX:
+        return FileRole(path, "accuracy", f"its suffix is {path.suffix}")
     if suffix in TABLES:
         return FileRole(path, *_table(path))
     if suffix in RECORDS:

@@ -1,4 +1,4 @@
-"""Applanix SBET trajectories and their accuracy companion, smrmsg, into the map.
+"""Applanix SBET trajectories and their accuracy companion, smrmsg, into the map; RIEGL's POF too.
 
 Both are bare little-endian records of float64 without a header. Applanix' body axes are forward,
 right, down, and its attitude is C = Rz(heading) Ry(pitch) Rx(roll) into north, east, down, with
@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import attitude_from_angles
+from mlscorr.io.pof import POQ_SUFFIX, read_pof, read_poq
 from mlscorr.io.projection import project
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.tables import check_finite
@@ -83,6 +84,47 @@ def read_sbet(path: str | Path, crs: str | None, accuracy: str | Path | None = N
         )
     record = _read_records(path, SBET_FIELDS, "SBET")
     _check_radians(path, record)
+    return _in_map(path, crs, record, accuracy, 0.0)
+
+
+def read_riegl(
+    path: str | Path, crs: str | None, accuracy: str | Path | None = None
+) -> tuple[Trajectory, str]:
+    """Trajectory in a projected CRS from a POF of RIEGL, whose angles count as an SBET's.
+
+    Parameters
+    ----------
+    path, crs
+        See read_sbet.
+    accuracy : path, optional
+        Its POQ, or a smrmsg file.
+
+    Returns
+    -------
+    trajectory : Trajectory
+    layout : str
+        A sentence.
+
+    Raises
+    ------
+    ValueError
+        As read_sbet and read_pof.
+    """
+    record, constant, layout = read_pof(path)
+    if crs is None:
+        raise ValueError(
+            f"{path} is a POF with latitude and longitude: set crs in survey.toml "
+            'to the projected CRS of cloud and control, e.g. crs = "EPSG:32650".'
+        )
+    trajectory = _in_map(path, crs, record | {"wander": 0.0}, accuracy, constant)
+    return trajectory, (
+        f"{layout}; latitude and longitude in the datum of {crs}, altitudes as heights above the "
+        "ellipsoid; heading clockwise from true north, pitch nose up, roll right side down."
+    )
+
+
+def _in_map(path, crs, record, accuracy, constant):
+    """Trajectory of geographic columns; the constant (s) is what was added to a POF's times."""
     try:
         position, convergence = project(crs, record)
         heading = record["heading"] - record["wander"] - convergence
@@ -90,7 +132,7 @@ def read_sbet(path: str | Path, crs: str | None, accuracy: str | Path | None = N
             record["gps_time"],
             position,
             attitude_from_angles(record["roll"], record["pitch"], heading),
-            *(_read_smrmsg(accuracy, record["gps_time"]) if accuracy else (None, None)),
+            *(_sigmas(accuracy, record["gps_time"], constant) if accuracy else (None, None)),
         )
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
@@ -154,9 +196,13 @@ def _cause(accuracy, gps_time):
     return "it belongs to another one"
 
 
-def _read_smrmsg(path, gps_time):
+def _sigmas(path, gps_time, constant):
     """Sigmas (n, 3) of E, N, H (m) and roll, pitch, heading (rad) at the trajectory's times."""
-    record = _read_records(path, SMRMSG_FIELDS, "smrmsg")
+    if is_poq := Path(path).suffix.lower() == POQ_SUFFIX:
+        record = read_poq(path)
+        record["gps_time"] += constant
+    else:
+        record = _read_records(path, SMRMSG_FIELDS, "smrmsg")
     times = record["gps_time"]
     step = np.median(np.diff(times)) if len(times) > 1 else 0.0
     if (np.diff(times) <= 0).any():
@@ -170,5 +216,6 @@ def _read_smrmsg(path, gps_time):
     position = np.column_stack([at_epochs[name] for name in ("east", "north", "down")])
     attitude = np.column_stack([at_epochs[name] for name in ("roll", "pitch", "heading")])
     if min(position.min(), attitude.min()) < 0:
-        raise ValueError(f"the accuracy file {path} holds negative sigmas: it may not be smrmsg.")
-    return position, np.radians(attitude / 60)
+        kind = "a POQ" if is_poq else "smrmsg"
+        raise ValueError(f"the accuracy file {path} holds negative sigmas: it may not be {kind}.")
+    return position, attitude if is_poq else np.radians(attitude / 60)

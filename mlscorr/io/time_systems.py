@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from mlscorr.io.settings import SETTINGS
 from mlscorr.survey import Trajectory
 
-WEEK = 604800.0  # s
+DAY = 86400.0  # s
+WEEK = 7 * DAY
 ADJUSTMENT = 1e9  # s
 SYSTEMS = ("week", "standard", "gps")
 NAMES = {

@@ -8,7 +8,8 @@ import numpy as np
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
 from mlscorr.io.course import check_heading, checked_motion
 from mlscorr.io.output import output_file
-from mlscorr.io.sbet import is_sbet, read_sbet
+from mlscorr.io.pof import POF_SUFFIX
+from mlscorr.io.sbet import is_sbet, read_riegl, read_sbet
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.text_files import warn_of_cut
@@ -54,7 +55,7 @@ def read_trajectory(
     crs : str, optional
         Projected CRS that an SBET is brought into; a CSV is in map coordinates already.
     accuracy : path, optional
-        An SBET's smrmsg file; a CSV carries its sigmas in its own columns.
+        An SBET's smrmsg or a POF's POQ; a CSV carries its sigmas in its own columns.
 
     Returns
     -------
@@ -81,7 +82,7 @@ def read_trajectory_file(
     accuracy: str | Path | None = None,
     section: TrajectorySection = NOTHING_GIVEN,
 ) -> TrajectoryFile:
-    """Trajectory of a file whose kind its content tells: SBET, TerraScan's, TUM's, or a table.
+    """Trajectory of a file whose kind its content tells, or the suffix of a POF.
 
     Parameters
     ----------
@@ -102,32 +103,45 @@ def read_trajectory_file(
     path = Path(path)
     with path.open("rb") as file:
         start = file.read(SETTINGS.longest_line)
-    if path.suffix.lower() in SBET_SUFFIXES or is_sbet(path):
-        given = sorted(section.model_fields_set - {"file", "accuracy"})
-        if given:
-            raise ValueError(
-                f"{path} is an SBET, whose columns and conventions are known: remove "
-                f"{', '.join(given)} from [trajectory]."
-            )
-        return TrajectoryFile(checked_motion(path, read_sbet(path, crs, accuracy)), True)
+    suffix = path.suffix.lower()
+    if suffix == POF_SUFFIX or suffix in SBET_SUFFIXES or is_sbet(path):
+        return _read_geographic(path, crs, accuracy, section, suffix == POF_SUFFIX)
     if accuracy is not None:
         raise ValueError(
             f"{path} has its accuracy in its own sigma columns; an accuracy file ({accuracy}) "
-            "belongs to an SBET."
+            "belongs to an SBET or a POF."
+        )
+    if suffix == ".pofx":
+        raise ValueError(
+            f"{path} is a POFX of RIEGL, whose layout is not public: export it as POF, SBET or "
+            "text."
         )
     is_text = not start.startswith(MARK)
     is_wide = start[:2] in (b"\xff\xfe", b"\xfe\xff")  # UTF-16
     if is_text and b"\0" in start and not is_wide and path.suffix.lower() != ".csv":
         raise ValueError(
             f"{path} is of an unknown kind: no table of text, no SBET (whole records of 136 bytes, "
-            f"angles in radians) and no trajectory of TerraScan. Export it as text or SBET, from "
-            "RIEGL's POF too, whose layout is not public."
+            f"angles in radians) and no trajectory of TerraScan. Export it as text or SBET."
         )
     table, layout = (read_table if is_text else read_terrascan)(path, section, crs)
     trajectory = checked_motion(path, _trajectory_of(path, table))
     if is_text and not is_wide:
         warn_of_cut(path)
     return TrajectoryFile(trajectory, False, layout)
+
+
+def _read_geographic(path, crs, accuracy, section, is_pof):
+    """TrajectoryFile of an SBET or a POF, which take no columns and no conventions."""
+    given = sorted(section.model_fields_set - {"file", "accuracy"})
+    if given:
+        raise ValueError(
+            f"{path} is {'a POF' if is_pof else 'an SBET'}, whose columns and conventions are "
+            f"known: remove {', '.join(given)} from [trajectory]."
+        )
+    if is_pof:
+        trajectory, layout = read_riegl(path, crs, accuracy)
+        return TrajectoryFile(checked_motion(path, trajectory), False, layout)
+    return TrajectoryFile(checked_motion(path, read_sbet(path, crs, accuracy)), True)
 
 
 def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:

@@ -164,7 +164,7 @@ def _ambiguous(what, candidates, clouds=()):
 
 
 def choose_accuracy(roles: Iterable[FileRole], drive: Drive, crs: str | None) -> Path | None:
-    """The accuracy file of an SBET, None without one.
+    """The accuracy file of an SBET or a POF, None without one.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def choose_accuracy(roles: Iterable[FileRole], drive: Drive, crs: str | None) ->
         Where several fit.
     """
     fitting = {}
-    for role in roles if drive.recorded.is_sbet and not drive.section.accuracy else ():
+    for role in roles if drive.lack and not drive.section.accuracy else ():
         try:
             drive.read(crs, role.path)
             fitting[role.path] = ""

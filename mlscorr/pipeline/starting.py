@@ -140,7 +140,7 @@ def _text(folder, path, given, roles):
     text.put("trajectory", "file", _name(path, drive.path),
              f"{len(trajectory)} epochs, {length:.0f} s")  # fmt: skip
     if accuracy is not None:
-        text.put("trajectory", "accuracy", _name(path, accuracy), "sigmas of the SBET")
+        text.put("trajectory", "accuracy", _name(path, accuracy), "sigmas of the trajectory")
     if control is not None:
         text.put("control", "file", _name(path, control), _targets(points))
     rate = _rate(clouds[0], trajectory)

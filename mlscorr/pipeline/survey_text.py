@@ -10,7 +10,7 @@ import tomlkit
 COLUMN = 40  # characters, behind which comments start
 HEAD = "# Made by mlscorr init. Lines behind # are not known, or need not be: docs/survey.md."
 OPTIONAL = {
-    "trajectory": ['# accuracy = "smrmsg.out"       # of an SBET without sigmas'],
+    "trajectory": ['# accuracy = "smrmsg.out"       # of an SBET, or a POQ of a POF'],
     "control": [
         '# file = "control.csv"          # surveyed targets; without them passes are only tied',
     ],

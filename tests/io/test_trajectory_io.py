@@ -184,9 +184,9 @@ def test_a_vehicle_at_rest_has_no_course(tmp_path):
 
 def test_unknown_kinds_and_needless_accuracy_are_refused(tmp_path):
     "What can't be used is said, not ignored"
-    (tmp_path / "t.pof").write_bytes(bytes(1000))
-    with pytest.raises(ValueError, match=r"t\.pof is of an unknown kind: .* POF too"):
-        read_trajectory(tmp_path / "t.pof")
+    (tmp_path / "t.nav").write_bytes(bytes(1000))
+    with pytest.raises(ValueError, match=r"t\.nav is of an unknown kind: .* as text or SBET"):
+        read_trajectory(tmp_path / "t.nav")
     csv_of(tmp_path / "t.csv", table_of(drive(50)))
     with pytest.raises(ValueError, match="its own sigma columns"):
         read_trajectory(tmp_path / "t.csv", accuracy=tmp_path / "smrmsg.out")

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from dataclasses import replace
 
 import laspy
 import numpy as np
@@ -11,9 +12,11 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
+from mlscorr.io.trajectory import read_trajectory
 from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.survey_text import SurveyText
 from mlscorr.survey import PointCloud
+from tests.beds.pof import pof_bytes, poq_bytes
 
 START, EAST, NORTH = 413_200.0, 532_000.0, 3_374_000.0
 WEEK = 604_800.0 * 2300
@@ -137,6 +140,25 @@ def test_an_sbet_gives_the_zone_where_no_cloud_states_a_crs(folder):
         "accuracy": "smrmsg_Mission 1.out",
     }
     assert "UTM zone of export_Mission 1.out" in text
+
+
+def test_a_pof_with_its_poq_is_known_by_its_ending(folder):
+    "RIEGL's trajectory and its sigmas are taken, its POFX beside it is said to have no layout"
+    sigmas = read_trajectory(folder / "trajectory.csv")
+    sigmas = replace(
+        sigmas,
+        position_sigma=np.full((len(sigmas), 3), 0.02),
+        attitude_sigma=np.full((len(sigmas), 3), 1e-4),
+    )
+    (folder / "trajectory.csv").unlink()
+    (folder / "LINE.POF").write_bytes(pof_bytes(sigmas, "EPSG:32650"))
+    (folder / "LINE.POQ").write_bytes(poq_bytes(sigmas))
+    (folder / "LINE.pofx").write_bytes(bytes(100))
+    started = mlscorr.init(folder)
+    assert tomllib.loads(started.text)["trajectory"] == {"file": "LINE.POF", "accuracy": "LINE.POQ"}
+    reason = next(role.reason for role in started.roles if role.path.name == "LINE.pofx")
+    assert "not public: export it as POF" in reason
+    assert any("RIEGL's POF 1.1" in note for note in started.notes)
 
 
 def test_lists_of_a_total_station_are_control(folder):
