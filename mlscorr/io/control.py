@@ -108,24 +108,16 @@ def read_control_list(
     )
     layout, given = (layout, {}) if layout.is_own else complete(layout, section, NORMAL)
     lines = list(read_rows(layout, exact=True))
-    rows = [
-        {name: _value(layout, line, name, cells[i]) for name, i in layout.columns.items()} | given
-        for line, cells in lines
-    ]
-    if not rows:
+    if not lines:
         raise ValueError(f"{path} has a header but no points.")
-    doubled = [name for name, count in Counter(row["name"] for row in rows).items() if count > 1]
-    if doubled:
-        raise ValueError(
-            f"{path} names {shown(', '.join(doubled))} more than once; every control or check "
-            "point needs a name of its own."
-        )
+    rows, faults = _values(layout, lines)
+    rows = [row | given for row in rows]
+    _refuse(path, [*faults, *_doubled(path, rows)])
     if not layout.is_own:
         check_unused(layout, [cells for _, cells in lines], {"role": ROLES, "kind": KINDS})
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
-    for row in rows:
-        _check(path, row)
+    _refuse(path, [fault for row in rows for fault in _faults(path, row)])
     control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
@@ -155,6 +147,42 @@ def holds_points(path: str | Path) -> bool:
     return len(first) > 1 or any(len(re.findall(r"\d+[.,]\d", line)) > 1 for _, line in first)
 
 
+def _values(layout, lines):
+    """Rows of values by column, and a sentence on each cell that holds none."""
+    rows, faults = [], []
+    for line, cells in lines:
+        row = {}
+        for name, i in layout.columns.items():
+            try:
+                row[name] = _value(layout, line, name, cells[i])
+            except ValueError as fault:
+                faults.append(str(fault))
+        rows.append(row)
+    return rows, faults
+
+
+def _refuse(path, faults):
+    """Raise all that is wrong with the rows of a file at once, if anything is."""
+    number, most = len(faults), SETTINGS.named_faults
+    if number > 1:
+        first = f"{path} has {number} faults."
+        more = [f"And {number - most} more like these."] if number > most else []
+        faults = [first, *faults[:most], *more]
+    if faults:
+        raise ValueError(" ".join(faults))
+
+
+def _doubled(path, rows):
+    """A sentence on names that stand more than once."""
+    count = Counter(row.get("name", "") for row in rows)
+    doubled = [name for name, number in count.items() if number > 1 and name]
+    if doubled:
+        yield (
+            f"{path} names {shown(', '.join(doubled))} more than once; every control or check "
+            "point needs a name of its own."
+        )
+
+
 def _value(layout, line, name, cell):
     """Value of a cell: text, or the number of a column that holds numbers."""
     if name in ("kind", "role"):
@@ -174,30 +202,30 @@ def _value(layout, line, name, cell):
     return number
 
 
-def _check(path, row):
-    """Refuse a row whose values can't be meant."""
+def _faults(path, row):
+    """A sentence on each value of a row that can't be meant."""
     who, (smallest, largest) = f"{shown(row['name'])} of {path}", SETTINGS.target_size
     for key, known in (("kind", KINDS), ("role", ROLES)):
         if row[key] not in known:
             near = nearest(row[key], known)
-            raise ValueError(
+            yield (
                 f"{who} has the unknown {key} '{shown(row[key])}'; known are "
                 f"{', '.join(known[:-1])} and {known[-1]}." + (f" Is {near} meant?" if near else "")
             )
     if not smallest <= row["size"] <= largest:
-        raise ValueError(
+        yield (
             f"{who} has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
             f"{_likely_unit(row['size'])}"
         )
     for key in AXES:
         if abs(row[key]) > SETTINGS.largest_coordinate:
-            raise ValueError(
+            yield (
                 f"{who} has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
                 "no map reaches that far (millimetres?)."
             )
     for key in ("sigma_horizontal", "sigma_vertical"):
         if row[key] <= 0:
-            raise ValueError(f"{who} has the {key} {row[key]:g} m; it must be greater than zero.")
+            yield f"{who} has the {key} {row[key]:g} m; it must be greater than zero."
         if row[key] > SETTINGS.coarse_sigma:
             warnings.warn(
                 f"{who} has the {key} {row[key]:g} m and will hardly count (millimetres?).",
@@ -205,9 +233,7 @@ def _check(path, row):
             )
     normal = [row.get(name, np.nan) for name in NORMAL]
     if np.isfinite(normal).any() and not (np.isfinite(normal).all() and np.any(normal)):
-        raise ValueError(
-            f"{who} has the normal {normal}; give three numbers, not all zero, or none."
-        )
+        yield (f"{who} has the normal {normal}; give three numbers, not all zero, or none.")
 
 
 def _likely_unit(size):

@@ -25,6 +25,7 @@ class Settings:
     near: float = 1e3  # m, within which a survey's control and points lie of the trajectory
     far: float = 5e3  # m, beyond which control and trajectory can't belong together
 
+    named_faults: int = 8  # of a file in a message; more would hide what they have in common
     same_place: float = 0.1  # m; realisations of one datum put a place so far apart in a few years
 
     # ---- tables

@@ -184,6 +184,25 @@ def test_what_may_mean_two_things_or_nothing_is_refused(content, message, drive,
         read(tmp_path, content, drive)
 
 
+def test_all_rows_that_are_wrong_are_named_at_once(drive, tmp_path):
+    "Nobody mends a table a row a time: cells, names, kinds and sizes stand in the sentence"
+    rows = [f"P{n};532012,49;3373991,48;44,48" for n in range(12)]
+    rows[2], rows[5], rows[8] = (
+        "P2;532012,49;hoch;44,48",
+        "P1;532012,49;tief;44,48",
+        ";532012,49;1;2",
+    )
+    with pytest.raises(ValueError, match="has 4 faults") as error:
+        read(tmp_path, "\n".join(["Punkt;E;N;H", *rows]), drive)
+    for part in ("Line 4", "'hoch'", "Line 7", "'tief'", "Line 10", "no name", "names P1 more"):
+        assert part in str(error.value)
+    rows = [f"P{n};532012,49;3373991,48;44,48;disc;600" for n in range(12)]
+    with pytest.raises(ValueError, match=r"24 faults.*kind 'disc'.*Then give 0\.6") as error:
+        read(tmp_path, "\n".join(["Punkt;E;N;H;kind;size", *rows]), drive)
+    assert "P3 of" in str(error.value)
+    assert str(error.value).endswith("And 16 more like these.")
+
+
 def test_axes_that_both_lie_near_are_not_guessed(drive, tmp_path):
     "In a local grid with equal numbers X and Y stay open, and so they do without a trajectory"
     local = Trajectory(drive.gps_time, drive.position - [532e3, 3374e3, 0], drive.attitude)
