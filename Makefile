@@ -32,6 +32,7 @@ faults: $(VENV)/ready
 
 bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench.py
+	$(RUN)/python benchmarks/bench_start.py
 	$(RUN)/python benchmarks/bench_simulate.py
 	$(RUN)/python benchmarks/bench_collocation.py
 	$(RUN)/python benchmarks/bench_tie_solver.py

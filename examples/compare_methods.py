@@ -32,14 +32,12 @@ def main():
         compared = mlscorr.compare(mlscorr.read_survey(path))
         report = compared.write(arguments.out or Path(scratch) / "compared")
 
-    print(report["basis"])
     for row in report["methods"]:
         score = row[report["scored_by"]]
         if score["rmse"] is None:
-            print(f"{row['name']:15s} not determined: {row['why'] or score['why']}")
-            continue
+            continue  # the statements say why
         print(f"{row['name']:15s} RMSE E/N/H {np.round(score['rmse'], 3)} m")
-    print(*report["verdict"], sep="\n")
+    print(*(fact["sentence"] for fact in report["statements"]), sep="\n")
     with rc_context(STYLE):
         comparison_figure(report).savefig(arguments.picture, dpi=150)
     print(f"Picture: {arguments.picture}")

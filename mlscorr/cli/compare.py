@@ -14,6 +14,7 @@ from mlscorr.cli.terminal import (
     SurveyArgument,
     exit_code,
     say,
+    say_statements,
     warn,
 )
 from mlscorr.cli.work import print_json, work
@@ -56,19 +57,14 @@ def compare(
 
 
 def _tell(report, out):
-    """The table of scores, the verdict, and where the results lie."""
+    """What stands first, the table of scores, and where the results lie."""
     by = report["scored_by"]
-    say(report["basis"])
+    say_statements(report["statements"])
     say(f"{'RMSE (m)':16s}{'E':>8s}{'N':>8s}{'H':>8s}{'3D':>9s}{'fit, 3D':>9s}")
     scored = [row for row in report["methods"] if row[by]["rmse"] is not None]
     for row in sorted(scored, key=lambda row: row[by]["rmse_3d"]):
         axes = "".join(f"{value:8.3f}" for value in row[by]["rmse"])
         say(f"{row['name']:16s}{axes}{row[by]['rmse_3d']:9.3f}{row['control']['rmse_3d']:9.3f}")
-    for row in report["methods"]:
-        if row[by]["rmse"] is None:
-            say(f"{row['name']:16s}not determined: {row['why'] or row[by].get('why') or ''}")
-    for sentence in report["verdict"]:
-        say(sentence)
     say(f"Report: {out / 'compare.html'}")
     for file in report["files"]:
         say(f"Cloud:  {out / file['name']}")

@@ -6,7 +6,17 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyArgument, exit_code, say
+from mlscorr.cli.terminal import (
+    Exit,
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    SurveyArgument,
+    exit_code,
+    say,
+    say_statements,
+)
 from mlscorr.cli.work import print_json, work
 
 
@@ -40,18 +50,7 @@ def diagnose(
 
 
 def _tell(content):
-    """Verdict, where, how far, and what to do."""
-    verdict, closure = content["verdict"], content["closure"]
-    say(verdict["sentence"])
-    if verdict["same"]:
-        say(f"This survey can't tell it from: {', '.join(verdict['same'])}.")
-    say(content["headline"])
-    if closure["effect"] != "none":
-        low, high = closure["interval"]
-        say(
-            f"With {closure['effect']} in the simulator the gap goes from {closure['before']:.2f} "
-            f"to {closure['after']:.2f} {closure['unit']} on data not used to find it: "
-            f"{100 * closure['shrink']:.0f} % of its square ({100 * low:.0f} to {100 * high:.0f})."
-        )
+    """What stands first, and what to do."""
+    say_statements(content["statements"])
     for number, sentence in enumerate(content["advice"], start=1):
         say(f"{number}. {sentence}")

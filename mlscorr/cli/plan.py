@@ -15,6 +15,8 @@ def plan(
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
     with work(out, overwrite, survey, planned=True):
         content = mlscorr.plan(mlscorr.read_survey(survey, planned=True)).write(out, overwrite)
+    from mlscorr.report.gap import accuracy_sentence
+
     print_json(content, as_json)
     say(f"{'Smallest effect that shows':34s}{'':>12s}  unit      usual size")
     for parts in content["detectable"].values():
@@ -23,6 +25,8 @@ def plan(
             say(f"{part['name']:34s}{part['detectable']:12.3g}  {part['unit']:8s}  {usual}")
     for members in content["classes"]:
         say(f"Can't be told apart: {', '.join(members)}.")
+    if content["accuracy"] is not None:
+        say(accuracy_sentence(content["accuracy"]))
     for number, sentence in enumerate(content["advice"], start=1):
         say(f"{number}. {sentence}")
     say(f"Page:    {out / 'plan.html'}")

@@ -10,6 +10,7 @@ The story, a room each:
 - document: all of it as plain numbers and words
 """
 
+from mlscorr.gap.agreement import agreements
 from mlscorr.gap.close import (
     Beams,
     BeamSimulator,

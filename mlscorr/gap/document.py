@@ -11,7 +11,6 @@ from mlscorr.effects.vehicle import PositionNoise
 from mlscorr.gap.close.closure import Closure
 from mlscorr.gap.infer.causes import Inference
 from mlscorr.gap.infer.separability import Separability
-from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.where import NAMES
 from mlscorr.gap.observe.absence import Absence
 from mlscorr.gap.observe.rows import Rows
@@ -109,12 +108,12 @@ def _sentence(inference):
         return f"No known effect explains it ({chance}): it looks like a {verdict.lead}."
     sizes = [
         f"{parameter.name} {parameter.estimate:.4g} {parameter.unit}"
-        + (f" +- {SETTINGS.quantile * parameter.sigma:.2g}" if np.isfinite(parameter.sigma) else "")
+        + (f" ± {parameter.sigma:.2g}" if np.isfinite(parameter.sigma) else "")
         for parameter in cause.parameters
     ]
     names = verdict.label.replace("+", " and ")
     do = "explain" if "+" in verdict.label else "explains"
-    return f"{names} {do} it ({chance}): {', '.join(sizes)} (95 %)."
+    return f"{names} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
 
 
 def _advice(inference, closure, next_data):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlscorr.evaluate.rows import TargetRow
+from mlscorr.evaluate.target_rows import surveyed_rows
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
@@ -65,20 +66,22 @@ class ComparedSurvey(Summary):
     @property
     def document(self) -> dict:
         """The document of compare.json."""
-        return document(
-            "compare",
-            {
-                "name": self.survey.name,
-                "crs": self.survey.crs,
-                "misclosure": "surveyed - observed, m",
-                "control_points": len(set(self.matched_control.name)),
-                "check_points": len(set(self.matched_check.name)),
-                "scored_by": self.scored_by,
-                "cross_validation_groups": self.groups,
-                "methods": list(self.rows),
-                "unseen": [{"name": row.name, "why": row.reason} for row in self.missing],
-            },
-        )
+        from mlscorr.report import comparison_screen
+
+        content = {
+            "name": self.survey.name,
+            "crs": self.survey.crs,
+            "misclosure": "surveyed - observed, m",
+            "control_points": len(set(self.matched_control.name)),
+            "check_points": len(set(self.matched_check.name)),
+            "scored_by": self.scored_by,
+            "cross_validation_groups": self.groups,
+            "methods": list(self.rows),
+            "unseen": [{"name": row.name, "why": row.reason} for row in self.missing],
+        }
+        matched = self.matched_control, self.matched_check
+        rows = surveyed_rows(*matched, self.corrections["raw"], ()) + self.missing
+        return document("compare", comparison_screen(content, rows) | content)
 
     def to_frame(self) -> pandas.DataFrame:
         """A row each method, with its statistics as a data frame; pandas is needed for it."""
@@ -130,12 +133,11 @@ class ComparedSurvey(Summary):
         OSError
             When writing fails.
         """
-        from mlscorr.report import basis, verdict, write_comparison
+        from mlscorr.report import write_comparison
 
         for name in clouds:
             self._check_cloud(name)
         content = self.document
-        content |= {"basis": basis(content), "verdict": verdict(content)}
         with output_folder(out, self.survey.inputs, overwrite) as folder:
             content["files"] = self._write_clouds(folder, clouds, progress or silent)
             write_json(folder / "compare.json", content)

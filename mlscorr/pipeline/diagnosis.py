@@ -20,6 +20,7 @@ from mlscorr.gap import (
     PatchCollector,
     Rows,
     Surroundings,
+    agreements,
     as_believed,
     background,
     build_rows,
@@ -205,20 +206,23 @@ class DiagnosedSurvey(Summary):
     @property
     def document(self) -> dict:
         """The document of gap.json."""
-        return document(
-            "gap",
-            gap_document(
-                survey=self.survey,
-                rows=self.rows,
-                inference=self.inference,
-                closure=self.closure,
-                next_data=self.next_data,
-                effects=self.effects,
-                left_out=self.left_out,
-                warnings=self.warnings,
-                absence=self.absence,
-            ),
+        from mlscorr.report.gap import gap_screen
+
+        believed, _ = as_believed(self.survey, self.simulator)
+        content = gap_document(
+            survey=self.survey,
+            rows=self.rows,
+            inference=self.inference,
+            closure=self.closure,
+            next_data=self.next_data,
+            effects=self.effects,
+            left_out=self.left_out,
+            warnings=self.warnings,
+            absence=self.absence,
         )
+        agreement = agreements(self.rows, background(self.rows, believed))
+        content["agreement"] = [vars(part) for part in agreement]
+        return document("gap", gap_screen(content) | content)
 
     @property
     def improved(self) -> Simulator:

@@ -78,9 +78,7 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
 
 def _accuracy(survey, rows):
     """PlannedAccuracy by the control that will be seen; None where there is none."""
-    first = np.unique(rows.item[rows.channel == "target"], return_index=True)[1]
-    first = np.flatnonzero(rows.channel == "target")[first]
-    first = first[rows.survey_item[first] < len(survey.control)]  # control comes before check
+    first = _looks_at_control(survey, rows)
     if len(first) == 0:
         return None
     points = survey.surveyed[rows.survey_item[first]]
@@ -96,6 +94,13 @@ def _accuracy(survey, rows):
         rows.points[first],
     )
     return predict_accuracy(survey.trajectory, Matched(observed, points), survey.pos)
+
+
+def _looks_at_control(survey, rows):
+    """The first row of each look at a control point."""
+    first = np.unique(rows.item[rows.channel == "target"], return_index=True)[1]
+    first = np.flatnonzero(rows.channel == "target")[first]
+    return first[rows.survey_item[first] < len(survey.control)]  # control comes before check
 
 
 _NOISE = "Noise shows in the roughness of surfaces and the spread of residuals, not in a shift."
@@ -152,12 +157,13 @@ class PlannedSurvey(Summary):
         """Sigma of the corrected position along the drive: 3D, m."""
         if self.accuracy is None:
             return None
-        sigma = self.accuracy.sigma
+        sigma, looks = self.accuracy.sigma, _looks_at_control(self.survey, self.rows)
         return {
             "gps_time": self.accuracy.gps_time.round(3).tolist(),
             "sigma": sigma.round(5).tolist(),
             "rms": float(np.sqrt(np.mean(sigma**2))),
             "largest": float(sigma.max()),
+            "control_times": self.rows.gps_time[looks].round(3).tolist(),
         }
 
     def _advice(self, detectable):
@@ -196,7 +202,7 @@ class PlannedSurvey(Summary):
         Parameters
         ----------
         name : str
-            ``detectable``, ``map`` or ``separability``.
+            ``accuracy``, ``detectable``, ``map`` or ``separability``.
 
         Raises
         ------

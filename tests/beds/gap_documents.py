@@ -70,6 +70,10 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
         },
         "gap": {"before": 17.04, "after": -1.52, "unit": "mm", "null_band": [-2.3, 3.9]},
         "headline": "Observed and simulated differ by 17.0 mm; 38 % of it is in the axis E.",
+        "agreement": [
+            {"channel": "target", "things": 16, "rms_mm": 41.0, "stated_mm": 12.0},
+            {"channel": "surface", "things": 500, "rms_mm": 9.0, "stated_mm": 8.0},
+        ],
         "advice": ["Have the scanner looked at.", "Then diagnose the survey again."],
         "where": splits(rng),
         "causes": [
@@ -114,7 +118,7 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
         "map": plan_of(rng, rows),
         "channels": {"target": 48, "surface": 1000, "roughness": 961},
         "simulator": {"effects": []},
-        "left_out": {"beam_divergence": "No row of this survey depends on beam_divergence."},
+        "left_out": {"beam_divergence": "No row of this survey depends on it."},
         "warnings": ["No plane was seen twice."],
     }
     return document | changes
@@ -216,6 +220,14 @@ def plan_document(**changes):
         "detectable": found,
         **apart(rng),
         "next_data": gap_document()["next_data"],
+        "accuracy": {
+            "gps_time": [413_200.0, 413_205.0, 413_210.0, 414_000.0, 414_005.0, 414_010.0],
+            "sigma": [0.01, 0.04, 0.02, 0.02, 0.06, 0.01],
+            "rms": 0.0317,
+            "largest": 0.06,
+            "control_times": [413_201.0, 414_009.0],
+        },
+        "next_control": [],
         "map": place,
         "advice": [],
         "warnings": [],

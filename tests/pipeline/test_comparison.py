@@ -16,7 +16,6 @@ from mlscorr.baselines import RAW, Transformation
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_copy import write_corrected
 from mlscorr.io.survey_file import read_survey
-from mlscorr.report import basis
 from tests.beds.documents import undocumented
 from tests.beds.places import EXAMPLES, MLSCORR
 from tests.beds.shared import shared
@@ -91,7 +90,7 @@ def test_few_check_points_are_backed_by_cross_validation(compared):
     document = compared.document
     assert document["scored_by"] == "cross_validated"
     assert document["cross_validation_groups"] == 4
-    assert "cross-validated over all points" in basis(document)
+    assert "cross-validated over all points" in document["statements"][1]["sentence"]
     shift = compared.row("shift")["cross_validated"]
     assert shift["n"] == 5
     assert shift["rmse_3d"] > 0
@@ -141,7 +140,10 @@ def test_without_check_points_the_control_points_are_left_out_in_turn(street, tm
     rewrite_control(folder, lambda rows: [row for row in rows if row["role"] == "control"])
     other = compare(folder)
     assert other.scored_by == "cross_validated"
-    assert "There are no check points, so the scores are cross-validated" in basis(other.document)
+    assert (
+        "There are no check points, so the scores are cross-validated"
+        in other.document["statements"][1]["sentence"]
+    )
     assert other.row("shift")["cross_validated"]["n"] == 4
     assert other.row("shift")["check"] | {"n": 0} == other.row("shift")["check"]
 
@@ -155,7 +157,7 @@ def test_one_target_leaves_what_one_target_can_tell(street, tmp_path):
     assert determined == ["raw", "shift", "linear", "pchip", "linear-steps", "lsc"]
     assert all(row["why"] for row in other.rows if row["status"] != "determined")
     assert other.scored_by == "control"
-    assert "mere fit" in basis(other.document)
+    assert "mere fit" in other.document["statements"][1]["sentence"]
     other.write(tmp_path / "out")
     assert "there is 1" in (tmp_path / "out" / "compare.html").read_text()
 
@@ -193,7 +195,7 @@ def test_the_command_writes_page_document_and_clouds(commanded):
     )
     assert [file["method"] for file in printed["files"]] == ["shift", "lsc"]
     assert all((out / file["name"]).exists() for file in printed["files"])
-    assert printed["verdict"][0] in process.stderr
+    assert printed["statements"][0]["sentence"] in process.stderr
 
 
 def test_a_shifted_cloud_keeps_all_but_its_coordinates(street, commanded, compared):

@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from mlscorr.report import basis, verdict, write_comparison
-from mlscorr.report.comparison_page import comparison_figure, ranking
+from mlscorr.evaluate.rows import TargetRow
+from mlscorr.report import comparison_screen, write_comparison
+from mlscorr.report.comparison_page import comparison_figure
+from mlscorr.report.comparison_screen import basis, ranking, verdict
+
+PLACE = np.array([532_000.0, 3_374_000.0, 42.0])
+UNSEEN = [TargetRow.unobserved("T9", 1, "check", PLACE, "No disc there.", True)]
 
 
 def fake(scores, **changes):
@@ -23,6 +28,7 @@ def fake(scores, **changes):
                 "why": None if value is not None else "All targets lie on one <line>.",
                 "check": score,
                 "control": score,
+                "cross_validated": score,
                 "seconds": None if value is None else 0.1,
                 "warnings": [],
                 "details": {},
@@ -30,7 +36,8 @@ def fake(scores, **changes):
         )
     document = {"name": "street", "crs": None, "control_points": 9, "check_points": 8}
     document |= {"scored_by": "check", "cross_validation_groups": 0, "methods": rows, "unseen": []}
-    return document | changes
+    document |= changes
+    return comparison_screen(document, UNSEEN) | document
 
 
 @pytest.mark.parametrize(
@@ -83,6 +90,19 @@ def test_methods_are_ranked_and_those_without_a_score_are_not():
 def test_what_the_scores_rest_on_is_one_sentence(changes, words):
     "Check points, cross-validation, or the fit alone"
     assert words in basis(fake({"raw": 0.5, "lsc": 0.02}, **changes))
+
+
+def test_what_failed_stands_on_the_first_screen():
+    "Check points without an observation and methods without a score are named, with the reason"
+    document = fake({"raw": 0.5, "affine": None, "lsc": 0.02})
+    facts = {row["what"]: row for row in document["statements"]}
+    assert document["rating"] == facts["Check points"]["rating"] == "red"
+    assert facts["Check points"]["items"] == [{"name": "T9", "text": "No disc there."}]
+    assert facts["Not determined"]["sentence"] == "1 of 3 methods have no score."
+    assert facts["Not determined"]["items"][0]["name"] == "affine"
+    assert facts["Result"]["rating"] == "green"
+    nothing = fake({"raw": 0.5, "lsc": 0.02}, scored_by="control")["statements"]
+    assert [row["rating"] for row in nothing[:2]] == ["amber", "amber"]
 
 
 def test_each_method_stands_at_its_rmse():

@@ -9,10 +9,8 @@ from mlscorr.report.pages import Page, data_uri, show, versions
 from tests.beds.reports import Links
 
 CONTENT = {
-    "document": {"name": "<street>", "crs": None, "methods": [], "unseen": []},
-    "sentences": ["Best is lsc."],
-    "basis": "Nothing.",
-    "warned": [],
+    "document": {"name": "<street>", "crs": None, "methods": [], "unseen": []}
+    | {"rating": "green", "statements": []},
     "kinds": {},
 }
 
@@ -47,8 +45,8 @@ def test_styles_and_scripts_lie_in_the_page():
 
 def test_a_page_refuses_to_show_what_it_was_not_given():
     "A missing value is an error, not a blank"
-    with pytest.raises(UndefinedError, match="basis"):
-        made(content={key: value for key, value in CONTENT.items() if key != "basis"})
+    with pytest.raises(UndefinedError, match="document"):
+        made(content={key: value for key, value in CONTENT.items() if key != "document"})
 
 
 def test_a_page_says_when_and_by_what_it_was_written():

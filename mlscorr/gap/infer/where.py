@@ -209,13 +209,12 @@ def _bins(rows, row, by):
 def _headline(before, band, splits, number, explained):
     """One sentence: how large, and where most of it is."""
     low, high = band
-    measurable = before > high
-    size = (
-        f"All rows together differ by {before:.1f} mm more than predicted ({low:.1f} to "
-        f"{high:.1f} mm when nothing is wrong)"
-    )
+    measurable, chance = before > high, f"{low:.1f} to {high:.1f} mm when nothing is wrong"
+    more = "more" if before > 0 else "less"
+    size = f"All rows together differ by {abs(before):.1f} mm {more} than predicted"
+    size += f" ({chance})" if measurable else f", no more than by chance ({chance})"
     if not measurable and not explained:
-        return f"Nothing stands out. {size}: that is not measurable."
+        return f"Nothing stands out. {size}."
     best, largest = None, 0.0
     for split in splits:
         fraction = split.count / number

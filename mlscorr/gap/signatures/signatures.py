@@ -11,6 +11,8 @@ from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.settings import SETTINGS
 from mlscorr.survey import Survey
 
+NO_MOUNTING = "and the survey has no [mounting]"  # why most effects are left out, where any are
+
 
 @dataclass(frozen=True)
 class Signature:
@@ -117,15 +119,13 @@ def signatures(
     rng = np.random.default_rng(0) if rng is None else rng
     for kind in known_effects() if effects is None else effects:
         if kind.needs_mounting() and survey.mounting is None:
-            left_out[kind.name] = (
-                f"{kind.name} acts on the {kind.stage}, and the survey has no [mounting]."
-            )
+            left_out[kind.name] = f"It acts on the {kind.stage}, {NO_MOUNTING}."
             continue
         bank = [signature(bench, kind, fixed, rng) for fixed in _bank(kind, rows, survey)]
         bank = [sign for sign in bank if sign.jacobian.any() or sign.is_noise]
         signs += bank
         if not bank:
-            left_out[kind.name] = f"No row of this survey depends on {kind.name}."
+            left_out[kind.name] = "No row of this survey depends on it."
     return tuple(signs), left_out
 
 

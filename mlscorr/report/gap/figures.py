@@ -6,6 +6,7 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from mlscorr.effects.wording import known
+from mlscorr.report.gap.accuracy import accuracy_figure
 from mlscorr.report.gap.innovations import innovations_figure
 from mlscorr.report.gap.ladder import ladder, ladder_figure
 from mlscorr.report.gap.rows import detectable_rows, worst_rows
@@ -47,6 +48,8 @@ def plan_figures(document: dict) -> Figures:
     figures, worst = {}, worst_rows(detectable_rows(document["detectable"]))
     if any(known(row.ratio) for row in worst):
         figures["detectable"] = partial(detectable_figure, worst)
+    if document.get("accuracy"):
+        figures["accuracy"] = partial(accuracy_figure, document)
     if document["map"]["trajectory"]:
         figures["map"] = partial(site_map, document)
     return figures | _separability(document)

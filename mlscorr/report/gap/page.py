@@ -1,7 +1,9 @@
 """The pages of a diagnosis, and of what a survey could diagnose before it is driven."""
 
 from mlscorr.effects.wording import DASH, joined
+from mlscorr.report.gap.accuracy import accuracy_sentence
 from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
+from mlscorr.report.gap.first_screen import accuracy, unjudged
 from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.labels import family, lowered, title, titles
 from mlscorr.report.gap.numbers import percent
@@ -41,6 +43,7 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "method": "Method",
 }
 PLANNED = {
+    "accuracy": "Accuracy along the drive",
     "detectable": "How small an error would show",
     "separability": SECTIONS["separability"],
     "map": SECTIONS["map"],
@@ -72,6 +75,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "figures": figures,
         "verdict": verdict(document),
         "facts": facts(document),
+        "others": [fact.document() for fact in (*accuracy(document), *unjudged(document))],
         "smallest": smallest(detectable) if is_clean else [],
         "splits_in_words": joined(lowered(split_title(split)) for split in document["where"]),
         "bin_rows": bin_rows(document),
@@ -105,13 +109,17 @@ def plan_page(document: dict, name: str) -> Page:
     rows = detectable_rows(document["detectable"])
     worst = worst_rows(rows)
     figures = _drawn(plan_figures(document))
-    is_empty = {"map": "map" not in figures, "left": not document.get("left_out")}
+    is_empty = {key: key not in figures for key in ("map", "accuracy")}
+    is_empty["left"] = not document.get("left_out")
     content = {
         "figures": figures,
         "verdict": _plan_verdict(worst, document),
         "detectable_rows": rows,
         "smallest_rows": [],
         "compared": False,
+        "accuracy_words": accuracy_sentence(document["accuracy"])
+        if document.get("accuracy")
+        else "",
     }
     if document["advice"]:
         content["advice_title"] = "What to add"

@@ -112,7 +112,7 @@ def _nothing(document):
         kicker = "Nothing is shown to be wrong, but not all is ruled out"
     text = (
         "The survey and its simulation differ by no more than chance makes them differ. An error "
-        "smaller than the sizes below might not have shown."
+        "smaller than the sizes that would show here may be there all the same."
     )
     return VerdictBox("good", kicker, [text])
 

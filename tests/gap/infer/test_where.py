@@ -15,7 +15,7 @@ def test_the_gap_adds_up_over_every_split_and_may_be_negative(with_surface):
     quiet = replace(g.rows, residual=_quiet(g))
     where = infer_causes(quiet, g.background, g.survey, signs, np.random.default_rng(1), 20).where
     assert where.before < 0
-    assert "not measurable" in where.headline
+    assert "mm less than predicted, no more than by chance" in where.headline
     for split in where.splits:
         assert split.share.sum() == pytest.approx(1.0)
         total = np.sum(split.count * np.sign(split.before) * split.before**2) / split.count.sum()

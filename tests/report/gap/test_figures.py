@@ -11,7 +11,7 @@ def test_each_figure_has_a_name():
     document = gap_document()
     names = ["where", "innovations", "evidence", "closure", "map", "separability"]
     assert list(diagnosis_figures(document)) == names
-    assert list(plan_figures(plan_document())) == ["detectable", "map", "separability"]
+    assert list(plan_figures(plan_document())) == ["detectable", "accuracy", "map", "separability"]
     assert "where" not in diagnosis_figures(document | {"where": []})
 
 

@@ -127,7 +127,7 @@ def test_what_was_left_out_and_warned_of_reaches_the_page(pages):
     "Warnings, channels with rows, effects left out with the reason, the lead, next data"
     text = words(pages["effect"])
     expected = ["No plane was seen twice.", "Roughness 961 rows", "Targets 48 rows", "0.97 0.31"]
-    expected += ["Wide beam No row of this survey depends on beam_divergence.", "mlscorr 0.1.0"]
+    expected += ["Wide beam No row of this survey depends on it.", "mlscorr 0.1.0"]
     expected += ["Lever arm and vertical datum look the same", "Each of 4 blocks of 25 s"]
     assert [piece for piece in expected if piece not in text] == []
 

@@ -1,0 +1,95 @@
+"""What a diagnosis says first, in terminal, gap.json and page: two answers, and what is open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from mlscorr.effects.wording import joined
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.signatures.signatures import NO_MOUNTING
+from mlscorr.report.gap.labels import lowered, title
+from mlscorr.report.gap.verdict import facts, is_named, verdict
+from mlscorr.report.headline import Statement, statements_section, warning_statements
+from mlscorr.report.tables import length_in_words
+
+RATINGS = {"good": "green", "open": "amber", "bad": "red"}  # by the tone of a verdict
+THINGS = {  # what a residual is of, in words
+    "target": "Surveyed targets",
+    "surface": "Reference surface",
+    "shared": "Planes that two passes both saw",
+}
+
+
+def gap_screen(document: dict) -> dict[str, object]:
+    """``rating`` and ``statements`` of gap.json.
+
+    Parameters
+    ----------
+    document : dict
+        Its other content.
+    """
+    box = verdict(document)
+    first, *more = box.sentences
+    items = [("", sentence) for sentence in more]
+    items += [
+        (fact.title, f"{fact.number.rstrip('.')}. {fact.more}".strip()) for fact in facts(document)
+    ]
+    answer = Statement("Unmodelled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
+    warnings = warning_statements(document["warnings"])
+    return statements_section([*accuracy(document), answer, *unjudged(document), *warnings])
+
+
+def accuracy(document: dict) -> Iterator[Statement]:
+    """Whether the recorded cloud is as accurate as POS, scanner and survey state.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    parts = document["agreement"]
+    if not parts:
+        return
+    is_worse = [part["rms_mm"] > SETTINGS.quantile * part["stated_mm"] for part in parts]
+    answer = "less accurate than" if any(is_worse) else "as accurate as"
+    sizes = [
+        (
+            THINGS[part["channel"]],
+            f"off by {length_in_words(part['rms_mm'] / 1e3)} (RMS per axis), "
+            f"{length_in_words(part['stated_mm'] / 1e3)} by what POS, survey and extraction state",
+        )
+        for part in parts
+    ]
+    rating, items = "amber" if any(is_worse) else "green", (*sizes, *_moved(document))
+    yield Statement("Accuracy", rating, f"The recorded cloud is {answer} stated.", items)
+
+
+def _moved(document):
+    """What the cause itself does to points."""
+    causes = [c for c in document["causes"] if c["effect"] == document["verdict"]["label"]]
+    if not is_named(document) or not causes or not causes[0]["rms_mm"]:
+        return ()
+    size = length_in_words(causes[0]["rms_mm"] / 1e3)
+    return ((title(causes[0]["effect"]), f"moves what was compared by {size} (RMS)"),)
+
+
+def unjudged(document: dict) -> Iterator[Statement]:
+    """The effects that this survey can say nothing of, by reason.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    left = sorted(document["left_out"].items(), key=lambda item: item[1])
+    if left:
+        items = tuple(
+            (joined(lowered(title(name)) for name, _ in group), why)
+            for why, group in groupby(left, key=lambda item: item[1])
+        )
+        judged = [rung["label"] for rung in document["evidence"] if "+" not in rung["label"]]
+        total = len(left) + len({*judged} - {"none", "unknown"})
+        sentence = f"{len(left)} of {total} kinds of error can be neither named nor ruled out here."
+        is_mendable = any(NO_MOUNTING in why for _, why in left)
+        yield Statement("Not judged", "amber" if is_mendable else "green", sentence, items)
