@@ -163,11 +163,11 @@ def _values(layout, lines):
 
 def _refuse(path, faults):
     """Raise all that is wrong with the rows of a file at once, if anything is."""
-    number, most = len(faults), SETTINGS.named_faults
+    number, limit = len(faults), SETTINGS.named_faults
     if number > 1:
         first = f"{path} has {number} faults."
-        more = [f"And {number - most} more like these."] if number > most else []
-        faults = [first, *faults[:most], *more]
+        more = [f"And {number - limit} more like these."] if number > limit else []
+        faults = [first, *faults[:limit], *more]
     if faults:
         raise ValueError(" ".join(faults))
 

@@ -157,13 +157,13 @@ class PlannedSurvey(Summary):
         """Sigma of the corrected position along the drive: 3D, m."""
         if self.accuracy is None:
             return None
-        sigma, looks = self.accuracy.sigma, _looks_at_control(self.survey, self.rows)
+        sigma, rows = self.accuracy.sigma, _looks_at_control(self.survey, self.rows)
         return {
             "gps_time": self.accuracy.gps_time.round(3).tolist(),
             "sigma": sigma.round(5).tolist(),
             "rms": float(np.sqrt(np.mean(sigma**2))),
             "largest": float(sigma.max()),
-            "control_times": self.rows.gps_time[looks].round(3).tolist(),
+            "control_times": self.rows.gps_time[rows].round(3).tolist(),
         }
 
     def _advice(self, detectable):
