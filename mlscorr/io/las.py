@@ -57,8 +57,24 @@ def spread_times(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
     times : array of the same length
         Units: s.
     """
+    places, records = spread_records(layout)
+    return places, records["gps_time"]
+
+
+def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of points spread as by spread_times, and their records as by records_at.
+
+    Parameters
+    ----------
+    layout : LasLayout
+
+    Returns
+    -------
+    places : (65 or fewer,) int array
+    records : structured array of the same length
+    """
     places = np.unique(np.linspace(0, layout.points - 1, SETTINGS.sampled_points).astype(np.int64))
-    return places, times_at(layout, places)
+    return places, records_at(layout, places)
 
 
 def read_chunks(
@@ -139,8 +155,24 @@ def times_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     (n,) array
         Units: s.
     """
+    return records_at(layout, places)["gps_time"]
+
+
+def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
+    """Records of a few points, of which only gps_time and point_source_id are sure to be decoded.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    places : (n,) array of int
+        Numbers of the points.
+
+    Returns
+    -------
+    (n,) structured array
+    """
     places = np.asarray(places)
-    times = np.empty(len(places))
+    records = np.empty(len(places), layout.record)
     buffer = bytearray(layout.record_length)
     with open(layout.path, "rb") as file:
         decoder = layout.decoder(file, threads=False)
@@ -148,8 +180,8 @@ def times_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
             with _decoding(layout, place, place + 1):
                 decoder.seek(int(place))
                 decoder.decompress_many(buffer)
-            times[k] = np.frombuffer(buffer, layout.record)["gps_time"][0]
-    return times
+            records[k] = np.frombuffer(buffer, layout.record)[0]
+    return records
 
 
 def read_records(

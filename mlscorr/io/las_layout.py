@@ -133,7 +133,7 @@ class LasLayout:
     def record(self) -> np.dtype:
         """Type of a point record: the fields that are used here by name, the others by length."""
         fields = PointFormat(self.point_format).dtype().fields
-        names = ["X", "Y", "Z", "intensity", "gps_time"]
+        names = ["X", "Y", "Z", "intensity", "gps_time", "point_source_id"]
         kinds, starts = zip(*(fields[name][:2] for name in names), strict=True)
         form: Any = {"names": names, "formats": kinds, "offsets": starts}
         return np.dtype(form | {"itemsize": self.record_length})
@@ -257,7 +257,8 @@ class LasLayout:
         file : binary file
             Open for reading.
         threads : bool
-            Without them seeking is cheap, and only gps_time is sure to be decoded.
+            Without them seeking is cheap, and only gps_time and point_source_id are sure to be
+            decoded.
 
         Returns
         -------
@@ -268,8 +269,9 @@ class LasLayout:
             return _PlainPoints(file, len(self.head), self.record_length)
         if threads:
             return lazrs.ParLasZipDecompressor(file, self.laszip)
-        time_only = lazrs.DecompressionSelection(lazrs.SELECTIVE_DECOMPRESS_GPS_TIME)
-        return lazrs.LasZipDecompressor(file, self.laszip, time_only)
+        fields = lazrs.SELECTIVE_DECOMPRESS_GPS_TIME | lazrs.SELECTIVE_DECOMPRESS_POINT_SOURCE_ID
+        selection = lazrs.DecompressionSelection(fields)
+        return lazrs.LasZipDecompressor(file, self.laszip, selection)
 
 
 class _PlainPoints:

@@ -37,6 +37,7 @@ class Settings:
     baseline: float = 0.5  # s, over which the course is taken, long against noise of positions
     course_tolerance: float = 30.0  # deg, beyond the drift of a boat or the crab of an aircraft
     fastest: float = 340.0  # m/s, the speed of sound: no vehicle with a scanner
+    same_export: float = 1e-3  # m, to which text files write coordinates
     microseconds: float = 1e13  # a time beyond counts them: as seconds it were 300 000 years
 
     # ---- times

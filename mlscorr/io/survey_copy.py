@@ -8,11 +8,11 @@ from pathlib import Path, PurePath
 import numpy as np
 import tomlkit
 
+from mlscorr.io.survey_paths import matching
 from mlscorr.io.text_files import ENCODING
 from mlscorr.survey import Mounting
 
-PATHS = (("trajectory", "file"), ("trajectory", "accuracy"), ("control", "file"),
-         ("scene", "reference"))  # fmt: skip
+PATHS = (("control", "file"), ("scene", "reference"))
 
 
 def write_survey_copy(
@@ -38,7 +38,7 @@ def write_survey_copy(
     clouds : sequence of sequences of str, optional
         New files of each scanner, in the folder.
     trajectory : str, optional
-        New trajectory.file, in the folder.
+        New trajectory.file of all sessions, in the folder.
     """
     source = Path(source)
     document = tomlkit.parse(source.read_text(encoding=ENCODING))
@@ -46,26 +46,53 @@ def write_survey_copy(
     for section, key in PATHS:
         if key in document.get(section, {}):
             document[section][key] = _moved(there, document[section][key])
-    scanner = document.get("scanner")
-    scanners = scanner if isinstance(scanner, list) else []
-    for section in (document["cloud"], *scanners):
-        for number, name in enumerate(section["files"]):  # which keeps comments between them
-            section["files"][number] = _moved(there, name, source.parent)
+    sessions, scanners = _listed(document["trajectory"]), _listed(document.get("scanner"))
+    for section in sessions or [document["trajectory"]]:
+        for key in {"file", "accuracy"} & set(section):
+            section[key] = _moved(there, section[key])
+    files = [section for section in sessions if "files" in section]
     if clouds:
+        for section in files:  # the copies keep their names, not their folders
+            section["files"] = _names(source, section["files"])
         document["cloud"]["files"] = [name for names in clouds for name in names]
         for section, names in zip(scanners, clouds, strict=bool(scanners)):
             section["files"] = list(names)
+    else:
+        for section in (document["cloud"], *scanners, *files):
+            for number, name in enumerate(section["files"]):  # which keeps comments between them
+                section["files"][number] = _moved(there, name, source.parent)
     if trajectory is not None:
-        document["trajectory"]["file"] = trajectory
-        for key in set(document["trajectory"]) - {"file"}:  # its sigmas and columns are its own
-            del document["trajectory"][key]
+        _set_trajectory(document, trajectory)
     for section, mounting in zip(scanners or [document], mountings, strict=bool(mountings)):
-        lever_arm, boresight = mounting_values(mounting)
-        section["mounting"]["lever_arm"] = lever_arm
-        section["mounting"]["boresight"] = boresight
-        if mounting.covariance is not None:
-            _set_covariance(section["mounting"], mounting.covariance)
+        _set_mounting(section["mounting"], mounting)
     Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _set_trajectory(document, name):
+    """One trajectory in our own columns."""
+    if _listed(document["trajectory"]):
+        document["trajectory"] = tomlkit.table()
+    document["trajectory"]["file"] = name
+    for key in set(document["trajectory"]) - {"file"}:  # its sigmas and columns are its own
+        del document["trajectory"][key]
+
+
+def _listed(section):
+    """Sections of a list of tables; none of a table."""
+    return section if isinstance(section, list) else []
+
+
+def _names(source, patterns):
+    """Names of the files that patterns of a survey.toml name."""
+    paths = [matching(source, "trajectory.files", pattern) for pattern in patterns]
+    return sorted({path.name for some in paths for path in some})
+
+
+def _set_mounting(section, mounting):
+    """Lever arm and boresight, and how well they are known."""
+    section["lever_arm"], section["boresight"] = mounting_values(mounting)
+    if mounting.covariance is not None:
+        _set_covariance(section, mounting.covariance)
 
 
 def _set_covariance(section, covariance):

@@ -10,12 +10,13 @@ from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
 from mlscorr.io.projection import check_area, check_crs, describe_projection
+from mlscorr.io.session_points import check_belongings
 from mlscorr.io.survey_paths import files_of
 from mlscorr.io.survey_scanners import mounted_scanners, scanner_notes
 from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
 from mlscorr.io.time_systems import match_times
 from mlscorr.io.toml_file import read_toml
-from mlscorr.io.trajectory import read_trajectory_file
+from mlscorr.io.trajectory_sessions import read_sessions
 from mlscorr.survey import CloudFile, Pos, Scanner, Survey, Trajectory
 
 FILE_NAME = "survey.toml"
@@ -51,23 +52,20 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     """
     path = survey_toml(path)
     settings = read_survey_file(path, planned)
-    clouds, trajectory_file, accuracy, control_file, reference = files = files_of(path, settings)
-    inputs = tuple(input_file(*named) for named in _named(path, files))
-    recorded = read_trajectory_file(trajectory_file, settings.crs, accuracy, settings.trajectory)
-    trajectory, control, check = recorded.trajectory, NO_POINTS, NO_POINTS
-    layouts = [*filter(None, [recorded.layout])]
-    if control_file is not None and holds_points(control_file):
-        points = read_control_list(control_file, settings.control, trajectory)
-        control, check = points.control, points.check
-        check_together(control_file, control + check, trajectory)
-        layouts += filter(None, [points.layout])
+    files = files_of(path, settings)
+    inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
+    recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
+    trajectory = recorded.trajectory
+    control, check, layout = _surveyed(files.control, settings.control, trajectory)
+    layouts = [*recorded.layouts, *filter(None, [layout])]
     notes = crs_notes(settings.crs, trajectory, recorded.is_sbet)
     system = settings.cloud.gps_time if settings.cloud else "auto"
-    read = [cloud_file(cloud, trajectory, system, settings.crs) for cloud in clouds]
+    read = [cloud_file(cloud, trajectory, system, settings.crs) for cloud in files.clouds]
     cloud_files = tuple(file for file, _ in read)
+    check_belongings(path, files.sessions, recorded.parts, cloud_files)
     scanners = mounted_scanners(path, settings, cloud_files)
     is_one = len(scanners) == 1
-    notes += [*(note for _, note in read), *scanner_notes(scanners), *layouts]
+    notes += [*recorded.notes, *(note for _, note in read), *scanner_notes(scanners), *layouts]
     if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
         notes.append(UNKNOWN_POS)
     return Survey(
@@ -81,7 +79,7 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
         check=check,
         scanner=scanners[0].scanner if is_one else Scanner(),
         pos=settings.pos.pos(),
-        reference=reference,
+        reference=files.reference,
         search_radius=settings.matching.search_radius,
         use_ties=settings.ties.use == "auto",
         notes=tuple(notes),
@@ -89,6 +87,25 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
         inputs=inputs,
         scanners=() if is_one else scanners,
     )
+
+
+def _surveyed(path, section, trajectory):
+    """Control points, check points, and how their list was understood."""
+    if path is None or not holds_points(path):
+        return NO_POINTS, NO_POINTS, None
+    points = read_control_list(path, section, trajectory)
+    check_together(path, points.control + points.check, trajectory)
+    return points.control, points.check, points.layout
+
+
+def stated_pos(settings: PlannedSurveyFile) -> Pos | None:
+    """What [pos] says; None where it is left out.
+
+    Parameters
+    ----------
+    settings : PlannedSurveyFile
+    """
+    return settings.pos.pos() if "pos" in settings.model_fields_set else None
 
 
 def crs_notes(crs: str | None, trajectory: Trajectory, is_sbet: bool) -> list[str]:
@@ -155,15 +172,8 @@ def input_files(path: str | Path, planned: bool = False) -> list[Path]:
         For files that aren't there.
     """
     path = survey_toml(path)
-    return [file for _, file in _named(path, files_of(path, read_survey_file(path, planned)))]
-
-
-def _named(path, files):
-    """Pairs (what it is, path) of a survey.toml and of the files that it names."""
-    clouds, *others = files
-    named = [("survey", path), *(("cloud", cloud) for cloud in clouds)]
-    named += zip(("trajectory", "trajectory accuracy", "control", "reference"), others, strict=True)
-    return [(what, file) for what, file in named if file is not None]
+    named = files_of(path, read_survey_file(path, planned)).named
+    return [path, *(file for _, file in named)]
 
 
 def survey_toml(path: str | Path) -> Path:

@@ -2,13 +2,44 @@
 
 import glob
 from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from mlscorr.io.survey_sections import PlannedSurveyFile
+from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
+from mlscorr.io.trajectory_sessions import SessionFile
+from mlscorr.survey import CloudFile
 
 
-def files_of(path: Path, settings: PlannedSurveyFile) -> tuple:
-    """Paths of the clouds, and of trajectory, accuracy, control and reference or None.
+@dataclass(frozen=True)
+class SurveyPaths:
+    """Paths of the files that a survey.toml names.
+
+    Parameters
+    ----------
+    clouds : list of Path
+    sessions : list of SessionFile
+        The one trajectory, or several.
+    control, reference : Path or None
+    """
+
+    clouds: list[Path]
+    sessions: list[SessionFile]
+    control: Path | None
+    reference: Path | None
+
+    @property
+    def named(self) -> list[tuple[str, Path]]:
+        """Pairs (what it is, path) of all."""
+        named = [("cloud", cloud) for cloud in self.clouds]
+        for session in self.sessions:
+            named += [("trajectory", session.path), ("trajectory accuracy", session.accuracy)]
+        named += [("control", self.control), ("reference", self.reference)]
+        return [(what, file) for what, file in named if file is not None]
+
+
+def files_of(path: Path, settings: PlannedSurveyFile) -> SurveyPaths:
+    """Paths of the files that a survey.toml names.
 
     Parameters
     ----------
@@ -21,30 +52,58 @@ def files_of(path: Path, settings: PlannedSurveyFile) -> tuple:
     FileNotFoundError
         For those that don't exist.
     ValueError
-        For a cloud file that is named twice, and for two of one name.
+        For a file that is named twice, and for two clouds of one name.
     """
     names = settings.cloud.files if settings.cloud else ()
     clouds = [cloud for name in names for cloud in matching(path, "cloud.files", name)]
     if clouds:
         check_distinct(path, clouds)
-    others = single_files(settings).items()
-    return clouds, *(None if name is None else existing(path, key, name) for key, name in others)
+    sessions = [session_file(path, section) for section in settings.trajectories]
+    check_sessions(path, sessions)
+    control = None if settings.control is None else settings.control.file
+    return SurveyPaths(
+        clouds,
+        sessions,
+        given_file(path, "control.file", control),
+        given_file(path, "scene.reference", settings.scene.reference),
+    )
 
 
-def single_files(settings: PlannedSurveyFile) -> dict[str, str | None]:
-    """Names of trajectory, accuracy, control and reference by the keys that hold them.
+def session_file(path: Path, section: TrajectorySection) -> SessionFile:
+    """The files of a [trajectory] or one of [[trajectory]].
 
     Parameters
     ----------
-    settings : PlannedSurveyFile
+    path : Path
+        Of survey.toml.
+    section : TrajectorySection
+
+    Raises
+    ------
+    FileNotFoundError
+        For those that don't exist.
     """
-    control = None if settings.control is None else settings.control.file
-    return {
-        "trajectory.file": settings.trajectory.file,
-        "trajectory.accuracy": settings.trajectory.accuracy,
-        "control.file": control,
-        "scene.reference": settings.scene.reference,
-    }
+    file = existing(path, "trajectory.file", section.file)
+    accuracy = given_file(path, "trajectory.accuracy", section.accuracy)
+    return SessionFile(file, accuracy, section)
+
+
+def check_sessions(path: Path, sessions: Sequence[SessionFile]) -> None:
+    """Refuse a trajectory that is named twice.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    sessions : sequence of SessionFile
+
+    Raises
+    ------
+    ValueError
+    """
+    file, count = Counter(session.path.resolve() for session in sessions).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{count} of the [[trajectory]] of {path} name the file {file}.")
 
 
 def matching(path: Path, key: str, name: str) -> list[Path]:
@@ -70,6 +129,44 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
     if not matches:
         raise FileNotFoundError(f"{key} of {path}: no file is like {folder / name}.")
     return matches
+
+
+def own_clouds(
+    path: Path, key: str, patterns: Sequence[str] | None, clouds: Sequence[CloudFile]
+) -> list[CloudFile]:
+    """Those of a survey's clouds that patterns name; all without patterns.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    key : str
+        That holds the patterns.
+    patterns : sequence of str, optional
+    clouds : sequence of CloudFile
+
+    Raises
+    ------
+    ValueError
+        Where a pattern names none of them.
+    FileNotFoundError
+        Where there is no such file.
+    """
+    own = [] if patterns is not None else [*clouds]
+    for pattern in patterns or ():
+        there = {file.resolve() for file in matching(path, key, pattern)}
+        named = [cloud for cloud in clouds if cloud.path.resolve() in there]
+        if not named:
+            raise ValueError(
+                f"{key} of {path}: {pattern} is none of the {len(clouds)} files of [cloud]."
+            )
+        own += named
+    return own
+
+
+def given_file(path: Path, key: str, name: str | None) -> Path | None:
+    """Path of a file that a survey.toml may name; as existing, None without a name."""
+    return None if name is None else existing(path, key, name)
 
 
 def existing(path: Path, key: str, name: str) -> Path:

@@ -16,6 +16,7 @@ Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
 Three = Field(min_length=3, max_length=3)
 Six = Field(min_length=6, max_length=6)
 Column = Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=1)] | None
+PointSource = Annotated[int, Field(ge=0, le=65535)]  # 16 bits of a LAS point
 Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
 
 
@@ -77,6 +78,13 @@ class TrajectorySection(TomlSection):
     pitch: Literal["nose up", "nose down"] | None = None
     roll: Literal["right side down", "right side up"] | None = None
     axes: Literal["right-forward-up", "forward-left-up", "forward-right-down"] | None = None
+
+
+class SessionSection(TrajectorySection):
+    """One of several trajectories, and the points that it belongs to."""
+
+    files: Annotated[list[str], Field(min_length=1)] | None = None
+    point_source_ids: Annotated[list[PointSource], Field(min_length=1)] | None = None
 
 
 class MountingSection(TomlSection):
@@ -176,7 +184,7 @@ class MountedScannerSection(ScannerSection):
         return document
 
 
-def _kind_of_scanner(document):
+def _kind_of_section(document):
     return _LIST if isinstance(document, list | tuple) else _TABLE
 
 
@@ -185,7 +193,12 @@ _TABLE, _LIST = "", " "
 Scanners = Annotated[
     Annotated[ScannerSection, Tag(_TABLE)]
     | Annotated[list[MountedScannerSection], Field(min_length=1), Tag(_LIST)],
-    Discriminator(_kind_of_scanner),
+    Discriminator(_kind_of_section),
+]
+Trajectories = Annotated[
+    Annotated[TrajectorySection, Tag(_TABLE)]
+    | Annotated[list[SessionSection], Field(min_length=1), Tag(_LIST)],
+    Discriminator(_kind_of_section),
 ]
 
 
@@ -226,7 +239,7 @@ class PlannedSurveyFile(TomlSection):
     name: str | None = None
     crs: str | None = None
     cloud: CloudSection | None = None
-    trajectory: TrajectorySection
+    trajectory: Trajectories
     mounting: CalibratedMountingSection | None = None
     control: ControlSection | None = None
     scanner: Scanners = ScannerSection()
@@ -249,6 +262,11 @@ class PlannedSurveyFile(TomlSection):
                 f"{', '.join(names)} (without a name it is the number)"
             )
         return self
+
+    @property
+    def trajectories(self) -> list[TrajectorySection]:
+        """That of [trajectory], or each [[trajectory]]."""
+        return [*self.trajectory] if isinstance(self.trajectory, list) else [self.trajectory]
 
     @property
     def scanners(self) -> list[tuple[str, MountedScannerSection]]:

@@ -144,13 +144,19 @@ def _best(candidates, times, span, systems):
 
 def _others(flagged, times):
     """The systems that the header does not name, the likelier by the size of the times first."""
-    usual = _usual_systems(times)
+    usual = usual_systems(times)
     others = [system for system in SYSTEMS if system != flagged]
     return sorted(others, key=lambda system: system not in usual)
 
 
-def _usual_systems(times):
-    """The systems whose range the times lie in."""
+def usual_systems(times: np.ndarray) -> tuple[str, ...]:
+    """Names of the systems whose range times lie in, the likelier first.
+
+    Parameters
+    ----------
+    times : (n,) array
+        Units: s.
+    """
     if times.min() >= 0 and times.max() <= 2 * WEEK:
         return ("week",)
     if times.min() >= ADJUSTMENT:
@@ -160,7 +166,7 @@ def _usual_systems(times):
 
 def _settle_equal(match, times):
     """Name the system of equal times by their size: a constant of zero says nothing of it."""
-    usual = _usual_systems(times)
+    usual = usual_systems(times)
     if match.constant != 0.0 or match.cloud_system in usual:
         return match
     return TimeMatch(0.0, usual[0], usual[0], match.inside)

@@ -17,6 +17,7 @@ from mlscorr.io.trajectory_tables import (
     ATTITUDE_SIGMAS,
     COLUMNS,
     POSITION_SIGMAS,
+    SESSION,
     read_table,
     read_terrascan,
 )
@@ -24,6 +25,7 @@ from mlscorr.io.trj import MARK
 from mlscorr.survey import Trajectory
 
 SBET_SUFFIXES = (".sbet", ".out")
+NAMED = {"file", "accuracy"}  # keys of any trajectory
 NOTHING_GIVEN = TrajectorySection(file="")
 
 
@@ -132,7 +134,7 @@ def read_trajectory_file(
 
 def _read_geographic(path, crs, accuracy, section, is_pof):
     """TrajectoryFile of an SBET or a POF, which take no columns and no conventions."""
-    given = sorted(section.model_fields_set - {"file", "accuracy"})
+    given = sorted(section.model_fields_set & set(TrajectorySection.model_fields) - NAMED)
     if given:
         raise ValueError(
             f"{path} is {'a POF' if is_pof else 'an SBET'}, whose columns and conventions are "
@@ -147,7 +149,8 @@ def _read_geographic(path, crs, accuracy, section, is_pof):
 def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
     """Write a trajectory with its sigmas, if any: 1e-6 s, 1e-5 m, 1e-7 deg, heading from 0 to 360.
 
-    The file appears whole or not at all.
+    A column session follows where steps alone don't part the sessions of the POS. The file appears
+    whole or not at all.
 
     Parameters
     ----------
@@ -168,6 +171,9 @@ def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
     if trajectory.attitude_sigma is not None:
         blocks.append(np.degrees(trajectory.attitude_sigma))
         names, formats = names + ATTITUDE_SIGMAS, formats + ["%.7f"] * 3
+    if trajectory.session is not None:
+        blocks.append(trajectory.session[:, None])
+        names, formats = names + SESSION, [*formats, "%d"]
     table, line = np.hstack(blocks), ",".join(formats) + "\n"
     with output_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(names) + "\n")
@@ -194,6 +200,7 @@ def _trajectory_of(path, table):
             attitude_from_angles(*np.radians(angles).T),
             sigmas(POSITION_SIGMAS),
             None if attitude_sigma is None else np.radians(attitude_sigma),
+            table[SESSION[0]].astype(int) if SESSION[0] in table else None,
         )
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None

@@ -27,6 +27,7 @@ from mlscorr.io.trj import read_trj
 COLUMNS = ("gps_time", *AXES, *ANGLES)
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
 ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
+SESSION = ("session",)  # of the POS, in a trajectory that was joined of several
 GRID, TRUE = "clockwise from grid north", "clockwise from true north"
 TUM = ("gps_time", *AXES, *QUATERNION)
 INERTIAL_EXPLORER = ("hell", "hdngsd")  # names of columns that no other program writes
@@ -70,7 +71,7 @@ def read_table(
         angles = ("roll", "pitch", "yaw" if section.heading and "yaw" in names else "heading")
         return [name for name in ("gps_time", *place, *angles) if name not in names]
 
-    groups, chosen = (POSITION_SIGMAS, ATTITUDE_SIGMAS), section.columns.chosen
+    groups, chosen = (POSITION_SIGMAS, ATTITUDE_SIGMAS, SESSION), section.columns.chosen
     layout = read_layout(
         path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, _tum_columns, HINTS
     )

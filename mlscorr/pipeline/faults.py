@@ -13,12 +13,19 @@ from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
 from mlscorr.io.projection import check_crs
-from mlscorr.io.survey_file import cloud_file, crs_notes, survey_toml
-from mlscorr.io.survey_paths import check_distinct, existing, matching, single_files
+from mlscorr.io.session_points import check_belongings
+from mlscorr.io.survey_file import cloud_file, crs_notes, stated_pos, survey_toml
+from mlscorr.io.survey_paths import (
+    check_distinct,
+    check_sessions,
+    given_file,
+    matching,
+    session_file,
+)
 from mlscorr.io.survey_scanners import mounted_scanners
 from mlscorr.io.survey_sections import SurveyFile
 from mlscorr.io.toml_file import read_toml
-from mlscorr.io.trajectory import read_trajectory_file
+from mlscorr.io.trajectory_sessions import read_sessions
 from mlscorr.survey import Trajectory
 
 Place = Literal["survey.toml", "data", "system"]
@@ -123,27 +130,35 @@ def find_faults(path: str | Path, faults: Faults) -> None:
     ]
     if clouds:
         faults.of("survey.toml", check_distinct, toml, clouds)
-    others = {
-        key: name and faults.of("survey.toml", existing, toml, key, name)
-        for key, name in single_files(settings).items()
-    }
-    trajectory = _trajectory(settings, others, faults)
-    _control(others["control.file"], settings.control, trajectory, faults)
+    sessions = [
+        faults.of("survey.toml", session_file, toml, section) for section in settings.trajectories
+    ]
+    named = settings.control and settings.control.file
+    control = faults.of("survey.toml", given_file, toml, "control.file", named)
+    faults.of("survey.toml", given_file, toml, "scene.reference", settings.scene.reference)
+    recorded = _sessions(toml, settings, sessions, faults)
+    trajectory = recorded and recorded.trajectory
+    _control(control, settings.control, trajectory, faults)
     if trajectory is not None and crs is not None:
         faults.of("data", crs_notes, crs, trajectory, False)
     read = [_cloud(cloud, trajectory, settings, crs, faults) for cloud in dict.fromkeys(clouds)]
     if all(read):
         faults.of("survey.toml", mounted_scanners, toml, settings, tuple(read))
+        if recorded is not None:
+            faults.of("survey.toml", check_belongings, toml, sessions, recorded.parts, read)
 
 
-def _trajectory(settings, files, faults):
-    """The trajectory, None where it can't be read."""
-    path, section = files["trajectory.file"], settings.trajectory
-    if path is None or (section.accuracy and files["trajectory.accuracy"] is None):
+def _sessions(toml, settings, sessions, faults):
+    """The trajectory of all files, None where one can't be read, or they don't belong together."""
+    known = [session for session in sessions if session is not None]
+    if known:
+        faults.of("survey.toml", check_sessions, toml, known)
+    single = [faults.of("data", read_sessions, [session], settings.crs) for session in known]
+    if len(known) < len(sessions) or None in single:
         return None
-    accuracy = files["trajectory.accuracy"]
-    recorded = faults.of("data", read_trajectory_file, path, settings.crs, accuracy, section)
-    return recorded and recorded.trajectory
+    if len(single) == 1:
+        return single[0]
+    return faults.of("data", read_sessions, sessions, settings.crs, stated_pos(settings))
 
 
 def _control(path, section, trajectory: Trajectory | None, faults):

@@ -19,13 +19,8 @@ from mlscorr.io.output import output_file
 from mlscorr.io.survey_file import FILE_NAME, read_survey
 from mlscorr.io.survey_sections import PlannedSurveyFile
 from mlscorr.io.toml_file import validate
-from mlscorr.pipeline.choice import (
-    Cloud,
-    choose_accuracy,
-    choose_control,
-    choose_crs,
-    choose_trajectory,
-)
+from mlscorr.pipeline.choice import choose_control, choose_crs
+from mlscorr.pipeline.drives import Cloud, choose_accuracy, choose_trajectory
 from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.survey_text import SurveyText
@@ -136,11 +131,7 @@ def _text(folder, path, given, roles):
     else:
         text.note("", f'crs = "EPSG:..."  of cloud and control: {why_crs}')
     _put_clouds(text, path, clouds, trajectory)
-    length = float(np.ptp(trajectory.gps_time))
-    text.put("trajectory", "file", _name(path, drive.path),
-             f"{len(trajectory)} epochs, {length:.0f} s")  # fmt: skip
-    if accuracy is not None:
-        text.put("trajectory", "accuracy", _name(path, accuracy), "sigmas of the trajectory")
+    _put_sessions(text, path, drive, accuracy)
     if control is not None:
         text.put("control", "file", _name(path, control), _targets(points))
     rate = _rate(clouds[0], trajectory)
@@ -158,6 +149,8 @@ def _validate(given):
     """Refuse what no survey.toml can say."""
     document: dict[str, Any] = {"trajectory": {"file": ""}, **given}
     for section, key in (("trajectory", "file"), ("control", "file"), ("cloud", "files")):
+        if section in given and isinstance(given[section], list):
+            raise ValueError(f"[[{section}]] can't be given: init names the files of several.")
         if section in given:
             document[section] = {key: [""] if key == "files" else "", **given[section]}
     validate("What is given", document, PlannedSurveyFile)
@@ -213,6 +206,16 @@ def _put_clouds(text, path, clouds, trajectory):
     if (end[:-1] - start[1:] > SETTINGS.tile_overlap * (end - start)[:-1]).any():
         text.note("cloud", "Files overlap in time. Where two scanners wrote them, say which wrote")
         text.note("cloud", "which under [[scanner]] (docs/survey.md), each with its own mounting.")
+
+
+def _put_sessions(text, path, drive, accuracy):
+    """File and accuracy of the trajectory, or of each."""
+    for number, (file, part) in enumerate(zip(drive.paths, drive.recorded.parts, strict=True)):
+        section = "trajectory" if len(drive.paths) == 1 else text.listed("trajectory", number)
+        length = float(np.ptp(part.gps_time))
+        text.put(section, "file", _name(path, file), f"{len(part)} epochs, {length:.0f} s")
+        if file in accuracy:
+            text.put(section, "accuracy", _name(path, accuracy[file]), "sigmas of the trajectory")
 
 
 def _targets(points):

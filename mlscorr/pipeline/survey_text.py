@@ -50,6 +50,23 @@ class SurveyText:
         names = ("", "cloud", *OPTIONAL)
         self.lines: dict[str, list[str]] = {name: [] for name in names}
         self.keys: dict[str, set[str]] = {name: set() for name in names}
+        self.entries: dict[str, int] = {}
+
+    def listed(self, section: str, number: int) -> str:
+        """Name for put of an entry of a list of sections; what is given is said of each.
+
+        Parameters
+        ----------
+        section : str
+        number : int
+            From 0.
+        """
+        self.entries[section] = number + 1
+        name = f"{section} {number}"
+        self.lines[name], self.keys[name] = [], set()
+        for dotted in [key for key in self.given if key.startswith(f"{section}.")]:
+            self.given[f"{name}{dotted.removeprefix(section)}"] = self.given[dotted]
+        return name
 
     def put(self, section: str, key: str, value: object, reason: str) -> None:
         """Write a key with its value and why, unless the user gave it.
@@ -80,13 +97,19 @@ class SurveyText:
         self.lines[section].append(f"# {_shown(sentence)}")
 
     def __str__(self) -> str:
+        for section in self.entries:  # said of each entry
+            self.given = {k: v for k, v in self.given.items() if not k.startswith(f"{section}.")}
         for dotted in list(self.given):
             section, _, key = dotted.rpartition(".") if dotted.count(".") < 2 else (
                 dotted.split(".")[0], "", dotted.split(".", 1)[1])  # fmt: skip
             self.put(section, key, self.given[dotted], "")
         parts = [HEAD, *self.lines.pop("")]
         for section, lines in self.lines.items():
-            keys = self.keys.get(section, set())
+            keys, count = self.keys.get(section, set()), self.entries.get(section, 0)
+            for number in range(count):
+                parts += ["", f"[[{section}]]", *self.lines[f"{section} {number}"]]
+            if count or section.partition(" ")[0] in self.entries:
+                continue
             unknown = [
                 line for line in OPTIONAL.get(section, ()) if line[2:].split(" =")[0] not in keys
             ]

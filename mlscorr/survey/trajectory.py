@@ -29,6 +29,8 @@ class Trajectory(Summary):
         n rotations R_P^G from body to map axes.
     position_sigma, attitude_sigma : (n, 3) array, optional
         One sigma of E, N, H (m) and of roll, pitch, heading (rad).
+    session : (n,) int array, optional
+        Number of the session of the POS of each epoch, where steps alone don't part sessions.
 
     Raises
     ------
@@ -41,6 +43,7 @@ class Trajectory(Summary):
     attitude: Rotation
     position_sigma: np.ndarray | None = None
     attitude_sigma: np.ndarray | None = None
+    session: np.ndarray | None = None
 
     def __post_init__(self):
         if len(self.gps_time) < 2:
@@ -66,9 +69,17 @@ class Trajectory(Summary):
 
     @cached_property
     def gaps(self) -> np.ndarray:
-        """Start and end (k, 2) of the steps longer than ten times the median step. Units: s."""
+        """Start and end (k, 2) of the steps longer than ten times the median step. Units: s.
+
+        With sessions it is the median of each, and from one to the next is a gap, however short.
+        """
         steps = np.diff(self.gps_time)
-        last = np.flatnonzero(steps > GAP_FACTOR * np.median(steps))
+        session = np.zeros(len(self), int) if self.session is None else self.session
+        is_gap = np.diff(session) != 0
+        for number in np.unique(session[:-1][~is_gap]):
+            inside = (session[:-1] == number) & ~is_gap
+            is_gap[inside] = steps[inside] > GAP_FACTOR * np.median(steps[inside])
+        last = np.flatnonzero(is_gap)
         return np.column_stack([self.gps_time[last], self.gps_time[last + 1]])
 
     @cached_property
@@ -123,12 +134,16 @@ class Trajectory(Summary):
                 return None
             return np.column_stack([np.interp(gps_time, self.gps_time, v) for v in values.T])
 
+        session = self.session
+        if session is not None:
+            session = session[np.searchsorted(self.gps_time, gps_time, side="right") - 1]
         return _Epochs(
             gps_time,
             linear(self.position),
             Slerp(self.gps_time, self.attitude)(gps_time),
             linear(self.position_sigma),
             linear(self.attitude_sigma),
+            session,
         )
 
 

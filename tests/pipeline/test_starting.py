@@ -361,6 +361,55 @@ def test_what_is_ambiguous_is_named_and_nothing_written(spoil, words, folder):
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
+def cut(folder, overlap=0.0, other=""):
+    "The trajectory in two files, of the times about each cloud"
+    (folder / "trajectory.csv").unlink()
+    for number, (start, seconds) in enumerate([(0.0, 18.0 + overlap), (18.0, 22.0)], start=1):
+        text = HEADER + trajectory(START + start, seconds)
+        (folder / f"run-{number}.csv").write_text(text.replace("roll", "rol") if other else text)
+
+
+def test_trajectories_that_follow_each_other_are_a_list(folder):
+    "One file of each run: [[trajectory]] with both, what is given said of each; a third is not"
+    cut(folder)
+    (folder / "yesterday.csv").write_text(HEADER + trajectory(START - 86_400.0))
+    given = {"trajectory": {"roll": "right side down"}}
+    started = mlscorr.init(folder, given=given)
+    started.write()
+    runs = [{"file": f"run-{n}.csv", **given["trajectory"]} for n in (1, 2)]
+    assert read(folder)["trajectory"] == runs
+    assert len(mlscorr.read_survey(folder).trajectory.passes) == 2
+    roles = {role.path.name: role.role for role in started.roles}
+    assert roles["run-1.csv"] == roles["run-2.csv"] == "trajectory"
+    assert roles["yesterday.csv"] == "none"
+    assert "# [trajectory]" not in started.text and "180 epochs, 18 s" in started.text
+
+
+def test_trajectories_that_overlap_stay_ambiguous(folder):
+    "Neither covers both clouds, and for 5 s there are two: both are named"
+    cut(folder, overlap=5.0)
+    with pytest.raises(ValueError, match=r"run-1\.csv.* run-2\.csv overlap by 4.9 s"):
+        mlscorr.init(folder)
+
+
+def test_sbets_that_follow_each_other_have_their_own_accuracy(folder):
+    "Two SBETs without a CRS of any cloud: the UTM zone of the drive, and smrmsg beside its own"
+    (folder / "trajectory.csv").unlink()
+    for number, start in ((1, START), (2, START + 41.0)):
+        write_cloud(folder / f"pass-{number}.las", start=start + 2.0)
+        write_sbet(folder / f"run-{number}.out", start)
+        accuracy = np.full((45, 10), 0.02)
+        accuracy[:, 0] = start - 2.0 + np.arange(45.0)
+        accuracy.tofile(folder / f"smrmsg-{number}.out")
+    mlscorr.init(folder).write()
+    document = read(folder)
+    assert document["crs"] == "EPSG:32650"
+    assert document["trajectory"] == [
+        {"file": f"run-{n}.out", "accuracy": f"smrmsg-{n}.out"} for n in (1, 2)
+    ]
+    assert mlscorr.read_survey(folder).trajectory.position_sigma is not None
+
+
 def test_what_is_said_decides(folder):
     "--set names one of two trajectories, and values that no file holds; text needs no quotes"
     (folder / "smoothed.csv").write_text(HEADER + trajectory())

@@ -10,13 +10,13 @@ START = 413_200.0  # s of week
 CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # m, UTM
 
 
-def drive(gps_time, attitude=None, **sigmas):
+def drive(gps_time, attitude=None, **others):
     "10 m/s to the north, turning by 2 degrees a second"
     elapsed = np.asarray(gps_time) - START
     position = CORNER + np.outer(elapsed, [0.0, 10.0, 0.1])
     if attitude is None:
         attitude = attitude_from_angles(0.01, -0.02, np.radians(2.0) * elapsed)
-    return Trajectory(np.asarray(gps_time), position, attitude, **sigmas)
+    return Trajectory(np.asarray(gps_time), position, attitude, **others)
 
 
 @pytest.mark.parametrize(
@@ -121,3 +121,15 @@ def test_targets_within_a_second_share_an_epoch():
     "Of times in any order those within a second of the last one kept are left out"
     epochs = control_epochs(START + np.array([5.0, 0.0, 0.9, 1.5, 9.0, 5.5]))
     assert epochs - START == pytest.approx([0.0, 1.5, 5.0, 9.0])  # s
+
+
+def test_sessions_part_a_trajectory_where_steps_do_not():
+    "From one session to the next is a gap of 0.1 s; the median of each says what a gap in it is"
+    time = START + np.concatenate([np.arange(0.0, 10.0, 0.1), np.arange(10.0, 60.0, 2.0)])
+    session = np.repeat([3, 1], [100, 25])
+    whole = drive(time, session=session)
+    assert whole.passes == pytest.approx(START + np.array([[0.0, 9.9], [10.0, 58.0]]))
+    assert len(drive(time).passes) == 25  # each step of 2 s is twenty median ones
+    assert whole.at(START + np.array([9.85, 11.0])).session.tolist() == [3, 1]
+    with pytest.raises(ValueError, match="1 of 1 times lie outside"):
+        whole.at(START + 9.95)

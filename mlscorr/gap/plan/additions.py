@@ -153,11 +153,15 @@ def _joined(trajectory, time, position, attitude, order):
         None if values is None else np.vstack([values, values[order]])
         for values in (trajectory.position_sigma, trajectory.attitude_sigma)
     ]
+    session = trajectory.session
+    if session is not None:
+        session = np.append(session, session.max() + 1 + session[order])
     return Trajectory(
         np.append(trajectory.gps_time, time),
         np.vstack([trajectory.position, position]),
         Rotation.concatenate([trajectory.attitude, attitude]),
         *sigmas,
+        session,
     )
 
 

@@ -219,7 +219,9 @@ class Bench:
         rows = np.unique(
             np.concatenate([np.arange(0, len(whole), step), ends.ravel(), [len(whole) - 1]])
         )
-        thin = Trajectory(whole.gps_time[rows], whole.position[rows], whole.attitude[rows])
+        session = None if whole.session is None else whole.session[rows]
+        pose = whole.gps_time[rows], whole.position[rows], whole.attitude[rows]
+        thin = Trajectory(*pose, session=session)
         return thin if np.array_equal(thin.gaps, whole.gaps) else whole
 
     def _pose_shift(self, changed):

@@ -197,7 +197,7 @@ def _without_pose(recorded, true, changed):
     if changed.attitude is not true.attitude:
         attitude = true.attitude * changed.attitude.inv() * attitude
     position = recorded.position - (changed.position - true.position)
-    return Trajectory(recorded.gps_time, position, attitude)
+    return Trajectory(recorded.gps_time, position, attitude, session=recorded.session)
 
 
 def _without_mount(recorded, true, changed):

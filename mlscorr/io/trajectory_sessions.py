@@ -1,0 +1,266 @@
+"""One trajectory of several files: sessions of the POS, joined in order of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.survey_sections import TrajectorySection
+from mlscorr.io.time_systems import NAMES, usual_systems
+from mlscorr.io.trajectory import read_trajectory_file
+from mlscorr.survey import Pos, Trajectory
+
+KINDS = ("position", "attitude")
+
+
+@dataclass(frozen=True)
+class SessionFile:
+    """A file of [trajectory] or of one [[trajectory]].
+
+    Parameters
+    ----------
+    path : Path
+    accuracy : Path or None
+        Of an SBET.
+    section : TrajectorySection
+        What survey.toml says of it.
+    """
+
+    path: Path
+    accuracy: Path | None
+    section: TrajectorySection
+
+
+@dataclass(frozen=True)
+class Sessions:
+    """The trajectory of a survey, and what it was made of.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of all sessions.
+    parts : tuple of Trajectory
+        Of each file.
+    is_sbet : bool
+        Whether one of the files is.
+    layouts : tuple of str
+        How tables of others were understood.
+    notes : tuple of str
+        How the files were joined.
+    """
+
+    trajectory: Trajectory
+    parts: tuple[Trajectory, ...]
+    is_sbet: bool
+    layouts: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def read_sessions(
+    files: Sequence[SessionFile], crs: str | None = None, pos: Pos | None = None
+) -> Sessions:
+    """The trajectory of a survey's one file, or of several that are joined.
+
+    Parameters
+    ----------
+    files : sequence of SessionFile
+    crs : str, optional
+        As of read_trajectory.
+    pos : Pos, optional
+        What survey.toml says of a trajectory without sigmas.
+
+    Returns
+    -------
+    Sessions
+
+    Raises
+    ------
+    ValueError
+        As read_trajectory_file, and where the files can't be of one drive.
+    """
+    read = [read_trajectory_file(f.path, crs, f.accuracy, f.section) for f in files]
+    names = [file.path.name for file in files]
+    parts = [file.trajectory for file in read]
+    joined, notes = parts[0], []
+    if len(parts) > 1:
+        check_systems(names, parts)
+        parts, notes = _with_sigmas(names, parts, pos)
+        joined, joints = join_sessions(names, parts, pos or Pos())
+        notes = [_summary(names, parts, joined), *joints, *notes]
+    layouts = tuple(filter(None, (file.layout for file in read)))
+    return Sessions(joined, tuple(parts), any(f.is_sbet for f in read), layouts, tuple(notes))
+
+
+def _summary(names, parts, joined):
+    """A sentence on several files."""
+    order = np.argsort([part.gps_time[0] for part in parts])
+    listed = ", ".join(f"{names[i]} {_span(parts[i])}" for i in order)
+    return (
+        f"The trajectory was joined of {len(parts)} files in order of time ({listed}): "
+        f"{len(joined)} epochs, gaps {len(joined.gaps)}."
+    )
+
+
+def _span(part):
+    return f"[{part.gps_time[0]:.3f}, {part.gps_time[-1]:.3f}] s"
+
+
+def check_systems(names: Sequence[str], parts: Sequence[Trajectory]) -> None:
+    """Refuse trajectories that can't be of one time system by the size of their times.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the files, for messages.
+    parts : sequence of Trajectory
+
+    Raises
+    ------
+    ValueError
+    """
+    systems = [usual_systems(part.gps_time) for part in parts]
+    for name, part, system in zip(names, parts, systems, strict=True):
+        if not set(system) & set(systems[0]):
+            raise ValueError(
+                f"The times of {names[0]} {_span(parts[0])} are {NAMES[systems[0][0]]} by their "
+                f"size, those of {name} {_span(part)} {NAMES[system[0]]}: the trajectories of a "
+                "survey need one time system. Export them in the same one."
+            )
+
+
+def _with_sigmas(names, parts, pos):
+    """All parts with the sigmas that one of them states, and sentences on those of [pos]."""
+    notes = []
+    for kind in KINDS:
+        key = f"{kind}_sigma"
+        lacking = [i for i, part in enumerate(parts) if getattr(part, key) is None]
+        if len(lacking) in (0, len(parts)):
+            continue
+        without = ", ".join(names[i] for i in lacking)
+        if pos is None:
+            raise ValueError(
+                f"{len(lacking)} of the {len(parts)} trajectories state no sigma of {kind} "
+                f"({without}), the others do. Export them with it, name the accuracy of an SBET "
+                f"under its [[trajectory]], or say under [pos] in survey.toml what {key} they have."
+            )
+        for i in lacking:
+            stated = np.tile(np.broadcast_to(getattr(pos, key), 3), (len(parts[i]), 1))
+            parts[i] = replace(parts[i], **{key: stated})
+        notes.append(f"The sigma of {kind} that {without} does not state is that of [pos].")
+    return parts, notes
+
+
+def join_sessions(
+    names: Sequence[str], parts: Sequence[Trajectory], pos: Pos
+) -> tuple[Trajectory, list[str]]:
+    """One trajectory of several, in order of time; from one to the next is a gap.
+
+    What two of them have in common is taken once, of the one that starts first, and joins them
+    without a gap where both are the same to the millimetre: one export that was cut.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the files, for messages.
+    parts : sequence of Trajectory
+        All with sigmas, or none.
+    pos : Pos
+        Whose sigmas are believed where they have none.
+
+    Returns
+    -------
+    trajectory : Trajectory
+        Without sessions where its steps part them.
+    notes : list of str
+        Sentences on what overlaps.
+
+    Raises
+    ------
+    ValueError
+        Where two are at different places at the same time.
+    """
+    order = sorted(range(len(parts)), key=lambda i: (parts[i].gps_time[0], -len(parts[i])))
+    sessions, kept, notes = [_numbers(part) for part in parts], {}, []
+    largest, bases = 1 + max(session.max() for session in sessions), {}
+    for number, i in enumerate(order):
+        bases[i], is_new = 1 + number * largest, np.ones(len(parts[i]), bool)
+        for j in order[:number]:
+            is_common = parts[j].segment(parts[i].gps_time) >= 0
+            if not is_common.any():
+                continue
+            is_same = _compare([names[j], names[i]], parts[j], parts[i], is_common, pos)
+            if is_same:
+                bases[i] = bases[j]
+            how = "the same, and join" if is_same else "alike within their sigmas, and part"
+            notes.append(
+                f"{is_common.sum()} epochs of {names[i]} lie within {names[j]}: they are {how} the "
+                f"two there; those of {names[j]} are taken."
+            )
+            is_new &= ~is_common
+        kept[i] = is_new
+    return _stacked([(parts[i], kept[i], bases[i] + sessions[i]) for i in order]), notes
+
+
+def _numbers(part):
+    """Sessions (n,) of a part by itself, from 0."""
+    return np.zeros(len(part), int) if part.session is None else part.session - part.session.min()
+
+
+def _compare(names, first, second, is_common, pos):
+    """Whether two trajectories are one; a ValueError where they are at different places."""
+    there = Trajectory.at(first, second.gps_time[is_common])
+    apart = np.linalg.norm(there.position - second.position[is_common], axis=1)
+    turned = (there.attitude * second.attitude[is_common].inv()).magnitude()
+    limits = []
+    for kind in KINDS:
+        key = f"{kind}_sigma"
+        stated = getattr(second, key)
+        if stated is None:
+            limits.append(np.linalg.norm(np.broadcast_to(getattr(pos, key), 3)) * np.sqrt(2))
+        else:
+            both = np.hstack([getattr(there, key), stated[is_common]])
+            limits.append(_rms(np.linalg.norm(both, axis=1)))
+    way, turn = _rms(apart), _rms(turned)
+    if way > limits[0] or turn > limits[1]:
+        common = second.gps_time[is_common]
+        raise ValueError(
+            f"{names[0]} and {names[1]} overlap by {np.ptp(common):.1f} s (from {common[0]:.3f} s) "
+            f"and differ there by {way:.3f} m and {np.degrees(turn):.4f} deg (RMS), where "
+            f"their sigmas state {limits[0]:.3f} m and {np.degrees(limits[1]):.4f} deg. Two "
+            "vehicles are two surveys, each with its own survey.toml; of one vehicle give the "
+            "final trajectory alone, and times of different weeks as GPS seconds that go on."
+        )
+    return bool(apart.max() <= SETTINGS.same_export)
+
+
+def _rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _stacked(rows):
+    """The Trajectory of rows (part, which of its epochs, session of each)."""
+
+    def stack(name):
+        values = [getattr(part, name) for part, _, _ in rows]
+        if any(value is None for value in values):
+            return None
+        both = zip(values, rows, strict=True)
+        return np.concatenate([value[kept] for value, (_, kept, _) in both])[order]
+
+    session = np.concatenate([numbers[kept] for _, kept, numbers in rows])
+    order = np.argsort(np.concatenate([part.gps_time[kept] for part, kept, _ in rows]))
+    attitude = Rotation.concatenate([part.attitude[kept] for part, kept, _ in rows if kept.any()])
+    trajectory = Trajectory(
+        stack("gps_time"),
+        stack("position"),
+        attitude[order],
+        stack("position_sigma"),
+        stack("attitude_sigma"),
+    )
+    parted = replace(trajectory, session=session[order])
+    return trajectory if np.array_equal(trajectory.gaps, parted.gaps) else parted

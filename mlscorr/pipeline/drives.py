@@ -1,0 +1,279 @@
+"""Which clouds and which trajectory are meant in a folder: one is taken, two are named."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.folder_roles import FileRole
+from mlscorr.io.las import spread_times
+from mlscorr.io.las_layout import LasLayout
+from mlscorr.io.poses import utm_zone
+from mlscorr.io.survey_sections import TrajectorySection
+from mlscorr.io.time_systems import TimeMatch, match_times
+from mlscorr.io.trajectory_sessions import (
+    SessionFile,
+    Sessions,
+    check_systems,
+    join_sessions,
+    read_sessions,
+)
+from mlscorr.survey import Pos, Trajectory
+
+WORLD = ("EPSG:3857", "EPSG:6933")  # project all places: latitudes come out in two ways
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """A cloud file by its header.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    """
+
+    layout: LasLayout
+
+    @property
+    def name(self) -> str:
+        """Of the file."""
+        return self.layout.path.name
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Times spread over the file, as they stand in it. Units: s."""
+        return spread_times(self.layout)[1]
+
+    def match(self, trajectory: Trajectory, setting: str = "auto") -> TimeMatch:
+        """How its times become those of a trajectory; as match_times."""
+        return match_times(self.name, self.times, self.layout.is_standard, trajectory, setting)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A trajectory that covers the clouds of a folder, in one file or in one of each session.
+
+    Parameters
+    ----------
+    paths : tuple of Path
+    section : TrajectorySection
+        What is said of each.
+    recorded : Sessions
+        In the first of WORLD where it needs a CRS.
+    lack : str
+        The sentence of its reader where it needs a CRS.
+    is_geographic : bool
+    """
+
+    paths: tuple[Path, ...]
+    section: TrajectorySection
+    recorded: Sessions
+    lack: str = ""
+    is_geographic: bool = False
+
+    @property
+    def name(self) -> str:
+        """Of its files."""
+        return ", ".join(path.name for path in self.paths)
+
+    def read(self, crs: str | None, accuracy: Mapping[Path, Path] | None = None) -> Trajectory:
+        """The trajectory in a CRS, each file with its accuracy."""
+        if not self.lack:
+            return self.recorded.trajectory
+        files = [SessionFile(p, (accuracy or {}).get(p), self.section) for p in self.paths]
+        return read_sessions(files, crs, Pos()).trajectory
+
+    @property
+    def span(self) -> np.ndarray:
+        """First and last time. Units: s."""
+        return self.recorded.trajectory.gps_time[[0, -1]]
+
+    @property
+    def layout(self) -> tuple[object, ...]:
+        """What files of one export have in common."""
+        if self.lack:
+            return self.recorded.is_sbet, self.is_geographic, self.paths[0].suffix.lower()
+        return tuple(text.replace(self.name, "") for text in self.recorded.layouts)
+
+    @property
+    def zone(self) -> str:
+        """EPSG code of the UTM zone of a geographic one."""
+        from pyproj import Transformer
+
+        place = np.median(self.recorded.trajectory.position[:, :2], axis=0)
+        to_degrees = Transformer.from_crs(WORLD[0], "EPSG:4326", always_xy=True)
+        longitude, latitude = to_degrees.transform(*place)
+        return utm_zone(latitude, longitude)
+
+
+def choose_trajectory(
+    roles: list[FileRole], clouds: list[Cloud], given: Mapping
+) -> tuple[Drive, dict[Path, str]]:
+    """The trajectory that covers the clouds in time, and why others are not taken.
+
+    Parameters
+    ----------
+    roles : list of FileRole
+        Of files that may be trajectories, and of tables that are nothing else.
+    clouds : list of Cloud
+    given : mapping
+        What is said under [trajectory].
+
+    Raises
+    ------
+    ValueError
+        Where none can be read and covers the clouds, and where several do.
+    """
+    drives, readable, refusals = {}, {}, {}
+    for path in [role.path for role in roles if role.role == "trajectory"]:
+        try:
+            with warnings.catch_warnings(action="ignore"):  # said when the survey is read
+                readable[path] = _read_drive(path, given)
+                for cloud in clouds:
+                    cloud.match(readable[path].recorded.trajectory)
+            drives[path] = readable[path]
+        except ValueError as error:
+            refusals[path] = str(error)
+    joined = [*join_drives(list(readable.values()), clouds)]
+    if len(joined) == 1:
+        return joined[0], {p: why for p, why in refusals.items() if p not in joined[0].paths}
+    if len(drives) == 1:
+        return next(iter(drives.values())), refusals
+    if drives:
+        raise ValueError(ambiguous("trajectory", dict.fromkeys(drives, ""), clouds))
+    overlap = _overlaps(list(readable.values()))
+    raise ValueError(" ".join((*overlap, *refusals.values())) or _no_trajectory(roles))
+
+
+def _overlaps(drives):
+    """A sentence where two trajectories that don't cover the clouds overlap in time."""
+    drives = sorted(drives, key=lambda drive: drive.span[0])
+    for first, second in pairwise(drives):
+        if (end := min(first.span[1], second.span[1])) >= second.span[0]:
+            yield (
+                f"{first.name} and {second.name} overlap by {end - second.span[0]:.1f} s "
+                "and may be of two vehicles: move what is of another survey out of the folder, or "
+                "name both under [[trajectory]] in survey.toml (docs/survey.md)."
+            )
+
+
+def join_drives(drives: list[Drive], clouds: list[Cloud]) -> Iterator[Drive]:
+    """Trajectories of one export that follow each other, and cover the clouds together only.
+
+    Parameters
+    ----------
+    drives : list of Drive
+        Of one file each.
+    clouds : list of Cloud
+
+    Yields
+    ------
+    Drive
+        Of two files or more.
+    """
+    for layout in dict.fromkeys(drive.layout for drive in drives):
+        group = sorted((d for d in drives if d.layout == layout), key=lambda d: d.span[0])
+        if any(first.span[1] >= second.span[0] for first, second in pairwise(group)):
+            continue
+        try:
+            whole = _joined(group).recorded.trajectory
+            time = np.concatenate([c.times + c.match(whole).constant for c in clouds])
+        except ValueError:  # of several time systems, or all together cover the clouds in part
+            continue
+        used = [d for d in group if ((time >= d.span[0]) & (time <= d.span[1])).any()]
+        if len(used) > 1:
+            yield _joined(used)
+
+
+def _joined(drives):
+    """One Drive of several that don't overlap."""
+    names = [drive.name for drive in drives]
+    parts = [drive.recorded.trajectory for drive in drives]
+    check_systems(names, parts)
+    whole = join_sessions(names, parts, Pos())[0]
+    recorded = replace(drives[0].recorded, trajectory=whole, parts=tuple(parts))
+    return replace(drives[0], paths=tuple(d.paths[0] for d in drives), recorded=recorded)
+
+
+def _no_trajectory(roles):
+    """A sentence on what would be a trajectory, and on the tables that might."""
+    tables = [f"{role.path.name} ({role.reason})" for role in roles if role.role == "table"]
+    hint = (
+        f" If it is {' or '.join(tables)}, say so, as --set 'trajectory.file = ...' and "
+        "--set 'trajectory.columns.gps_time = ...' with the other columns."
+    )
+    return (
+        "No file looks like a trajectory: add an SBET, or a table with the columns gps_time (s), "
+        f"easting, northing, height, roll, pitch, heading.{hint if tables else ''}"
+    )
+
+
+def _read_drive(path, given):
+    """Drive of a file. Raises ValueError as its reader."""
+    section = TrajectorySection.model_validate({**given, "file": path.name})
+    try:
+        return Drive((path,), section, read_sessions([SessionFile(path, None, section)]))
+    except ValueError as first:
+        lack = str(first)
+    if "crs" not in lack:
+        raise ValueError(lack)
+    files = [read_sessions([SessionFile(path, None, section)], crs) for crs in WORLD]
+    places = [file.trajectory.position[:, :2] for file in files]
+    return Drive((path,), section, files[0], lack, not np.array_equal(*places))
+
+
+def ambiguous(what: str, candidates: Mapping[Path, str], clouds: Sequence[Cloud] = ()) -> str:
+    """A sentence on several files of one role.
+
+    Parameters
+    ----------
+    what : str
+        The role.
+    candidates : mapping
+        Files to what is known of each.
+    clouds : sequence of Cloud
+        That they cover.
+    """
+    fit = f", which cover the {len(clouds)} cloud files alike" if clouds else ""
+    listed = "; ".join(f"{path.name}{': ' * bool(why)}{why}" for path, why in candidates.items())
+    first, key = next(iter(candidates)).name, what if "." in what else f"{what}.file"
+    return (
+        f"{len(candidates)} files may be the {what}{fit} ({listed.rstrip('.')}). Say which, as "
+        f"--set '{key} = \"{first}\"', or move the others out of the folder."
+    )
+
+
+def choose_accuracy(roles: Iterable[FileRole], drive: Drive, crs: str | None) -> dict[Path, Path]:
+    """The accuracy file of each SBET or POF that has one.
+
+    Parameters
+    ----------
+    roles : iterable of FileRole
+        Of files that may be one.
+    drive : Drive
+    crs : str or None
+
+    Raises
+    ------
+    ValueError
+        Where several fit.
+    """
+    roles, chosen = [*roles], {}
+    for path in drive.paths if drive.lack and not drive.section.accuracy else ():
+        fitting = {}
+        for role in roles:
+            try:
+                read_sessions([SessionFile(path, role.path, drive.section)], crs)
+                fitting[role.path] = ""
+            except ValueError:
+                continue
+        if len(fitting) > 1:
+            raise ValueError(ambiguous("trajectory.accuracy", fitting))
+        chosen |= dict.fromkeys([path] if fitting else [], next(iter(fitting), None))
+    return chosen
