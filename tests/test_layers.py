@@ -33,6 +33,7 @@ GAP_FLOOR = {room: number for number, rooms in enumerate(GAP_FLOORS) for room in
 ROOMS_OF = {
     "laspy": {"io"},
     "openpyxl": {"io"},
+    "pye57": {"io"},
     "open3d": {"baselines", "simulate", "report"},
     "sklearn": {"baselines", "gap"},
 }
@@ -133,7 +134,7 @@ def test_modules_of_the_simulator_know_those_below(path):
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_heavy_libraries_stay_in_their_rooms(path):
-    "laspy is known to io alone, open3d and sklearn to the rooms that ROOMS_OF names"
+    "laspy and pye57 are known to io alone, open3d and sklearn to the rooms that ROOMS_OF names"
     for name in imports_of(path):
         library = name.split(".")[0]
         assert library not in ROOMS_OF or room_of(path) in ROOMS_OF[library], name

@@ -38,6 +38,7 @@ def work(
         See progress_bars.
     """
     with exit_code(Exit.USAGE):
+        from mlscorr.io.conversion import announced
         from mlscorr.io.inputs import check_unchanged, input_file
         from mlscorr.io.output import check_output
         from mlscorr.io.survey_file import input_files
@@ -49,6 +50,7 @@ def work(
     with (
         exit_code(Exit.BAD_DATA, lambda: _entries(out) != before),
         progress_bars() as progress,
+        announced(progress),
     ):
         try:
             yield progress

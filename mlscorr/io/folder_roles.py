@@ -11,12 +11,14 @@ from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanin
 from mlscorr.io.control_lists import lacking, unnamed_columns
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
+from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.text_files import shown
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
-CLOUDS, MESHES = (".las", ".laz"), (".ply",)
+CLOUDS = (".las", ".laz", ".e57")
+MESHES = (".ply",)
 TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
 TRAJECTORIES = (".sbet", ".trj", POF_SUFFIX, ".pofx")
 RECORDS = (".out", ".smrmsg", ".bin")
@@ -63,6 +65,8 @@ def _role(path) -> FileRole:
     """What one file is by its suffix and its first bytes."""
     suffix = path.suffix.lower()
     if suffix in CLOUDS:
+        return _cloud(path)
+    if suffix in MESHES and not announced_faces(path):
         return _cloud(path)
     if suffix in MESHES:
         return FileRole(path, "reference", "a mesh")

@@ -7,6 +7,7 @@ import lazrs
 import numpy as np
 from laspy import PointFormat, supported_point_formats
 
+from mlscorr.io.conversion import converted, is_foreign
 from mlscorr.io.las_layout import LasLayout, decoding
 from mlscorr.io.settings import SETTINGS
 
@@ -15,7 +16,7 @@ EVLR_HEADER = struct.Struct("<2x16sHQ32s")  # owner, record, length of data, des
 
 
 def read_layout(path: str | Path) -> LasLayout:
-    """LasLayout of a LAS 1.0-1.4 or LAZ file with gps_time, checked.
+    """LasLayout of a LAS 1.0-1.4 or LAZ file with gps_time, checked; of an E57 or PLY its LAZ's.
 
     Nothing is allocated by a number that was not checked.
 
@@ -36,6 +37,8 @@ def read_layout(path: str | Path) -> LasLayout:
     path = Path(path)
     if not path.is_file():
         raise ValueError(f"There is no file {path}. Check cloud.files in survey.toml.")
+    source = path if is_foreign(path) else None
+    path = converted(path).path if source else path
     size = path.stat().st_size
     with open(path, "rb") as file:
         head = file.read(HEADER_SIZES[0])
@@ -47,7 +50,7 @@ def read_layout(path: str | Path) -> LasLayout:
         start = struct.unpack_from("<I", head, 96)[0]
         if start > size:
             raise ValueError(_cut_off(path, f"its points start at byte {start} of {size}"))
-        layout = LasLayout(path, head + file.read(max(0, start - len(head))), size)
+        layout = LasLayout(path, head + file.read(max(0, start - len(head))), size, source)
         _check_header(layout)
         points_end = _check_chunks(layout, file) if layout.is_compressed else _check_size(layout)
         _check_tail(layout, file, points_end)

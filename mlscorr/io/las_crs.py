@@ -117,7 +117,7 @@ def crs_conflict(layout: LasLayout, crs: str) -> str:
     if not what:
         return ""
     return (
-        f"The VLRs of {layout.path.name} state {crs_name(stated)}, crs of survey.toml is "
+        f"The VLRs of {layout.cloud.name} state {crs_name(stated)}, crs of survey.toml is "
         f"{crs_name(survey_crs)}: {what}. Set crs to that of the cloud, or bring the cloud into it."
     )
 

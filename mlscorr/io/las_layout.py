@@ -61,11 +61,19 @@ class LasLayout:
         All that precedes the points.
     size : int
         Of the whole file. Units: bytes.
+    source : Path, optional
+        The cloud of another format that the file at path was made of.
     """
 
     path: Path
     head: bytes
     size: int
+    source: Path | None = None
+
+    @property
+    def cloud(self) -> Path:
+        """The cloud as survey.toml names it."""
+        return self.source or self.path
 
     def field(self, form: str, start: int) -> tuple[Any, ...]:
         """Values of the header.

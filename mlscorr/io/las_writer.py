@@ -1,4 +1,4 @@
-"""Writing points as LAS or LAZ 1.4, format 6, with GPS week seconds, block by block."""
+"""Writing points as LAS or LAZ 1.4, format 6 or 7, block by block."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ def cloud_writer(
     crs: str | None = None,
     scale: float = 0.001,
     created: date | None = None,
+    is_standard: bool = False,
+    has_colours: bool = False,
 ) -> Iterator[CloudWriter]:
     """A CloudWriter for one new LAS or LAZ file, which appears whole or not at all.
 
@@ -43,6 +45,10 @@ def cloud_writer(
         Resolution of the stored coordinates. Units: m.
     created : date, optional
         Date in the header, today if not given.
+    is_standard : bool
+        Whether times are adjusted standard GPS time, not seconds of the GPS week.
+    has_colours : bool
+        Whether points have colours: format 7.
 
     Yields
     ------
@@ -58,7 +64,9 @@ def cloud_writer(
     import laspy
 
     path = Path(path)
-    header = _header(corner, crs, scale, created)
+    header = _header(corner, crs, scale, created, 7 if has_colours else 6)
+    if is_standard:
+        header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
     compress = path.suffix.lower() == ".laz"
     try:
         with output_file(path) as part, open(part, "wb") as stream:
@@ -102,16 +110,19 @@ class CloudWriter:
         scan_angle: np.ndarray | None = None,
         return_number: np.ndarray | int = 1,
         number_of_returns: np.ndarray | int = 1,
+        colours: np.ndarray | None = None,
     ) -> None:
         """Append a PointCloud.
 
         Parameters
         ----------
         cloud : PointCloud
-            xyz (n, 3) in m, gps_time (n,) in s of the GPS week, intensity (n,) from 0 to 65535.
+            xyz (n, 3) in m, gps_time (n,) in s, intensity (n,) from 0 to 65535.
         scan_angle : (n,) array, optional
             From -180 to 180. Units: deg.
         return_number, number_of_returns : (n,) int array
+        colours : (n, 3) array, optional
+            Red, green and blue from 0 to 65535.
 
         Raises
         ------
@@ -132,6 +143,8 @@ class CloudWriter:
         record.number_of_returns[:] = number_of_returns
         if scan_angle is not None:
             record.scan_angle = np.rint(scan_angle / SCAN_ANGLE_UNIT).astype(np.int16)
+        if colours is not None:
+            record.red, record.green, record.blue = np.asarray(colours, np.uint16).T
         self._las.write_points(record)
         self.points += len(cloud)
 
@@ -150,11 +163,11 @@ def _check(xyz, header):
         )
 
 
-def _header(corner, crs, scale, created):
+def _header(corner, crs, scale, created, point_format):
     """LAS header whose offset is the corner in whole metres."""
     import laspy
 
-    header = laspy.LasHeader(point_format=6, version="1.4")
+    header = laspy.LasHeader(point_format=point_format, version="1.4")
     header.scales = np.full(3, scale)
     header.offsets = np.floor(corner)
     header.generating_software = "mlscorr"

@@ -18,6 +18,10 @@ class Settings:
     sigma_step: float = 1e-4  # m, of a point's sigma in 16 bits: up to 6.5 m
     copied_bytes: int = 1 << 20  # at a time, where bytes are copied as they are
 
+    glanced_points: int = 5_000_000  # of a cloud that is no LAS, by check and init: 3 s
+    single_step: float = 1e-3  # m, of coordinates in single precision, within 8 km of zero
+    single_time_step: float = 1e-4  # s, of times in single precision: 1 mm at 10 m/s
+
     # ---- control
     target_size: tuple[float, float] = (0.02, 10.0)  # m: the beam's width; surely given in mm
     largest_coordinate: float = 1e8  # m: twice the Earth's girth, and map zones prefixed to E

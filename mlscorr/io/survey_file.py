@@ -4,6 +4,7 @@ import warnings
 from pathlib import Path
 
 from mlscorr.io.control import NO_POINTS, holds_points, read_control_list
+from mlscorr.io.conversion import conversion_notes
 from mlscorr.io.inputs import input_file
 from mlscorr.io.las import spread_times
 from mlscorr.io.las_checks import read_layout
@@ -57,7 +58,7 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
     trajectory = recorded.trajectory
     control, check, layout = _surveyed(files.control, settings.control, trajectory)
-    layouts = [*recorded.layouts, *filter(None, [layout])]
+    layouts = [*recorded.layouts, *filter(None, [layout]), *conversion_notes(files.clouds)]
     notes = crs_notes(settings.crs, trajectory, recorded.is_sbet)
     system = settings.cloud.gps_time if settings.cloud else "auto"
     read = [cloud_file(cloud, trajectory, system, settings.crs) for cloud in files.clouds]

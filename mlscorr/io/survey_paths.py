@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mlscorr.io.conversion import written_name
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
 from mlscorr.io.trajectory_sessions import SessionFile
 from mlscorr.survey import CloudFile
@@ -207,8 +208,8 @@ def check_distinct(path: Path, clouds: list[Path]) -> None:
     for kind, values in (
         ("names the file", [str(cloud.resolve()) for cloud in clouds]),
         (
-            "has files of the same name in different folders, and outputs keep their names:",
-            [cloud.name.casefold() for cloud in clouds],
+            "has files whose results would have the same name:",
+            [written_name(cloud).casefold() for cloud in clouds],
         ),
     ):
         value, count = Counter(values).most_common(1)[0]

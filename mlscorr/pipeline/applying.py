@@ -13,6 +13,7 @@ from mlscorr.correction import Correction
 from mlscorr.effects import Effect, effect_class, make_effect
 from mlscorr.effects.wording import joined
 from mlscorr.estimate.mounting import corrected_mounting
+from mlscorr.io.conversion import written_name
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.io.survey_file import FILE_NAME
@@ -232,7 +233,7 @@ class AppliedSurvey(Summary):
                 folder / FILE_NAME,
                 out,
                 [] if mounting is None else [mounting],
-                [[file.path.name for file in part.clouds] for part in parts],
+                [[written_name(file.path) for file in part.clouds] for part in parts],
                 trajectory,
             )
             effects = [effect.document() for effect in self.effects]

@@ -16,6 +16,7 @@ from mlscorr.evaluate.rows import TargetRow
 from mlscorr.evaluate.scores import score
 from mlscorr.evaluate.target_rows import surveyed_rows
 from mlscorr.evaluate.ties import misfit_section
+from mlscorr.io.conversion import written_name
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.survey_copy import mounting_values, write_survey_copy
 from mlscorr.io.survey_file import FILE_NAME
@@ -234,7 +235,7 @@ def write_calibrated_survey(
     trajectory : str, optional
         New trajectory in the folder.
     """
-    files = [[file.path.name for file in part.survey.clouds] for part in scanners]
+    files = [[written_name(file.path) for file in part.survey.clouds] for part in scanners]
     write_survey_copy(
         scanners[0].survey.path,
         folder / FILE_NAME,

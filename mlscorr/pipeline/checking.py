@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.evaluate.datum import datum_warnings
+from mlscorr.io.conversion import glance, read_in_part
 from mlscorr.io.las import spread_times
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
@@ -69,15 +70,16 @@ def check(path: str | Path) -> CheckedSurvey:
     CheckedSurvey
     """
     first = Faults()
-    survey = first.of("data", read_survey, path)
-    if survey is None:
+    with glance():
+        survey = first.of("data", read_survey, path)
+        if survey is not None:
+            return _checked(survey, first)
         faults = Faults()
         find_faults(path, faults)
-        for fault in first.faults:
-            faults.add(fault.where, fault.sentence)
-        reason = "Targets in the cloud, time and memory: the faults come first."
-        return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
-    return _checked(survey, first)
+    for fault in first.faults:
+        faults.add(fault.where, fault.sentence)
+    reason = "Targets in the cloud, time and memory: the faults come first."
+    return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
 
 
 def _checked(survey, faults):
@@ -91,7 +93,7 @@ def _checked(survey, faults):
         faults.warn(sentence)
     for layout in layouts:
         sentence, is_explained = far_cloud(
-            layout.path.name, cloud_box(layout)[:, :2], survey.trajectory
+            layout.cloud.name, cloud_box(layout)[:, :2], survey.trajectory
         )
         if is_explained:
             faults.add("data", sentence)
@@ -151,6 +153,8 @@ def _placed_times(survey, layouts) -> tuple[int, list[str]]:
 
 def _uncovered(survey, layouts) -> Iterator[str]:
     """A sentence on surveyed points outside the boxes of all files."""
+    if any(read_in_part(file.path) for file in survey.clouds):
+        return
     place = survey.surveyed.position[:, :2]
     covered = np.zeros(len(place), bool)
     for layout in layouts:
@@ -169,6 +173,9 @@ def _looked(survey: Survey, faults: Faults) -> tuple[QuickLook | None, list[str]
     """What a look at some targets shows, sentences on it, and on what was not looked at."""
     if not len(survey.surveyed):
         return None, [], ("Targets in the cloud: the survey has no control.",)
+    if parts := [file.path.name for file in survey.clouds if read_in_part(file.path)]:
+        reason = f"Targets in the cloud: {', '.join(parts)} was read by its first points only."
+        return None, [], (reason,)
     faults.of("data", check_control, survey)
     problems = Faults()
     probe = problems.of("data", look_near_control, survey)

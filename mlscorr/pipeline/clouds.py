@@ -7,6 +7,7 @@ import numpy as np
 
 from mlscorr.correction import PointSigma
 from mlscorr.evaluate.scores import Correcting
+from mlscorr.io.conversion import written_name
 from mlscorr.io.las_copy import write_corrected
 from mlscorr.survey import Survey
 
@@ -18,7 +19,7 @@ def write_clouds(
     watch: Callable[[np.ndarray], object],
     sigma: Callable[[Survey], PointSigma] | None = None,
 ) -> list[tuple[Path, int, int]]:
-    """Write a survey's clouds into a folder, under their names.
+    """Write a survey's clouds into a folder, under their names, as LAZ what was no LAS.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def write_clouds(
     for part in survey.by_scanner.values():
         sigmas = sigma and sigma(part)
         for file in part.clouds:
-            path = folder / file.path.name
+            path = folder / written_name(file.path)
             outside = write_corrected(file, path, correction, watch, sigmas)
             written.append((path, file.points, outside))
     return written

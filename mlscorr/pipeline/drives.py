@@ -24,7 +24,7 @@ from mlscorr.io.trajectory_sessions import (
     join_sessions,
     read_sessions,
 )
-from mlscorr.survey import Pos, Trajectory
+from mlscorr.survey import CloudFile, Pos, Trajectory
 
 WORLD = ("EPSG:3857", "EPSG:6933")  # project all places: latitudes come out in two ways
 
@@ -43,12 +43,16 @@ class Cloud:
     @property
     def name(self) -> str:
         """Of the file."""
-        return self.layout.path.name
+        return self.layout.cloud.name
 
     @cached_property
     def times(self) -> np.ndarray:
         """Times spread over the file, as they stand in it. Units: s."""
         return spread_times(self.layout)[1]
+
+    def file(self, constant: float = 0.0) -> CloudFile:
+        """Its CloudFile, with what makes its times those of the trajectory (s)."""
+        return CloudFile(self.layout.cloud, self.layout.points, constant, "")
 
     def match(self, trajectory: Trajectory, setting: str = "auto") -> TimeMatch:
         """How its times become those of a trajectory; as match_times."""

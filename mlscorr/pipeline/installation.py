@@ -16,6 +16,7 @@ PACKAGES = (
     "scipy",
     "laspy",
     "lazrs",
+    "pye57",
     "open3d",
     "threadpoolctl",
     "numba",

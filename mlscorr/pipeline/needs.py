@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from mlscorr.evaluate.beams import BeamCheck
+from mlscorr.io.conversion import recorded_points
 from mlscorr.io.las import read_chunks
 from mlscorr.io.settings import SETTINGS as IO
 from mlscorr.pipeline.quick_look import QuickLook
@@ -93,7 +94,12 @@ def amounts_read(survey: Survey, sampled: int) -> tuple[Amount, ...]:
     driven = float(np.sum(np.diff(trajectory.passes, axis=1)))
     way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     return (
-        Amount("points", survey.points, "", f"headers of {len(survey.clouds)} cloud files"),
+        Amount(
+            "points",
+            sum(map(recorded_points, survey.clouds)),
+            "",
+            f"headers of {len(survey.clouds)} cloud files",
+        ),
         Amount("scanners", len(survey.by_scanner), "", "survey.toml"),
         Amount("passes", sampled, "", f"{IO.sampled_points} times of each file"),
         Amount("trajectory", driven, "s", f"{len(trajectory)} epochs, {way.sum() / 1e3:.2f} km"),
@@ -140,7 +146,7 @@ def amounts_needed(
     -------
     tuple of Amount
     """
-    decoding = survey.points * sample.seconds / max(sample.points, 1)
+    decoding = sum(map(recorded_points, survey.clouds)) * sample.seconds / max(sample.points, 1)
     fitting = 0.0 if probe is None else probe.seconds * len(survey.surveyed)
     rate = sample.points / max(sample.seconds, 1e-9) / 1e6
     points = SETTINGS.decodings * decoding

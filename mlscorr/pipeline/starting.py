@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mlscorr.io.conversion import glance, is_foreign, recorded_points
 from mlscorr.io.folder_roles import FileRole, sort_files
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
@@ -24,7 +25,7 @@ from mlscorr.pipeline.drives import Cloud, choose_accuracy, choose_trajectory
 from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.survey_text import SurveyText
-from mlscorr.survey import CloudFile, PointCloud, Trajectory
+from mlscorr.survey import PointCloud, Trajectory
 
 HINT = " What is said in survey.toml is given here as --set 'control.size = 0.6'."
 
@@ -94,10 +95,10 @@ def init(
         raise ValueError(f"{folder} is no folder; give the one that holds the clouds.")
     path = folder / FILE_NAME if out is None else Path(out)
     _check_free(path)
-    roles = sort_files(folder)
     try:
-        text, roles = _text(folder, path, given, roles)
-        return StartedSurvey(path, text, tuple(roles), _read_notes(path, text))
+        with glance():
+            text, roles = _text(folder, path, given, sort_files(folder))
+            return StartedSurvey(path, text, tuple(roles), _read_notes(path, text))
     except ValueError as error:
         hint = HINT if "survey.toml" in str(error) and "--set" not in str(error) else ""
         raise ValueError(f"{error}{hint} Nothing was written.") from None
@@ -177,21 +178,25 @@ def _clouds(folder, given, roles):
     if damaged:
         raise ValueError(" ".join(damaged))
     clouds = [Cloud(read_layout(role.path)) for role in roles if role.role == "cloud"]
-    return clouds or _no_cloud(folder)
+    foreign = [role.reason for role in roles if role.role == "none" and is_foreign(role.path)]
+    return clouds or _no_cloud(folder, foreign)
 
 
-def _no_cloud(folder):
-    raise ValueError(f"{folder} holds no LAS or LAZ file: add the clouds with their gps_time.")
+def _no_cloud(folder, reasons=()):
+    raise ValueError(
+        " ".join(reasons)
+        or f"{folder} holds no LAS, LAZ, E57 or PLY cloud: add the clouds with their gps_time."
+    )
 
 
 def _put_clouds(text, path, clouds, trajectory):
     """Files of the clouds, their time systems and passes."""
-    names = [_name(path, cloud.layout.path) for cloud in clouds]
+    names = [_name(path, cloud.layout.cloud) for cloud in clouds]
     patterns = {f"{os.path.dirname(name)}/*{Path(name).suffix}".lstrip("/") for name in names}
     if len(names) > SETTINGS.listed_files and len(patterns) == 1:
         there = list(path.parent.glob(next(iter(patterns))))
         names = sorted(patterns) if len(there) == len(names) else names
-    points = sum(cloud.layout.points for cloud in clouds)
+    points = sum(recorded_points(cloud.file()) for cloud in clouds)
     spans, passes, systems = [], 0, Counter()
     for cloud in clouds:
         match = cloud.match(trajectory, text.given.get("cloud.gps_time", "auto"))
@@ -229,7 +234,7 @@ def _targets(points):
 def _rate(cloud: Cloud, trajectory: Trajectory) -> float | None:
     """Lines a second of a cloud, None where they are not seen."""
     constant, points = cloud.match(trajectory).constant, cloud.layout.points
-    file = CloudFile(cloud.layout.path, points, constant, "")
+    file = cloud.file(constant)
     first = max(0, points - SETTINGS.rated_points) // 2
     run = read_chunks(file, first=first, end=min(points, first + SETTINGS.rated_points))
     return line_rate(PointCloud.concatenate(list(run)), trajectory)

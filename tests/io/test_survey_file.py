@@ -252,7 +252,7 @@ def test_clouds_of_the_same_name_are_refused(folder):
     (folder / "other").mkdir()
     shutil.copy(folder / "pass-1.las", folder / "other" / "pass-1.las")
     toml(folder, '["pass-*.las"]', '["**/pass-1.las"]')
-    with pytest.raises(ValueError, match=r"same name in different folders.*pass-1.las"):
+    with pytest.raises(ValueError, match=r"results would have the same name.*pass-1.las"):
         read_survey(folder)
 
 

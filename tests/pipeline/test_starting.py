@@ -341,7 +341,7 @@ AMBIGUOUS = {
     ),
     "no cloud": (
         lambda folder: [(folder / f"pass-{i}.las").unlink() for i in (1, 2)],
-        ["no LAS or LAZ file"],
+        ["holds no LAS, LAZ, E57 or PLY cloud"],
     ),
     "survey.toml is there": (write("survey.toml", "# mine"), ["is there already"]),
 }

@@ -1,0 +1,121 @@
+"""Clouds that are no LAS: what their headers say, and their points block by block."""
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.settings import SETTINGS
+
+
+@dataclass(frozen=True)
+class SourceBlock:
+    """Some points of a cloud, as they stand in it.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        In the cloud's global coordinates. Units: m.
+    gps_time : (n,) array
+        Units: s.
+    intensity : (n,) array or None
+    colours : (n, 3) array or None
+    invalid : int
+        Number of points that were left out, as the file calls them invalid.
+    """
+
+    xyz: np.ndarray
+    gps_time: np.ndarray
+    intensity: np.ndarray | None
+    colours: np.ndarray | None
+    invalid: int = 0
+
+
+@dataclass(frozen=True)
+class CloudSource:
+    """A cloud by its header.
+
+    Parameters
+    ----------
+    path : Path
+    points : int
+    parts : str
+        Half a sentence on what the points are of.
+    dropped : tuple of str
+        Names of fields that a correction has no use for.
+    colour_limit : float
+        The largest value of a colour.
+    crs : str or None
+        As WKT.
+    intensities : function of a number of points
+        Gives the intensities block by block, nothing where there are none.
+    blocks : function of a number of points
+        Gives SourceBlocks of so many points at most.
+    """
+
+    path: Path
+    points: int
+    parts: str
+    dropped: tuple[str, ...]
+    colour_limit: float
+    crs: str | None
+    intensities: Callable[[int], Iterator[np.ndarray]]
+    blocks: Callable[[int], Iterator[SourceBlock]]
+
+
+def _check_single(path, what, largest, limit, cause):
+    """Refuse numbers of single precision where their steps are coarser than a limit."""
+    step = float(np.spacing(np.float32(largest)))
+    if step > limit:
+        raise ValueError(
+            f"{path} has its {what} in single precision: at {largest:.0f} they are rounded to "
+            f"steps of {step:.2g}. {cause}"
+        )
+
+
+def check_precision(
+    path: Path, singles: Collection[str], xyz: np.ndarray, time: np.ndarray
+) -> None:
+    """Refuse coordinates and times that single precision has spoilt.
+
+    Parameters
+    ----------
+    path : Path
+    singles : collection of str
+        Which of ``coordinates`` and ``times`` are in single precision.
+    xyz : (n, 3) array
+        As stored. Units: m.
+    time : (n,) array
+        Units: s.
+
+    Raises
+    ------
+    ValueError
+        Says the step that is left.
+    """
+    if "coordinates" in singles and len(xyz):
+        cause = "What is lost can't be had back: export it in double precision, or as LAS."
+        _check_single(path, "coordinates (m)", np.abs(xyz).max(), SETTINGS.single_step, cause)
+    if "times" in singles and len(time):
+        cause = "A vehicle moves on meanwhile: export times in double precision, or as LAS."
+        _check_single(path, "times (s)", np.abs(time).max(), SETTINGS.single_time_step, cause)
+
+
+def lacking_time(path: Path, fields: Collection[str], where: str, names: str) -> ValueError:
+    """The sentence on a cloud without times.
+
+    Parameters
+    ----------
+    path : Path
+    fields : collection of str
+        What it has.
+    where : str
+        Part of the file, or nothing.
+    names : str
+        What fields of time are called.
+    """
+    return ValueError(
+        f"{path} holds no time of its points{where}, so they cannot be placed on the trajectory. "
+        f"It has {', '.join(fields)}: export it with {names}, or as LAS with gps_time."
+    )

@@ -1,0 +1,273 @@
+"""Clouds of other formats, put into a LAZ once, from where all is as with LAS.
+
+The LAZ stands in a folder for temporary files (which TMPDIR names), and goes when the program ends.
+What is corrected is written as LAZ.
+"""
+
+from __future__ import annotations
+
+import atexit
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import cache
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mlscorr.io.cloud_sources import CloudSource
+from mlscorr.io.e57 import open_e57
+from mlscorr.io.las_writer import cloud_writer
+from mlscorr.io.ply_clouds import open_ply
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.time_systems import ADJUSTMENT, WEEK
+from mlscorr.survey import CloudFile, PointCloud
+
+OPENERS: dict[str, Callable[[Path], CloudSource]] = {".e57": open_e57, ".ply": open_ply}
+RESOLUTION = 1e-4  # m, of coordinates: a tenth of what scanners resolve, and 214 km in 32 bits
+LARGEST = np.iinfo(np.uint16).max  # of an intensity or a colour
+_limit: ContextVar[int | None] = ContextVar("limit", default=None)
+_progress: ContextVar[Any] = ContextVar("progress", default=None)
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A LAZ that was made of another file.
+
+    Parameters
+    ----------
+    path : Path
+    source : CloudSource
+    points : int
+        In the LAZ.
+    is_part : bool
+        Whether they are the first ones only.
+    note : str
+        A sentence.
+    """
+
+    path: Path
+    source: CloudSource
+    points: int
+    is_part: bool
+    note: str
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a cloud's suffix is that of another format than LAS.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    return path.suffix.lower() in OPENERS
+
+
+def written_name(path: Path) -> str:
+    """Name of the file that a corrected cloud is written to: its own, or the LAZ of its stem.
+
+    Parameters
+    ----------
+    path : Path
+
+    Examples
+    --------
+    >>> written_name(Path("a/scan.las")), written_name(Path("a/scan.e57"))
+    ('scan.las', 'scan.laz')
+    """
+    return path.with_suffix(".laz").name if is_foreign(path) else path.name
+
+
+@contextmanager
+def glance() -> Iterator[None]:
+    """Take the first points of large files only, for what must be done in seconds."""
+    token = _limit.set(SETTINGS.glanced_points)
+    try:
+        yield
+    finally:
+        _limit.reset(token)
+
+
+@contextmanager
+def announced(progress: Any) -> Iterator[None]:
+    """Say how far conversions have come.
+
+    Parameters
+    ----------
+    progress : function
+        progress(title, total) gives a function of the number of points just done.
+    """
+    token = _progress.set(progress)
+    try:
+        yield
+    finally:
+        _progress.reset(token)
+
+
+def converted(path: Path) -> Converted:
+    """The LAZ of an E57 or PLY, made when it is first asked for.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    ValueError
+        For files that can't be read, or have no times.
+    OSError
+        When the disk refuses.
+    """
+    state = path.stat()
+    return _converted(path.resolve(), state.st_size, state.st_mtime_ns, _limit.get())
+
+
+def conversion_notes(paths: Iterable[Path]) -> list[str]:
+    """Sentences on those of some clouds that are no LAS.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+    """
+    return [converted(path).note for path in paths if is_foreign(path)]
+
+
+def read_in_part(path: Path) -> bool:
+    """Whether only the first points of a cloud are read, as within a glance.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    return is_foreign(path) and converted(path).is_part
+
+
+def recorded_points(file: CloudFile) -> int:
+    """Number of points of a cloud, also where only the first are read.
+
+    Parameters
+    ----------
+    file : CloudFile
+    """
+    return converted(file.path).source.points if read_in_part(file.path) else file.points
+
+
+@cache
+def _converted(path, size, changed, limit):
+    source = OPENERS[path.suffix.lower()](path)
+    if limit is not None and source.points <= limit:
+        return _converted(path, size, changed, None)
+    target = Path(tempfile.mkdtemp(dir=_folder())) / written_name(path)
+    return _convert(source, target, limit)
+
+
+@cache
+def _folder():
+    """A folder that goes when the program ends."""
+    folder = tempfile.mkdtemp(prefix="mlscorr-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _convert(source, target, limit):
+    """Write a source's points, or the first of them, as LAZ."""
+    size, end = SETTINGS.chunk_points, limit or source.points
+    base, gain, scaled = _scale(source, size, end)
+    blocks = _first(source.blocks(size), end)
+    first = next((block for block in blocks if len(block.xyz)), None)
+    if first is None:
+        raise ValueError(f"{source.path} holds no valid points.")
+    is_standard, taken = _time_system(source.path, first.gps_time)
+    crs, crs_note = _known_crs(source.crs)
+    progress = _progress.get() or (lambda *_: lambda _: None)
+    done, count = progress(f"Reading {source.path.name}", end), 0
+    has_colours = first.colours is not None
+    with cloud_writer(target, first.xyz[0], crs, RESOLUTION, None, is_standard, has_colours) as laz:
+        for block in chain([first], blocks):
+            number = len(block.xyz)
+            intensity = np.zeros(number) if block.intensity is None else block.intensity
+            intensity = _in_16_bits((np.nan_to_num(intensity) - base) * gain)
+            cloud = PointCloud(block.xyz, block.gps_time - taken, intensity)
+            colours = np.zeros((number, 3)) if block.colours is None else block.colours
+            colours = _in_16_bits(colours * (LARGEST / source.colour_limit))
+            laz.write(cloud, colours=colours if has_colours else None)
+            count += number
+            done(number + block.invalid)
+    note = _note(source, count, limit, scaled + crs_note)
+    return Converted(target, source, count, limit is not None, note)
+
+
+def _in_16_bits(values):
+    return np.rint(values).clip(0, LARGEST).astype(np.uint16)
+
+
+def _first(blocks, end):
+    """Blocks until so many points are there."""
+    count = 0
+    for block in blocks:
+        yield block
+        count += len(block.xyz) + block.invalid
+        if count >= end:
+            return
+
+
+def _scale(source, size, end):
+    """What brings intensities into 16 bits: base, gain, and a phrase on it."""
+    low, high, count = np.inf, -np.inf, 0
+    for values in source.intensities(size):
+        low, high = min(low, np.nanmin(values)), max(high, np.nanmax(values))
+        if (count := count + len(values)) >= end:
+            break
+    if not np.isfinite([low, high]).all():
+        return 0.0, 1.0, "; it has no intensity, by which targets are seen"
+    if low >= 0 and 1 < high <= LARGEST:
+        return 0.0, 1.0, ""
+    base, top = (0.0, 1.0) if low >= 0 and high <= 1 else (min(low, 0.0), high)
+    gain = LARGEST / max(top - base, np.finfo(float).tiny)
+    return base, gain, f"; intensities of {low:g} to {high:g} as {gain:.5g} (value - {base:g})"
+
+
+def _time_system(path, times):
+    """Whether times are written as adjusted standard GPS time, and what is taken off them (s)."""
+    times = times[np.isfinite(times)]
+    if not len(times):
+        raise ValueError(f"{path} has points whose times are no numbers.")
+    if np.abs(times).max() > SETTINGS.microseconds:
+        raise ValueError(
+            f"{path} has times of {np.abs(times).max():.6g}, which count milli-, micro- or "
+            "nanoseconds: export them in seconds."
+        )
+    is_week = times.min() >= 0 and times.max() <= 2 * WEEK
+    return not is_week, ADJUSTMENT if times.min() >= ADJUSTMENT else 0.0
+
+
+def _known_crs(wkt):
+    """A CRS that can be written, and a phrase where there is another."""
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    if wkt is None:
+        return None, ""
+    try:
+        CRS.from_user_input(wkt).to_wkt("WKT1_GDAL")
+    except CRSError:
+        return None, "; its coordinateMetadata is no CRS that is known"
+    return wkt, ""
+
+
+def _note(source, count, limit, phrases):
+    """The sentence on a conversion."""
+    taken = f"the first {count} points of {source.points}" if limit else f"{count} points"
+    invalid = 0 if limit else source.points - count
+    left = f"; {invalid} invalid points were left out" if invalid else ""
+    dropped = f"; without its {', '.join(source.dropped)}" if source.dropped else ""
+    return (
+        f"{source.path.name} was read through LAZ at {RESOLUTION * 1e3:g} mm, {taken} "
+        f"{source.parts}{phrases}{left}{dropped}. What is corrected is written as "
+        f"{written_name(source.path)}."
+    )
