@@ -22,7 +22,7 @@ import numpy as np
 
 from mlscorr.io.cloud_sources import CloudSource
 from mlscorr.io.e57 import open_e57
-from mlscorr.io.las_writer import cloud_writer
+from mlscorr.io.las_writer import INTEGER_LIMIT, cloud_writer
 from mlscorr.io.ply_clouds import open_ply
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_systems import ADJUSTMENT, WEEK
@@ -124,7 +124,7 @@ def converted(path: Path) -> Converted:
         When the disk refuses.
     """
     state = path.stat()
-    return _converted(path.resolve(), state.st_size, state.st_mtime_ns, _limit.get())
+    return _converted(path.absolute(), state.st_size, state.st_mtime_ns, _limit.get())
 
 
 def conversion_notes(paths: Iterable[Path]) -> list[str]:
@@ -190,6 +190,7 @@ def _convert(source, target, limit):
     with cloud_writer(target, first.xyz[0], crs, RESOLUTION, None, is_standard, has_colours) as laz:
         for block in chain([first], blocks):
             number = len(block.xyz)
+            _check_extent(source.path, block.xyz - first.xyz[0])
             intensity = np.zeros(number) if block.intensity is None else block.intensity
             intensity = _in_16_bits((np.nan_to_num(intensity) - base) * gain)
             cloud = PointCloud(block.xyz, block.gps_time - taken, intensity)
@@ -200,6 +201,17 @@ def _convert(source, target, limit):
             done(number + block.invalid)
     note = _note(source, count, limit, scaled + crs_note)
     return Converted(target, source, count, limit is not None, note)
+
+
+def _check_extent(path, way):
+    """Refuse points so far from the first one (n, 3; m) that a LAS can't hold both."""
+    limit = RESOLUTION * (INTEGER_LIMIT - 1 / RESOLUTION)  # the header's offset is in whole metres
+    if count := int((np.abs(way) > limit).any(axis=1).sum()):
+        raise ValueError(
+            f"{path} has {count} points more than {limit / 1e3:.0f} km from its first one, up to "
+            f"{np.abs(way).max() / 1e3:.0f} km: one of them may be a pulse without an echo, as at "
+            "0, 0, 0. Export it without such points, in metres."
+        )
 
 
 def _in_16_bits(values):
@@ -220,7 +232,7 @@ def _scale(source, size, end):
     """What brings intensities into 16 bits: base, gain, and a phrase on it."""
     low, high, count = np.inf, -np.inf, 0
     for values in source.intensities(size):
-        low, high = min(low, np.nanmin(values)), max(high, np.nanmax(values))
+        low, high = np.fmin(low, np.fmin.reduce(values)), np.fmax(high, np.fmax.reduce(values))
         if (count := count + len(values)) >= end:
             break
     if not np.isfinite([low, high]).all():

@@ -278,6 +278,10 @@ REFUSED = {
         lambda path: write_ply(path, few() | {"gps_time": np.full(500, 1.7e18)}),
         "count milli-, micro- or nanoseconds: export them in seconds",
     ),
+    "f2.ply with a point at zero": (
+        lambda path: write_ply(path, {k: v * (np.arange(500) != 7) for k, v in few().items()}),
+        r"has 1 points more than 215 km from its first one, .* as at 0, 0, 0\. Export it without",
+    ),
     "g.ply that is none": (lambda path: path.write_text("ply\n") and path, "no header from ply to"),
     "h.ply without points": (
         lambda path: path.write_text("ply\nformat ascii 1.0\nend_header\n") and path,
