@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
 
-.PHONY: demo test docs wheel faults bench tables assets pages examples clean
+.PHONY: demo test docs wheel faults folders bench tables assets pages examples clean
 
 demo: $(VENV)/ready
 	$(RUN)/mlscorr demo -o demo --overwrite
@@ -29,6 +29,10 @@ wheel: $(VENV)/ready
 # The whole matrix of docs/faults.md, of which make test tries a part; SHARE=0.1 a tenth of it
 faults: $(VENV)/ready
 	MLSCORR_FAULTS=$(or $(SHARE),1) $(RUN)/python -m pytest -n 2 tests/faults
+
+# Folders as vendors and offices have them, through init, check and correct; make test takes a part
+folders: $(VENV)/ready
+	$(RUN)/python -m tests.beds.folders_of_others
 
 bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench.py

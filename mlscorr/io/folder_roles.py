@@ -10,17 +10,19 @@ import numpy as np
 from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings
 from mlscorr.io.control_lists import lacking, unnamed_columns
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
+from mlscorr.io.layout_search import find_layout, likely_header
 from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
+from mlscorr.io.settings import SETTINGS
 from mlscorr.io.text_files import shown
+from mlscorr.io.trajectory_tables import tum_columns
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
 CLOUDS = (".las", ".laz", ".e57")
 MESHES = (".ply",)
 TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
-TRAJECTORIES = (".sbet", ".trj", POF_SUFFIX, ".pofx")
+TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx")
 RECORDS = (".out", ".smrmsg", ".bin")
 RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json", "truth.json")
 
@@ -53,12 +55,23 @@ def sort_files(folder: Path) -> list[FileRole]:
     -------
     list of FileRole
     """
-    inner = [path for path in sorted(folder.iterdir()) if path.is_dir() and path.name[0] != "."]
-    results = [path for path in inner if any((path / name).exists() for name in RESULTS)]
-    places = [folder, *(path for path in inner if path not in results)]
+    results = []
+    places = list(_places(folder, results, SETTINGS.folder_depth))
     files = [path for place in places for path in sorted(place.iterdir()) if path.is_file()]
     roles = [_role(path) for path in files if path.name[0] != "." and path.suffix != ".toml"]
     return roles + [FileRole(path, "none", "results of a run") for path in results]
+
+
+def _places(folder, results, depth) -> Iterator[Path]:
+    """A folder and those within it that are not hidden; those of results go into their list."""
+    yield folder
+    for path in sorted(folder.iterdir()) if depth else ():
+        if not path.is_dir() or path.name[0] == ".":
+            continue
+        if any((path / name).exists() for name in RESULTS):
+            results.append(path)
+        else:
+            yield from _places(path, results, depth - 1)
 
 
 def _role(path) -> FileRole:
@@ -111,6 +124,8 @@ def _table(path) -> tuple[Role, str]:
     driven = set(find_meanings(header, TRAJECTORY_NAMES))
     if len(driven & {"roll", "pitch", "heading"}) > 1:
         return "trajectory", f"columns {', '.join(sorted(driven))}"
+    if find_layout(path, {}, lambda _: ["gps_time"], {}, tum_columns) is not None:
+        return "trajectory", "rows of eight numbers, as time, place and quaternion"
     header = likely_header(path, CONTROL_NAMES)
     surveyed = set(find_meanings(header, CONTROL_NAMES))
     if "name" in surveyed and ({"easting", "northing"} <= surveyed or {"x", "y"} <= surveyed):
@@ -120,8 +135,6 @@ def _table(path) -> tuple[Role, str]:
             return "control", "rows of a name and three coordinates"
     except ValueError as error:  # has the columns, and is not clear
         return "control", str(error)
-    if len(header) == 8 and all(map(NUMBER.fullmatch, header)):
-        return "trajectory", "rows of eight numbers, as time, place and quaternion"
     if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):
         return "table", f"its columns are {shown(', '.join(header))}"
     return "none", "no table of places"

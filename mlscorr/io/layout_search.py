@@ -226,7 +226,7 @@ def _with_numbers(layout, units, rows):
 
 
 def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
-    """The row among the first ones that holds the most names of columns; the first where none does.
+    """The row among the first ones that holds the most names of columns; the longest without any.
 
     Parameters
     ----------
@@ -239,6 +239,14 @@ def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
     list of str
     """
     path = Path(path)
-    encoding = None if path.suffix.lower() == SUFFIX else _encodings(path)[0]
-    rows = [cells for _, rows in _candidates(path, encoding) for _, cells in rows]
-    return max(rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[])
+    encodings = (None,) if path.suffix.lower() == SUFFIX else _encodings(path)
+    longest: list[str] = []
+    for encoding in encodings:
+        rows = [cells for _, rows in _candidates(path, encoding) for _, cells in rows]
+        best = max(
+            rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[]
+        )
+        if find_meanings(best, names):
+            return best
+        longest = longest or best
+    return longest

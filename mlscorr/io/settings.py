@@ -32,6 +32,9 @@ class Settings:
     named_faults: int = 8  # of a file in a message; more would hide what they have in common
     same_place: float = 0.1  # m; realisations of one datum put a place so far apart in a few years
 
+    # ---- folders
+    folder_depth: int = 3  # of folders within that of a survey: deliveries have two
+
     # ---- tables
     longest_line: int = 10_000  # characters; no table has columns for that
     sampled_lines: int = 200  # in which a header stands, below what a program says of itself

@@ -73,7 +73,7 @@ def read_table(
 
     groups, chosen = (POSITION_SIGMAS, ATTITUDE_SIGMAS, SESSION), section.columns.chosen
     layout = read_layout(
-        path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, _tum_columns, HINTS
+        path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, tum_columns, HINTS
     )
     layout = layout if layout.is_own else _used(layout)
     if section.angles:
@@ -118,8 +118,18 @@ def read_terrascan(
     return table, f"{path.name} was read as a TerraScan trajectory; {conventions}."
 
 
-def _tum_columns(cells: Sequence[str]) -> Mapping[str, int]:
-    """Columns of a row in TUM's layout: eight numbers, the last four a unit quaternion."""
+def tum_columns(cells: Sequence[str]) -> Mapping[str, int]:
+    """Columns of a row in TUM's layout: eight numbers, the last four a unit quaternion.
+
+    Parameters
+    ----------
+    cells : sequence of str
+
+    Returns
+    -------
+    mapping
+        Empty for a row in another layout.
+    """
     if len(cells) != len(TUM) or not all(map(NUMBER.fullmatch, cells)):
         return {}
     length = np.linalg.norm([float(cell.replace(",", ".")) for cell in cells[4:]])

@@ -49,7 +49,8 @@ def choose_control(
         except ValueError as error:
             apart[path] = str(error)
     if len(points) + len(problems) > 1:
-        raise ValueError(ambiguous("control", dict.fromkeys(points, "can be used") | problems))
+        sentence = ambiguous("control", dict.fromkeys(points, "can be used") | problems)
+        raise ValueError(f"{sentence} Join those that belong together, with a column role.")
     if points:
         path, read = next(iter(points.items()))
         return path, read, apart
