@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -23,7 +22,7 @@ class BeamCheck:
 
     def __init__(self, survey: Survey):
         self.survey = survey
-        self.samples: dict[Path, list[np.ndarray]] = {}
+        self.samples: dict[CloudFile, list[np.ndarray]] = {}
 
     def watched(self, read: Callable) -> Callable:
         """A function that reads as another one does, and samples what it gives.
@@ -35,7 +34,7 @@ class BeamCheck:
         """
 
         def watch(file: CloudFile) -> Iterator[PointCloud]:
-            rows = self.samples[file.path] = []
+            rows = self.samples[file] = []
             for chunk in read(file):
                 rows.append(self._sample(chunk, self.survey.of(file).mounting))
                 yield chunk
@@ -58,7 +57,7 @@ class BeamCheck:
 
     def warnings(self) -> Iterator[str]:
         """A sentence on each file whose beams can't have been measured so."""
-        for path, rows in self.samples.items():
+        for file, rows in self.samples.items():
             sample = np.concatenate(rows) if rows else np.empty((0, 3))
             if len(sample) < 10:
                 continue
@@ -66,13 +65,13 @@ class BeamCheck:
             length, off = np.median(sample[:, 1]), np.degrees(np.median(sample[:, 2]))
             if (steps < 0).any() and not (steps > 0).any():
                 yield (
-                    f"The times of {path.name} run backwards: none of {len(steps)} sampled points "
+                    f"The times of {file.name} run backwards: none of {len(steps)} sampled points "
                     "is later than the one before. Unless the file was sorted so, its gps_time is "
                     "wrong, and points get the correction of another time."
                 )
             if length > IO.near or off > SETTINGS.off_plane:
                 yield (
-                    f"The points of {path.name} lie {length:.0f} m beside the trajectory and "
+                    f"The points of {file.name} lie {length:.0f} m beside the trajectory and "
                     f"{off:.0f} deg off the scan plane (median of {len(sample)} samples; limits "
                     f"{IO.near:.0f} m and {SETTINGS.off_plane:.0f} deg): the file may be of "
                     "another survey with the same times, its gps_time wrong, or [mounting] that of "

@@ -93,7 +93,7 @@ def read_chunks(
     chunk_size : int
         Points at a time.
     first, end : int
-        Numbers of the points at which to start, and to end before.
+        Numbers of the points in the file at which to start, and to end before.
 
     Yields
     ------
@@ -107,7 +107,8 @@ def read_chunks(
     """
     layout = read_layout(cloud_file.path)
     scale, offset = layout.scale, layout.offset
-    for records in read_records(layout, chunk_size, first, end):
+    for whole in read_records(layout, chunk_size, first, end):
+        records = whole[cloud_file.rows(whole["point_source_id"])]
         xyz = np.empty((len(records), 3))
         for axis, name in enumerate("XYZ"):
             np.multiply(records[name], scale[axis], out=xyz[:, axis])
@@ -175,7 +176,7 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     records = np.empty(len(places), layout.record)
     buffer = bytearray(layout.record_length)
     with open(layout.path, "rb") as file:
-        decoder = layout.decoder(file, threads=False)
+        decoder = layout.decoder(file, threads=False, is_brief=True)
         for k, place in enumerate(places):
             with _decoding(layout, place, place + 1):
                 decoder.seek(int(place))
@@ -184,8 +185,27 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     return records
 
 
+def count_sources(layout: LasLayout) -> np.ndarray:
+    """Number of points (65536,) with each point_source_id.
+
+    Where LAZ keeps the ids apart (point formats 6 to 10) that takes half the time of reading.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    """
+    counts = np.zeros(1 << 16, int)
+    for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
+        counts += np.bincount(records["point_source_id"], minlength=len(counts))
+    return counts
+
+
 def read_records(
-    layout: LasLayout, chunk_size: int, first: int = 0, end: int | None = None
+    layout: LasLayout,
+    chunk_size: int,
+    first: int = 0,
+    end: int | None = None,
+    is_brief: bool = False,
 ) -> Iterator[np.ndarray]:
     """Records chunk by chunk, each in the memory of the one before.
 
@@ -196,6 +216,8 @@ def read_records(
         Points at a time.
     first, end : int
         As of read_chunks.
+    is_brief : bool
+        Whether gps_time and point_source_id do.
 
     Yields
     ------
@@ -210,7 +232,7 @@ def read_records(
     last = layout.points if end is None else end
     buffer = np.empty(min(chunk_size, last - first) * length, np.uint8)
     with open(layout.path, "rb") as file:
-        decoder = layout.decoder(file)
+        decoder = layout.decoder(file, is_brief=is_brief)
         if first:
             decoder.seek(first)
         for start in range(first, last, chunk_size):

@@ -5,7 +5,8 @@ import os
 import shutil
 import struct
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -17,7 +18,7 @@ from mlscorr.correction.point_sigma import PointSigma
 from mlscorr.io.extra_bytes import add_sigma_fields, with_sigmas
 from mlscorr.io.las import read_records, times_at
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_layout import LASZIP
+from mlscorr.io.las_layout import LASZIP, LasLayout
 from mlscorr.io.output import PART, output_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.survey import CloudFile, PointCloud
@@ -71,41 +72,105 @@ def write_corrected(
     OSError
         When the target cannot be written.
     """
-    layout, target = read_layout(cloud_file.path), Path(target)
+    return write_parts([CorrectedPart(cloud_file, correction, sigma)], target, watch)[0]
+
+
+@dataclass(frozen=True)
+class CorrectedPart:
+    """Points of a file, and how they are corrected.
+
+    Parameters
+    ----------
+    file : CloudFile
+        All of the file, or those of one of several scanners.
+    correction, sigma
+        As of write_corrected.
+    """
+
+    file: CloudFile
+    correction: SupportsApply
+    sigma: PointSigma | None = None
+
+    def move(self, layout: LasLayout, records: np.ndarray, sigmas: np.ndarray | None) -> int:
+        """Correct its points among records in place; returns those outside the trajectory.
+
+        Parameters
+        ----------
+        layout : LasLayout
+        records : (n,) structured array
+        sigmas : (n, 3) array, optional
+            Those of its points are filled in. Units: m.
+        """
+        rows = self.file.rows(records["point_source_id"])
+        some = records[rows]
+        xyz = [some[name] for name in "XYZ"]
+        scaled = layout.scale, layout.offset, some["gps_time"], self.file.time_constant
+        shift = getattr(self.correction, "shift_integers", None)
+        try:
+            outside = (shift or partial(_shift_integers, self.correction))(xyz, *scaled)
+        except ValueError as error:
+            raise ValueError(f"{layout.path}: {error}") from None
+        if sigmas is not None and self.sigma is not None:
+            sigmas[rows] = self.sigma.of_integers(xyz, *scaled)
+        if not isinstance(rows, slice):  # which is a view
+            records[rows] = some
+        return outside
+
+
+def write_parts(
+    parts: Sequence[CorrectedPart],
+    target: str | Path,
+    watch: Callable[[np.ndarray], object] | None = None,
+) -> list[int]:
+    """Copy a file whose points several scanners measured, as write_corrected does.
+
+    Parameters
+    ----------
+    parts : sequence of CorrectedPart
+        Of one file; with sigmas, or without.
+    target, watch
+        As of write_corrected.
+
+    Returns
+    -------
+    list of int
+        Number of points of each outside the trajectory.
+
+    Raises
+    ------
+    ValueError, OSError
+        As write_corrected.
+    """
+    layout, target = read_layout(parts[0].file.path), Path(target)
     _check_target(layout.path, target)
-    shift = getattr(correction, "shift_integers", None) or partial(_shift_integers, correction)
-    with output_file(target) as part:
-        with _Output(part) as output, open(layout.path, "rb") as file:
-            written = layout if sigma is None else add_sigma_fields(layout)
+    constant, has_sigmas = parts[0].file.time_constant, parts[0].sigma is not None
+    with output_file(target) as copy:
+        with _Output(copy) as output, open(layout.path, "rb") as file:
+            written = add_sigma_fields(layout) if has_sigmas else layout
             head, encoder = _start(written, output, target.suffix.lower() == ".laz")
-            outside, untimed, low, high = 0, 0, np.full(3, np.inf), np.full(3, -np.inf)
+            outside, untimed = np.zeros(len(parts), int), 0
+            low, high = np.full(3, np.inf), np.full(3, -np.inf)
             for records in read_records(layout, SETTINGS.chunk_points):
                 _check_channels(layout, target, records)
-                xyz = [records[name] for name in "XYZ"]
-                scaled = layout.scale, layout.offset, records["gps_time"], cloud_file.time_constant
-                try:
-                    outside += shift(xyz, *scaled)
-                except ValueError as error:
-                    raise ValueError(f"{layout.path}: {error}") from None
+                sigmas = np.full((len(records), 3), np.nan) if has_sigmas else None
+                outside += [part.move(layout, records, sigmas) for part in parts]
                 untimed += np.count_nonzero(~np.isfinite(records["gps_time"]))
-                low = np.minimum(low, [v.min() for v in xyz])
-                high = np.maximum(high, [v.max() for v in xyz])
-                raw = records.view(np.uint8)
-                if sigma is not None:
-                    raw = with_sigmas(records, sigma.of_integers(xyz, *scaled))
+                low = np.minimum(low, [records[name].min() for name in "XYZ"])
+                high = np.maximum(high, [records[name].max() for name in "XYZ"])
+                raw = records.view(np.uint8) if sigmas is None else with_sigmas(records, sigmas)
                 output.encode(encoder.compress_many, raw)
                 if watch is not None:
-                    watch(records["gps_time"] + cloud_file.time_constant)
+                    watch(records["gps_time"] + constant)
             output.encode(encoder.done)
             _finish(written, head, np.stack([high, low]), file, output)
-        _check_copy(layout, part)
+        _check_copy(layout, copy)
     if untimed:
         warnings.warn(
             f"{untimed} of {layout.points} points of {layout.path} have a gps_time that is not a "
             "number. They can't be placed on the trajectory and were left as they were.",
-            stacklevel=2,
+            stacklevel=3,
         )
-    return outside
+    return outside.tolist()
 
 
 def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):

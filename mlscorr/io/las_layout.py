@@ -257,7 +257,7 @@ class LasLayout:
             starts += self.field("Q", 235)
         return min(starts)
 
-    def decoder(self, file: BinaryIO, threads: bool = True) -> Any:
+    def decoder(self, file: BinaryIO, threads: bool = True, is_brief: bool = False) -> Any:
         """What reads the points of a file: seek(point) and decompress_many(buffer).
 
         Parameters
@@ -265,8 +265,9 @@ class LasLayout:
         file : binary file
             Open for reading.
         threads : bool
-            Without them seeking is cheap, and only gps_time and point_source_id are sure to be
-            decoded.
+            Without them seeking is cheap.
+        is_brief : bool
+            Whether only gps_time and point_source_id are sure to be decoded.
 
         Returns
         -------
@@ -275,11 +276,10 @@ class LasLayout:
         file.seek(len(self.head))
         if not self.is_compressed:
             return _PlainPoints(file, len(self.head), self.record_length)
-        if threads:
-            return lazrs.ParLasZipDecompressor(file, self.laszip)
-        fields = lazrs.SELECTIVE_DECOMPRESS_GPS_TIME | lazrs.SELECTIVE_DECOMPRESS_POINT_SOURCE_ID
-        selection = lazrs.DecompressionSelection(fields)
-        return lazrs.LasZipDecompressor(file, self.laszip, selection)
+        brief = lazrs.SELECTIVE_DECOMPRESS_GPS_TIME | lazrs.SELECTIVE_DECOMPRESS_POINT_SOURCE_ID
+        fields = brief if is_brief else lazrs.SELECTIVE_DECOMPRESS_ALL
+        kind = lazrs.ParLasZipDecompressor if threads else lazrs.LasZipDecompressor
+        return kind(file, self.laszip, lazrs.DecompressionSelection(fields))
 
 
 class _PlainPoints:

@@ -8,6 +8,7 @@ from pathlib import Path, PurePath
 import numpy as np
 import tomlkit
 
+from mlscorr.io.conversion import written_name
 from mlscorr.io.survey_paths import matching
 from mlscorr.io.text_files import ENCODING
 from mlscorr.survey import Mounting
@@ -50,22 +51,28 @@ def write_survey_copy(
     for section in sessions or [document["trajectory"]]:
         for key in {"file", "accuracy"} & set(section):
             section[key] = _moved(there, section[key])
-    files = [section for section in sessions if "files" in section]
     if clouds:
-        for section in files:  # the copies keep their names, not their folders
-            section["files"] = _names(source, section["files"])
-        document["cloud"]["files"] = [name for names in clouds for name in names]
-        for section, names in zip(scanners, clouds, strict=bool(scanners)):
-            section["files"] = list(names)
+        _set_clouds(source, document, sessions, scanners, clouds)
     else:
-        for section in (document["cloud"], *scanners, *files):
-            for number, name in enumerate(section["files"]):  # which keeps comments between them
+        for section in (document["cloud"], *sessions, *scanners):
+            for number, name in enumerate(section.get("files", ())):  # keeps comments between
                 section["files"][number] = _moved(there, name, source.parent)
     if trajectory is not None:
         _set_trajectory(document, trajectory)
     for section, mounting in zip(scanners or [document], mountings, strict=bool(mountings)):
         _set_mounting(section["mounting"], mounting)
     Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _set_clouds(source, document, sessions, scanners, clouds):
+    """New files of each scanner; those of sessions keep their names, not their folders."""
+    for section in sessions:
+        if "files" in section:
+            section["files"] = _names(source, section["files"])
+    document["cloud"]["files"] = list(dict.fromkeys(name for names in clouds for name in names))
+    for section, names in zip(scanners, clouds, strict=bool(scanners)):
+        if "files" in section:
+            section["files"] = list(names)
 
 
 def _set_trajectory(document, name):
@@ -85,7 +92,7 @@ def _listed(section):
 def _names(source, patterns):
     """Names of the files that patterns of a survey.toml name."""
     paths = [matching(source, "trajectory.files", pattern) for pattern in patterns]
-    return sorted({path.name for some in paths for path in some})
+    return sorted({written_name(path) for some in paths for path in some})
 
 
 def _set_mounting(section, mounting):

@@ -13,7 +13,7 @@ from mlscorr.io.nearness import check_together
 from mlscorr.io.projection import check_area, check_crs, describe_projection
 from mlscorr.io.session_points import check_belongings
 from mlscorr.io.survey_paths import files_of
-from mlscorr.io.survey_scanners import mounted_scanners, scanner_notes
+from mlscorr.io.survey_scanners import clouds_of, mounted_scanners, scanner_notes
 from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
 from mlscorr.io.time_systems import match_times
 from mlscorr.io.toml_file import read_toml
@@ -73,7 +73,7 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
         name=settings.name or path.absolute().parent.name,
         path=path,
         crs=settings.crs,
-        clouds=cloud_files,
+        clouds=clouds_of(scanners, cloud_files),
         trajectory=trajectory,
         mounting=scanners[0].mounting if is_one else None,
         control=control,

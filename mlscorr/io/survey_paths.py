@@ -133,7 +133,11 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
 
 
 def own_clouds(
-    path: Path, key: str, patterns: Sequence[str] | None, clouds: Sequence[CloudFile]
+    path: Path,
+    key: str,
+    patterns: Sequence[str] | None,
+    clouds: Sequence[CloudFile],
+    owner: str = "",
 ) -> list[CloudFile]:
     """Those of a survey's clouds that patterns name; all without patterns.
 
@@ -145,6 +149,8 @@ def own_clouds(
         That holds the patterns.
     patterns : sequence of str, optional
     clouds : sequence of CloudFile
+    owner : str
+        Words on who has the patterns.
 
     Raises
     ------
@@ -159,7 +165,7 @@ def own_clouds(
         named = [cloud for cloud in clouds if cloud.path.resolve() in there]
         if not named:
             raise ValueError(
-                f"{key} of {path}: {pattern} is none of the {len(clouds)} files of [cloud]."
+                f"{key} of {path}: {pattern}{owner} is none of the {len(clouds)} files of [cloud]."
             )
         own += named
     return own

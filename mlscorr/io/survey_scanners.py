@@ -1,8 +1,14 @@
-"""Which scanner wrote which of a survey's cloud files."""
+"""Which scanner measured which of a survey's points: files of its own, or ids in those of all."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from mlscorr.io.survey_paths import matching
+import numpy as np
+
+from mlscorr.io.las import count_sources
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.survey_paths import own_clouds
 from mlscorr.io.survey_sections import PlannedSurveyFile, ScannerSection
 from mlscorr.survey import CloudFile, MountedScanner
 
@@ -11,6 +17,8 @@ def mounted_scanners(
     path: Path, settings: PlannedSurveyFile, clouds: tuple[CloudFile, ...]
 ) -> tuple[MountedScanner, ...]:
     """The scanners of a survey: one or more.
+
+    Where point_source_ids tell them apart, the points of each id are counted.
 
     Parameters
     ----------
@@ -23,54 +31,106 @@ def mounted_scanners(
     Raises
     ------
     ValueError
-        Where a file is of no scanner, or of more than one, and for files that are none of these.
+        Where a file or an id is of no scanner, or of more than one, for files that are none of
+        these, and for ids that no point has.
     FileNotFoundError
         For files that don't exist.
     """
     if isinstance(settings.scanner, ScannerSection):
         mounting = _mounting(settings.mounting)
         return (MountedScanner("", settings.scanner.scanner(), mounting, clouds),)
-    written = _names(path, settings.scanners, clouds) if clouds else {}
+    measured = _measured(path, settings.scanners, clouds) if clouds else {}
     return tuple(
         MountedScanner(
-            name,
-            section.scanner(),
-            _mounting(section.mounting),
-            tuple(cloud for cloud in clouds if name in written[cloud]),
+            name, section.scanner(), _mounting(section.mounting), tuple(measured.get(name, ()))
         )
         for name, section in settings.scanners
     )
+
+
+def clouds_of(
+    scanners: Sequence[MountedScanner], clouds: Sequence[CloudFile]
+) -> tuple[CloudFile, ...]:
+    """The clouds of several scanners in the order of a survey's files.
+
+    Parameters
+    ----------
+    scanners : sequence of MountedScanner
+    clouds : sequence of CloudFile
+        The files.
+    """
+    parts = [part for scanner in scanners for part in scanner.clouds]
+    return tuple(part for cloud in clouds for part in parts if part.path == cloud.path)
 
 
 def _mounting(section):
     return None if section is None else section.mounting()
 
 
-def _names(path, sections, clouds):
-    """Name of the scanner that wrote each cloud file, in a set."""
-    names = {cloud: set() for cloud in clouds}
+def _measured(path, sections, clouds):
+    """CloudFiles of each scanner by its name."""
+    claims = {cloud: {} for cloud in clouds}
     for name, section in sections:
-        for pattern in section.files:
-            there = {file.resolve() for file in matching(path, "scanner.files", pattern)}
-            own = [cloud for cloud in clouds if cloud.path.resolve() in there]
-            if not own:
-                raise ValueError(
-                    f"scanner.files of {path}: {pattern} of scanner {name} is none of the "
-                    f"{len(clouds)} files of [cloud]."
-                )
-            for cloud in own:
-                names[cloud].add(name)
+        key = "scanner.files"
+        for cloud in own_clouds(path, key, section.files, clouds, f" of scanner {name}"):
+            claims[cloud][name] = section.point_source_ids
     wrong = [
-        f"{cloud.path.name} ({', '.join(sorted(writers)) or 'of none'})"
-        for cloud, writers in names.items()
-        if len(writers) != 1
+        f"{cloud.path.name} ({', '.join(sorted(own)) or 'of none'})"
+        for cloud, own in claims.items()
+        if not own or (len(own) > 1 and None in own.values())
     ]
     if wrong:
         raise ValueError(
             f"{len(wrong)} of the {len(clouds)} files of [cloud] in {path} are not of exactly one "
-            f"[[scanner]]: {', '.join(wrong)}. Name each in the files of the one that wrote it."
+            f"[[scanner]]: {', '.join(wrong)}. Name each in the files of the one that wrote it, or "
+            "the point_source_ids of each scanner in it."
         )
-    return names
+    measured = {name: [] for name, _ in sections}
+    for cloud, own in claims.items():
+        for name, part in _parts(path, cloud, own):
+            measured[name].append(part)
+    for name, section in sections:
+        if not measured[name]:
+            files = ", ".join(cloud.path.name for cloud, own in claims.items() if name in own)
+            raise ValueError(
+                f"No point of {files} has a point_source_id of scanner {name} in {path} "
+                f"({_listed(section.point_source_ids)})."
+            )
+    return measured
+
+
+def _parts(path, cloud, own):
+    """Pairs (name, CloudFile) of the scanners that measured a file, by the ids of each."""
+    if None in own.values():
+        return [(name, cloud) for name in own]
+    ids = [number for numbers in own.values() for number in set(numbers)]
+    doubled = sorted({number for number in ids if ids.count(number) > 1})
+    if doubled:
+        owners = [name for name, numbers in own.items() if doubled[0] in numbers]
+        raise ValueError(
+            f"point_source_id {doubled[0]} of {cloud.path.name} is of scanners "
+            f"{' and '.join(owners)} in {path}: each point is of one."
+        )
+    counts = count_sources(read_layout(cloud.path))
+    other = np.setdiff1d(np.flatnonzero(counts), ids)
+    if len(other):
+        raise ValueError(
+            f"{counts[other].sum()} of the {cloud.points} points of {cloud.path.name} have a "
+            f"point_source_id that no [[scanner]] of {path} names ({_listed(other)}; those named "
+            f"are {_listed(ids)}). Add each to the scanner that measured these points."
+        )
+    parts = [
+        (name, replace(cloud, points=int(n), point_source_ids=tuple(sorted(set(numbers)))))
+        for name, numbers in own.items()
+        if (n := counts[sorted(set(numbers))].sum())
+    ]
+    return parts if len(parts) > 1 else [(name, cloud) for name, _ in parts]
+
+
+def _listed(ids):
+    """The first ids in words."""
+    first = ", ".join(map(str, sorted(ids)[:10]))
+    return first if len(ids) <= 10 else f"{first} and {len(ids) - 10} more"
 
 
 def scanner_notes(scanners: tuple[MountedScanner, ...]) -> list[str]:
@@ -83,7 +143,7 @@ def scanner_notes(scanners: tuple[MountedScanner, ...]) -> list[str]:
     if len(scanners) < 2:
         return []
     wrote = "; ".join(
-        f"{mounted.name} wrote {', '.join(cloud.path.name for cloud in mounted.clouds)}"
+        f"{mounted.name} wrote {', '.join(cloud.name for cloud in mounted.clouds)}"
         for mounted in scanners
     )
     return [

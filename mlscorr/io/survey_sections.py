@@ -1,7 +1,7 @@
 """What stands in survey.toml, section by section, in its own units (deg)."""
 
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -167,21 +167,21 @@ class ScannerSection(TomlSection):
 
 
 class MountedScannerSection(ScannerSection):
-    """One of several scanners: its files, what is believed of it, and its mounting."""
+    """One of several scanners: its points, what is believed of it, and its mounting."""
 
     name: Annotated[str, Field(min_length=1)] | None = None
-    files: Annotated[list[str], Field(min_length=1)]
+    files: Annotated[list[str], Field(min_length=1)] | None = None
+    point_source_ids: Annotated[list[PointSource], Field(min_length=1)] | None = None
     mounting: CalibratedMountingSection | None = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _has_files(cls, document: Any) -> Any:
-        if isinstance(document, dict) and "point_source_ids" in document:
+    @model_validator(mode="after")
+    def _has_points(self) -> Self:
+        if self.files is None and self.point_source_ids is None:
             raise ValueError(
-                "point_source_ids can't tell scanners apart: split each cloud file by scanner, and "
-                "name what each scanner wrote in its files"
+                "files is missing: name those that the scanner wrote, or its point_source_ids in "
+                "files with the points of several"
             )
-        return document
+        return self
 
 
 def _kind_of_section(document):

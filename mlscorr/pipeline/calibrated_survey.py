@@ -116,24 +116,11 @@ class CalibratedSurvey(Summary):
                 write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
             if clouds:
                 done = (progress or silent)("Writing the cloud", self.survey.points)
-                self.write_clouds(folder, done, drift)
+                correction = drift or self.calibration.correction()
+                write_clouds(self.survey, folder, correction, lambda times: done(len(times)))
             trajectory = "trajectory.csv" if clouds and with_drift else None
             write_calibrated_survey(folder, out, [self], clouds, trajectory)
         return content
-
-    def write_clouds(self, folder: Path, done: Callable, drift: Correction | None = None) -> None:
-        """Write the clouds as the calibrated mounting puts them.
-
-        Parameters
-        ----------
-        folder : Path
-        done : function
-            Of the number of points just done.
-        drift : Correction, optional
-            Of mounting and POS error.
-        """
-        correction = drift or self.calibration.correction()
-        write_clouds(self.survey, folder, correction, lambda times: done(len(times)))
 
     def report(self, drift: Correction | None = None) -> dict[str, object]:
         """The content of calibration.json.

@@ -18,6 +18,7 @@ from mlscorr.pipeline.calibrated_survey import (
     write_calibrated_survey,
     write_calibration,
 )
+from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
@@ -151,8 +152,8 @@ class CalibratedScanners(Summary):
             write_calibration(folder, content)
             if clouds:
                 done = (progress or silent)("Writing the cloud", self.survey.points)
-                for part in parts:
-                    part.write_clouds(folder, done)
+                moved = {name: p.calibration.correction() for name, p in self.by_scanner.items()}
+                write_clouds(self.survey, folder, moved, lambda times: done(len(times)))
             write_calibrated_survey(folder, out, parts, clouds)
         return content
 

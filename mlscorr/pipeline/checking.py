@@ -10,7 +10,7 @@ import numpy as np
 
 from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.io.conversion import glance, read_in_part
-from mlscorr.io.las import spread_times
+from mlscorr.io.las import spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
 from mlscorr.io.nearness import far_cloud
@@ -87,8 +87,8 @@ def _checked(survey, faults):
     for sentence in _crs_conflicts(survey):
         faults.warnings = [warning for warning in faults.warnings if warning != sentence]
         faults.add("data", sentence)
-    layouts = [read_layout(file.path) for file in survey.clouds]
-    passes, outside = _placed_times(survey, layouts)
+    layouts = [read_layout(path) for path in survey.cloud_paths]
+    passes, outside = _placed_times(survey)
     for sentence in (*outside, *_crs_hints(survey, layouts), *_uncovered(survey, layouts)):
         faults.warn(sentence)
     for layout in layouts:
@@ -117,7 +117,7 @@ def _checked(survey, faults):
 def _crs_conflicts(survey) -> Iterator[str]:
     """A sentence on each file whose own CRS is another one."""
     if survey.crs is not None:
-        sentences = (crs_conflict(read_layout(file.path), survey.crs) for file in survey.clouds)
+        sentences = (crs_conflict(read_layout(path), survey.crs) for path in survey.cloud_paths)
         yield from filter(None, sentences)
 
 
@@ -133,17 +133,21 @@ def _crs_hints(survey, layouts) -> Iterator[str]:
         )
 
 
-def _placed_times(survey, layouts) -> tuple[int, list[str]]:
+def _placed_times(survey) -> tuple[int, list[str]]:
     """Number of passes that times spread over the files lie in; sentences on those outside."""
     passes, outside = 0, []
-    for file, layout in zip(survey.clouds, layouts, strict=True):
-        segment = survey.trajectory.segment(spread_times(layout)[1] + file.time_constant)
+    for file in survey.clouds:
+        records = spread_records(read_layout(file.path))[1]
+        times = records["gps_time"][file.rows(records["point_source_id"])] + file.time_constant
+        if not len(times):
+            continue
+        segment = survey.trajectory.segment(times)
         passes += len(set(segment[segment >= 0].tolist()))
         share = float(np.mean(segment < 0))
         if share > 0:
             start, end = survey.trajectory.gps_time[[0, -1]]
             outside.append(
-                f"About {share:.0%} of the points of {file.path.name} lie outside the trajectory "
+                f"About {share:.0%} of the points of {file.name} lie outside the trajectory "
                 f"[{start:.3f}, {end:.3f}] s or in its {len(survey.trajectory.gaps)} gaps, by "
                 f"{len(segment)} times spread over it: they stay as they are (exit code 4). Export "
                 "the whole trajectory."

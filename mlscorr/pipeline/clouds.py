@@ -1,6 +1,6 @@
 """Clouds as a correction puts them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -8,14 +8,14 @@ import numpy as np
 from mlscorr.correction import PointSigma
 from mlscorr.evaluate.scores import Correcting
 from mlscorr.io.conversion import written_name
-from mlscorr.io.las_copy import write_corrected
+from mlscorr.io.las_copy import CorrectedPart, write_parts
 from mlscorr.survey import Survey
 
 
 def write_clouds(
     survey: Survey,
     folder: Path,
-    correction: Correcting,
+    correction: Correcting | Mapping[str, Correcting],
     watch: Callable[[np.ndarray], object],
     sigma: Callable[[Survey], PointSigma] | None = None,
 ) -> list[tuple[Path, int, int]]:
@@ -25,7 +25,7 @@ def write_clouds(
     ----------
     survey : Survey
     folder : Path
-    correction : anything with ``apply(cloud) -> cloud``
+    correction : anything with ``apply(cloud) -> cloud``, or that of each scanner by its name
     watch : function of gps_time (n,)
         Is told the times of the points that were just written.
     sigma : function, optional
@@ -34,13 +34,17 @@ def write_clouds(
     Returns
     -------
     list of (path, points, points outside the trajectory)
-        Scanner by scanner; the latter stay as they were.
+        Scanner by scanner, but a file of several once; the last stay as they were.
     """
-    written = []
-    for part in survey.by_scanner.values():
+    parts: dict[Path, list[CorrectedPart]] = {}
+    for name, part in survey.by_scanner.items():
         sigmas = sigma and sigma(part)
+        moved = correction[name] if isinstance(correction, Mapping) else correction
         for file in part.clouds:
-            path = folder / written_name(file.path)
-            outside = write_corrected(file, path, correction, watch, sigmas)
-            written.append((path, file.points, outside))
+            parts.setdefault(file.path, []).append(CorrectedPart(file, moved, sigmas))
+    written = []
+    for source, some in parts.items():
+        path = folder / written_name(source)
+        outside = write_parts(some, path, watch)
+        written.append((path, sum(part.file.points for part in some), sum(outside)))
     return written

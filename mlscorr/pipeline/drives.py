@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.folder_roles import FileRole
-from mlscorr.io.las import spread_times
+from mlscorr.io.las import spread_records
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.poses import utm_zone
 from mlscorr.io.survey_sections import TrajectorySection
@@ -46,9 +46,20 @@ class Cloud:
         return self.layout.cloud.name
 
     @cached_property
+    def records(self) -> np.ndarray:
+        """Points spread over the file; as spread_records."""
+        return spread_records(self.layout)[1]
+
+    @property
     def times(self) -> np.ndarray:
         """Times spread over the file, as they stand in it. Units: s."""
-        return spread_times(self.layout)[1]
+        return self.records["gps_time"]
+
+    @property
+    def takes_turns(self) -> bool:
+        """Whether ids of points come again and again, not one after the other as of strips."""
+        ids = self.records["point_source_id"][np.argsort(self.times, kind="stable")]
+        return bool(np.count_nonzero(np.diff(ids)) > 2 * (len(np.unique(ids)) - 1))
 
     def file(self, constant: float = 0.0) -> CloudFile:
         """Its CloudFile, with what makes its times those of the trajectory (s)."""

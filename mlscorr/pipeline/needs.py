@@ -98,7 +98,7 @@ def amounts_read(survey: Survey, sampled: int) -> tuple[Amount, ...]:
             "points",
             sum(map(recorded_points, survey.clouds)),
             "",
-            f"headers of {len(survey.clouds)} cloud files",
+            f"headers of {len(survey.cloud_paths)} cloud files",
         ),
         Amount("scanners", len(survey.by_scanner), "", "survey.toml"),
         Amount("passes", sampled, "", f"{IO.sampled_points} times of each file"),
@@ -120,11 +120,11 @@ def amounts_written(survey: Survey) -> tuple[Amount, ...]:
     tuple of Amount
         Units: MB.
     """
-    clouds = sum(file.path.stat().st_size for file in survey.clouds) / 1e6
+    clouds = sum(path.stat().st_size for path in survey.cloud_paths) / 1e6
     epochs = len(survey.trajectory)
     table = epochs * SETTINGS.epoch_bytes / 1e6
     return (
-        Amount("clouds", clouds, "MB", f"{len(survey.clouds)} files, sizes of the inputs"),
+        Amount("clouds", clouds, "MB", f"{len(survey.cloud_paths)} files, sizes of the inputs"),
         Amount("trajectory.csv", table, "MB", f"{epochs} epochs of {SETTINGS.epoch_bytes} bytes"),
         Amount("report.html, report.json, targets.csv, pictures", SETTINGS.report_megabytes, "MB",
                "surveys of 24 points; docs/results.md"),

@@ -58,7 +58,7 @@ def look_near_control(survey: Survey) -> QuickLook:
         Where the files are not in order of time, so that a look takes as long as reading them.
     """
     survey = replace(survey, control=spread_points(survey), check=survey.surveyed[[]])
-    windows = {file.path: list(_near(survey, file)) for file in survey.clouds}
+    windows = {file: list(_near(survey, file)) for file in survey.clouds}
     survey = replace(survey, control=_affordable(survey, windows))
     start = perf_counter()
     matched, candidates, near = _find(survey, windows)
@@ -125,7 +125,7 @@ def _spans(survey):
 
 def _find(survey, windows) -> tuple[Matched, Candidates, NearPoints]:
     """The surveyed points that are found in what was read."""
-    targets, candidates, near = fit_while_reading(survey, lambda file: iter(windows[file.path]))
+    targets, candidates, near = fit_while_reading(survey, lambda file: iter(windows[file]))
     if not targets:
         return Matched.none(), candidates, near
     matches = match_targets(targets, candidates, survey).matches

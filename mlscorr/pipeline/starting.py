@@ -132,6 +132,7 @@ def _text(folder, path, given, roles):
     else:
         text.note("", f'crs = "EPSG:..."  of cloud and control: {why_crs}')
     _put_clouds(text, path, clouds, trajectory)
+    _note_sources(text, clouds)
     _put_sessions(text, path, drive, accuracy)
     if control is not None:
         text.put("control", "file", _name(path, control), _targets(points))
@@ -211,6 +212,14 @@ def _put_clouds(text, path, clouds, trajectory):
     if (end[:-1] - start[1:] > SETTINGS.tile_overlap * (end - start)[:-1]).any():
         text.note("cloud", "Files overlap in time. Where two scanners wrote them, say which wrote")
         text.note("cloud", "which under [[scanner]] (docs/survey.md), each with its own mounting.")
+
+
+def _note_sources(text, clouds):
+    """Say where the ids of points may be those of scanners."""
+    mixed = [cloud.name for cloud in clouds if cloud.takes_turns]
+    if mixed:
+        text.note("cloud", f"Ids of points (point_source_id) take turns in {', '.join(mixed)}.")
+        text.note("cloud", "Where each is a scanner, name them under [[scanner]] (docs/survey.md).")
 
 
 def _put_sessions(text, path, drive, accuracy):

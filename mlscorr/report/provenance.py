@@ -27,7 +27,7 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
     pairs = [("Coordinate reference system", crs)]
     pairs += [(f"Frame: {name[:1].lower()}{name[1:]}", text) for name, text in FRAMES]
     pairs.append(("Time of the trajectory", f"gps_time {time[0]:.3f} to {time[-1]:.3f} s"))
-    pairs += [(f"Time of {cloud.path.name}", _time(cloud)) for cloud in survey.clouds]
+    pairs += dict.fromkeys((f"Time of {cloud.path.name}", _time(cloud)) for cloud in survey.clouds)
     rate = 1 / np.median(np.diff(time))
     pairs.append(("Epochs of the trajectory", f"{thousands(len(time))} at {rate:.4g} Hz"))
     if trajectory.position_sigma is None:

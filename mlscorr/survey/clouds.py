@@ -28,18 +28,42 @@ class PointCloud(Columns):
 
 @dataclass(frozen=True)
 class CloudFile:
-    """A LAS or LAZ file.
+    """A LAS or LAZ file, or the points in it that one of several scanners measured.
 
     Parameters
     ----------
     path : Path
     points : int
+        Of the file, or of these.
     time_constant : float
         Added to the file's gps_time, it gives the trajectory's. Units: s.
     time_system : str
+    point_source_ids : tuple of int, optional
+        Of the points; without it all of the file.
     """
 
     path: Path
     points: int
     time_constant: float
     time_system: str
+    point_source_ids: tuple[int, ...] | None = None
+
+    @property
+    def name(self) -> str:
+        """Of the file, with the ids of the points."""
+        if self.point_source_ids is None:
+            return self.path.name
+        ids = ", ".join(map(str, self.point_source_ids))
+        return f"{self.path.name} (point_source_id {ids})"
+
+    def rows(self, point_source_id: np.ndarray) -> np.ndarray | slice:
+        """Which points are among these: (n,) bool, or a slice of all.
+
+        Parameters
+        ----------
+        point_source_id : (n,) int array
+            Of points of the file.
+        """
+        if self.point_source_ids is None:
+            return slice(None)
+        return np.isin(point_source_id, self.point_source_ids)

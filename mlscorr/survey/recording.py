@@ -85,7 +85,8 @@ class Survey(Summary):
     inputs : tuple of InputFile
         survey.toml and every file that it names.
     scanners : tuple of MountedScanner
-        Where there are several; each cloud file is of one of them.
+        Where there are several; each cloud file is of one of them, and a file with the points of
+        several is among the clouds once for each.
     """
 
     name: str
@@ -112,6 +113,11 @@ class Survey(Summary):
         return self.control + self.check
 
     @property
+    def cloud_paths(self) -> tuple[Path, ...]:
+        """Of the cloud files, each once."""
+        return tuple(dict.fromkeys(file.path for file in self.clouds))
+
+    @property
     def points(self) -> int:
         """Number of points in all cloud files."""
         return sum(file.points for file in self.clouds)
@@ -126,7 +132,7 @@ class Survey(Summary):
         return [
             ("name", self.name),
             ("coordinates", self.crs or "not stated"),
-            ("clouds", f"{len(self.clouds)} files, {self.points} points"),
+            ("clouds", f"{len(self.cloud_paths)} files, {self.points} points"),
             (
                 "trajectory",
                 f"{len(self.trajectory)} epochs, {start:.1f} to {end:.1f} s, gaps {passes - 1}",
@@ -209,6 +215,6 @@ class Survey(Summary):
             names = ", ".join(mounted.name for mounted in self.scanners)
             raise ValueError(
                 f"{self.path} has {len(self.scanners)} scanners ({names}), and {verb} rests on one "
-                "mounting. Give it a survey.toml of each scanner: its files under [cloud], its "
-                "[mounting] and its [scanner]."
+                "mounting. Give it a survey.toml of each scanner: its files under [cloud] (split "
+                "one with points of several), its [mounting] and its [scanner]."
             )

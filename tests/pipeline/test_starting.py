@@ -385,6 +385,17 @@ def test_trajectories_that_follow_each_other_are_a_list(folder):
     assert "# [trajectory]" not in started.text and "180 epochs, 18 s" in started.text
 
 
+def test_ids_that_take_turns_are_named(folder):
+    "Two scanners in one file write in turns, strips do not: init says what [[scanner]] is for"
+    strips, turns = laspy.read(folder / "pass-1.las"), laspy.read(folder / "pass-2.las")
+    strips.point_source_id = np.repeat([1, 2, 3, 4], 25)
+    turns.point_source_id = np.arange(100) % 3 // 2
+    strips.write(folder / "pass-1.las")
+    turns.write(folder / "pass-2.las")
+    text = mlscorr.init(folder).text
+    assert "(point_source_id) take turns in pass-2.las." in text and "[[scanner]]" in text
+
+
 def test_trajectories_that_overlap_stay_ambiguous(folder):
     "Neither covers both clouds, and for 5 s there are two: both are named"
     cut(folder, overlap=5.0)
