@@ -11,6 +11,7 @@ import pytest
 import mlscorr
 from mlscorr.effects import make_effect
 from mlscorr.frames import attitude_from_angles
+from mlscorr.io.las import read_chunks
 from mlscorr.io.survey_file import read_survey
 from mlscorr.io.trajectory import read_trajectory, write_trajectory_csv
 from mlscorr.io.trajectory_sessions import join_sessions
@@ -193,6 +194,24 @@ def test_trajectories_of_two_time_systems_are_refused(folder):
         read_survey(folder)
     faults = mlscorr.check(folder).faults
     assert any("one time system" in fault.sentence for fault in faults)
+
+
+def test_seconds_of_week_may_start_again_between_two(folder):
+    "Saturday night and Sunday morning: clouds in standard time find each its own run"
+    late, early = 604_000.0 - START, 100.0 - START - 20.0  # s, added to each run
+    week = 604_800.0 * 2300 - 1e9
+    for number, start, added, weeks in ((1, 0.0, late, 0), (2, 20.0, early, 1)):
+        run = drive(start, 15.0)
+        write_trajectory_csv(
+            folder / f"run-{number}.csv", replace(run, gps_time=run.gps_time + added)
+        )
+        times = START + start + np.linspace(1.0, 14.0, 100) + added + week + weeks * 604_800.0
+        write_las(folder / f"pass-{number}.las", times, is_standard=True)
+    survey = read_survey(folder)
+    assert len(survey.trajectory.passes) == 2
+    for cloud, run in zip(survey.clouds, (1, 0), strict=True):
+        chunk = next(read_chunks(cloud))
+        assert (survey.trajectory.segment(chunk.gps_time) == run).all()
 
 
 def test_sigmas_that_one_lacks_are_those_of_pos_or_asked_for(folder):
