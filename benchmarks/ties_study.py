@@ -23,6 +23,7 @@ from mlscorr.survey import Mounting, Ties
 NOISE = 0.010  # m, one sigma of a tie: what is left of a street that changes a little
 FARTHEST = 30.0  # m from the vehicle
 WRONG_SIZE = (0.1, 1.0)  # m, of cars that moved, and facades shifted by one window
+OUTAGES = ((20.0, 40.0), (225.0, 40.0))  # s
 # Number of ties of a drive of 90 s there, by what they are of: what stays of a second, poles and
 # trees every 12 m, ends of dashes every 12 m. A pole or an end of a dash is known to 2 NOISE.
 CANYON = {"facade": 600, "road": 300, "cross wall": 100}
@@ -125,10 +126,14 @@ def main():
     parser.add_argument("--wrong", type=float, default=0.05, help="share of wrong ties")
     parser.add_argument("--preview", action="store_true")
     parser.add_argument("--streets", nargs="*", default=["canyon"], choices=STREETS)
+    parser.add_argument("--filtered", action="store_true", help="in real time, two outages")
     parser.add_argument("--grade", default="mems", choices=("mems", "tactical"))
     arguments = parser.parse_args()
     scenario = scenarios()["canyon"]
-    pos = scenario.pos.model_copy(update={"grade": arguments.grade})
+    changes = {"grade": arguments.grade}
+    if arguments.filtered:  # 40 s in each pass, at other places of the road
+        changes |= {"processing": "filtered", "sky_view": False, "outages": OUTAGES}
+    pos = scenario.pos.model_copy(update=changes)
     scenario = scenario.model_copy(update={"pos": pos})
     print("control  seed     raw   alone  within    ties  within   ratio  street")
     for number in arguments.control:

@@ -35,6 +35,17 @@ def with_drift_history(equations: Equations) -> Equations:
         steps = steps[np.arange(len(steps)) != contradicted]
 
 
+def with_likely_starts(equations: Equations) -> Equations:
+    """The equations with the most likely start of growth in each segment, by control and ties.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of control points and some ties, whose epochs tell starts apart between control points.
+    """
+    return _with_starts(equations)[0]
+
+
 def _with_starts(equations):
     """The equations with the most likely starts, and the SignalParameters that go with them."""
     history = equations.stated.history
@@ -42,6 +53,8 @@ def _with_starts(equations):
     ends_by_step = np.isin(edges[1:], history.steps.middle)
     begins_pass = np.isin(edges[:-1], history.trajectory.passes[:, 0])
     segments = list(zip(edges[:-1], edges[1:], begins_pass, ends_by_step, strict=True))
+    tied = () if equations.ties is None else equations.ties.gps_time.ravel()
+    times = np.append(equations.observed, tied)
     objective = Objective.of(equations)
     mode, _ = objective.maximum(INTEGRATED, objective.initial)
     for _ in range(SETTINGS.rounds):
@@ -49,7 +62,7 @@ def _with_starts(equations):
         for number, segment in enumerate(segments):
             part = _about(equations, *segment[:2])
             best = Objective.of(part.with_starts(starts))(INTEGRATED, mode)
-            for candidate in _candidates(equations.observed, *segment):
+            for candidate in _candidates(times, *segment):
                 tried = np.where(np.arange(len(starts)) == number, candidate, starts)
                 value = Objective.of(part.with_starts(tried))(INTEGRATED, mode)
                 if value > best:

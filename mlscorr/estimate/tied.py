@@ -17,6 +17,7 @@ from scipy.stats import norm
 from mlscorr.collocation import reweight
 from mlscorr.correction import Correction
 from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.outages import with_likely_starts
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters
 from mlscorr.estimate.screening import Outlier, Screening, may_go
 from mlscorr.estimate.settings import SETTINGS
@@ -105,6 +106,7 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
     ties : TieEquations
     """
     tied = graduated(equations, parameters, ties)
+    tied = tied.with_starts(with_likely_starts(_sample(tied)).stated.starts)
     rows = tied.ties
     parameters = _most_probable(tied, parameters)
     tied = _weighted(tied, parameters, (_student,))

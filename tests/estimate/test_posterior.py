@@ -202,11 +202,11 @@ def test_a_calibration_frees_the_attitude_time():
 
 
 def test_a_search_turns_back_from_scales_that_rounding_spoils():
-    "Drift of a kilometre beside ties of a hundredth of a millimetre: improbable, not the end"
+    "Drift of a kilometre beside ties of a tenth of a micrometre: improbable, not the end"
     survey = tied_passes(1, number=40)
     control = estimate_correction(survey.trajectory, survey.matched).equations
     ties = TieEquations.of(control.trajectory, control.pos, survey.ties, control.stated)
-    ties = replace(ties, variance=1e-6 * ties.variance)
+    ties = replace(ties, variance=1e-9 * ties.variance)
     objective = Objective.of(replace(control, ties=ties))
     farthest = objective.initial + SETTINGS.farthest * objective.spread
     with pytest.raises(np.linalg.LinAlgError, match="Rounding leaves the log-likelihood"):
