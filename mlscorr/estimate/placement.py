@@ -139,6 +139,7 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
 def _places(equations, families, sigma):
     """NextControl, at most PLACES, by the 3D sigma (n,) at all epochs of the trajectory."""
     families = [family for family in families if family[1] > SETTINGS.smallest_share]
+    equations = _with_fewer_ties(equations)
     trajectory, regular = equations.trajectory, _even_rows(equations.trajectory)
     candidates = np.unique(_candidate_rows(regular, sigma))
     rows = np.union1d(regular, candidates)
@@ -166,6 +167,15 @@ def _places(equations, families, sigma):
         places.append(NextControl(time, *place, *there, *drive, *share, limit, passes, why))
         square = after
     return tuple(places)
+
+
+def _with_fewer_ties(equations):
+    """The equations with some of the ties, each as precise as all those that it stands for."""
+    if equations.ties is None:
+        return equations
+    step = -(-len(equations.ties) // SETTINGS.tie_sample)
+    some = equations.ties.select(slice(None, None, step))
+    return replace(equations, ties=replace(some, variance=some.variance / step))
 
 
 def _best(complete, families, rows, chosen, candidates, gains):
