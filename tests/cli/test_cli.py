@@ -466,7 +466,8 @@ def test_few_control_points_lower_the_order_with_a_warning(kept, order, survey):
 
 def interrupt(survey, number, wait):
     "Start a correction, send it a signal after waiting for something, and see it end"
-    command = [MLSCORR, "correct", survey, "-o", survey.parent / "out"]
+    started = ["env", "--default-signal"]  # as if nohup had not ignored SIGHUP
+    command = [*started, MLSCORR, "correct", survey, "-o", survey.parent / "out"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             wait(survey.parent, process)
