@@ -27,15 +27,20 @@ def interval(values, statistic=np.median):
     return f"{statistic(values):.3f} [{low:.3f}, {high:.3f}]"
 
 
+def stated_sigma(gps_time):
+    """What such a POS states (n, 3; m): it grows with the square of the time without GNSS."""
+    lost = (gps_time - FROM) % EVERY
+    lost = np.where((gps_time >= FROM) & (lost < LOST), lost, 0.0)
+    return np.outer(lost**2, [3.33e-4, 3.33e-4, 1.92e-4]) + np.array([0.015, 0.015, 0.03])
+
+
 def cases(path):
     """Name, recorded trajectory, matched control and error (n, 3) of each window of a real series.
 
     The windows that share more than half with the shared survey's are left out.
     """
     series = read_pos_error_series(path)
-    lost = (series.gps_time - FROM) % EVERY
-    lost = np.where((series.gps_time >= FROM) & (lost < LOST), lost, 0.0)
-    sigma = np.outer(lost**2, [3.33e-4, 3.33e-4, 1.92e-4]) + np.array([0.015, 0.015, 0.03])
+    sigma = stated_sigma(series.gps_time)
     starts = np.arange(series.gps_time[0], series.gps_time[-1] - WINDOW, WINDOW / 4)
     for seed, first in enumerate(starts):
         if abs(first - USED) >= WINDOW / 2:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from feature_surveys import EXTRACTION, FeatureSurvey
+from real_windows import EVERY, stated_sigma
 from ties_study import feature_ties, measure
 
 from mlscorr.estimate import believed_correction, estimate_correction, with_ties
@@ -23,19 +24,12 @@ from mlscorr.frames import attitude_from_angles
 from mlscorr.io.pos_error_series import read_pos_error_series
 from mlscorr.survey import ControlPoints, Pos, TargetObservations, Trajectory
 
-LENGTH = 150.0  # s of a pass, as GNSS was withheld 60 s in every 150 s
+LENGTH = EVERY  # s of a pass, in which GNSS was withheld once
 FIRST = (358_135.0, 358_360.0, 358_585.0, 358_785.0)  # s: behind the shared survey's window
 SPEED = 10.0  # m/s
 TARGETS = 24
 SURVEYED = 0.003  # m, one sigma
 STREET = {"facade": 1000, "road": 500, "cross wall": 170}  # a tie of each for 0.1 to 1 s
-
-
-def stated_sigma(gps_time):
-    """What such a POS states (n, 3): it grows with the square of the time without GNSS."""
-    lost = (gps_time - 357_900.0) % LENGTH
-    lost = np.where(lost < 60.0, lost, 0.0)
-    return np.outer(lost**2, [3.33e-4, 3.33e-4, 1.92e-4]) + np.array([0.015, 0.015, 0.03])
 
 
 def drive(series, first):

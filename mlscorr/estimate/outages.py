@@ -15,6 +15,7 @@ from mlscorr.estimate.assembly import with_fallbacks
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters
 from mlscorr.pos import SETTINGS as POS_SETTINGS
 
 
@@ -28,26 +29,21 @@ def with_drift_history(equations: Equations) -> Equations:
     """
     steps = equations.stated.history.steps
     while True:
-        complete, parameters = _with_starts(with_fallbacks(equations, steps))
+        complete, parameters = with_likely_starts(with_fallbacks(equations, steps))
         contradicted = _contradicted(complete, parameters)
         if contradicted is None:
             return complete
         steps = steps[np.arange(len(steps)) != contradicted]
 
 
-def with_likely_starts(equations: Equations) -> Equations:
-    """The equations with the most likely start of growth in each segment, by control and ties.
+def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameters]:
+    """The equations with the most likely starts, and the parameters that go with them.
 
     Parameters
     ----------
     equations : Equations
-        Of control points and some ties, whose epochs tell starts apart between control points.
+        Of control points, and of some ties, whose epochs tell starts apart between the points.
     """
-    return _with_starts(equations)[0]
-
-
-def _with_starts(equations):
-    """The equations with the most likely starts, and the SignalParameters that go with them."""
     history = equations.stated.history
     edges, starts = history.edges, equations.stated.starts
     ends_by_step = np.isin(edges[1:], history.steps.middle)

@@ -24,6 +24,7 @@ from mlscorr.estimate.prediction import predict_under
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
+from mlscorr.estimate.tied import sample
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Matched, Pos, Trajectory
 
@@ -173,9 +174,9 @@ def _with_fewer_ties(equations):
     """The equations with some of the ties, each as precise as all those that it stands for."""
     if equations.ties is None:
         return equations
-    step = -(-len(equations.ties) // SETTINGS.tie_sample)
-    some = equations.ties.select(slice(None, None, step))
-    return replace(equations, ties=replace(some, variance=some.variance / step))
+    some = sample(equations)
+    share = len(some.ties) / len(equations.ties)
+    return replace(some, ties=replace(some.ties, variance=share * some.ties.variance))
 
 
 def _best(complete, families, rows, chosen, candidates, gains):

@@ -106,7 +106,7 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
     ties : TieEquations
     """
     tied = graduated(equations, parameters, ties)
-    tied = tied.with_starts(with_likely_starts(_sample(tied)).stated.starts)
+    tied = tied.with_starts(with_likely_starts(sample(tied))[0].stated.starts)
     rows = tied.ties
     parameters = _most_probable(tied, parameters)
     tied = _weighted(tied, parameters, (_student,))
@@ -116,7 +116,7 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
     kept = replace(rows, variance=factor**2 * rows.variance, weight=np.ones(len(rows)))
     kept = kept.select(used)
     tied = replace(tied, ties=kept)
-    return Tied(tied, choose_parameters(_sample(tied), (parameters,), SETTINGS.tie_points), used)
+    return Tied(tied, choose_parameters(sample(tied), (parameters,), SETTINGS.tie_points), used)
 
 
 def screen_with_ties(
@@ -175,13 +175,19 @@ def _contradiction(test, what):
 
 def _most_probable(tied, parameters):
     """The most probable parameters of their family near some; the weights of the ties stay."""
-    objective = Objective.of(_sample(tied))
+    objective = Objective.of(sample(tied))
     at, _ = objective.maximum(parameters.family, objective.logarithms(parameters))
     return objective.parameters(parameters.family, at)
 
 
-def _sample(tied):
-    """The equations with as many of the ties as are needed to choose parameters."""
+def sample(tied: Equations) -> Equations:
+    """The equations with as many of the ties as are needed to choose parameters.
+
+    Parameters
+    ----------
+    tied : Equations
+        With ties.
+    """
     step = -(-len(tied.ties) // SETTINGS.tie_sample)
     return replace(tied, ties=tied.ties.select(slice(None, None, step)))
 

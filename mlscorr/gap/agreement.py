@@ -11,7 +11,7 @@ from mlscorr.gap.observe.rows import Background, Rows
 
 @dataclass(frozen=True)
 class Agreement:
-    """Of the things of one channel, as they were recorded.
+    """Of the things of one channel, as recorded, less the effects that the simulator has.
 
     Parameters
     ----------

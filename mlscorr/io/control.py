@@ -165,9 +165,8 @@ def _refuse(path, faults):
     """Raise all that is wrong with the rows of a file at once, if anything is."""
     number, limit = len(faults), SETTINGS.named_faults
     if number > 1:
-        first = f"{path} has {number} faults."
         more = [f"And {number - limit} more like these."] if number > limit else []
-        faults = [first, *faults[:limit], *more]
+        faults = [f"{path} has {number} faults.", *faults[:limit], *more]
     if faults:
         raise ValueError(" ".join(faults))
 
@@ -233,7 +232,7 @@ def _faults(path, row):
             )
     normal = [row.get(name, np.nan) for name in NORMAL]
     if np.isfinite(normal).any() and not (np.isfinite(normal).all() and np.any(normal)):
-        yield (f"{who} has the normal {normal}; give three numbers, not all zero, or none.")
+        yield f"{who} has the normal {normal}; give three numbers, not all zero, or none."
 
 
 def _likely_unit(size):

@@ -62,7 +62,8 @@ def accuracy(document: dict) -> Iterator[Statement]:
         for part in parts
     ]
     rating, items = "amber" if any(is_worse) else "green", (*sizes, *_moved(document))
-    yield Statement("Accuracy", rating, f"The recorded cloud is {answer} stated.", items)
+    less = ", less what the simulator has in it," if document["simulator"]["effects"] else ""
+    yield Statement("Accuracy", rating, f"The recorded cloud{less} is {answer} stated.", items)
 
 
 def _moved(document):

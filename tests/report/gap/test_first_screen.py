@@ -30,6 +30,12 @@ def test_a_good_survey_is_good_in_both():
     assert "as accurate as stated" in rows["Accuracy"]["sentence"]
 
 
+def test_what_the_simulator_has_already_is_off_the_residuals():
+    "A second round says so, for the cloud itself is still as it was"
+    _, rows = facts(gap_document("none", simulator={"effects": [{"name": "time_offset"}]}))
+    assert rows["Accuracy"]["sentence"].startswith("The recorded cloud, less what the simulator")
+
+
 @pytest.mark.parametrize(
     ("left_out", "rating"),
     [
