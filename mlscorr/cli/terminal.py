@@ -20,11 +20,13 @@ _voice = {"quiet": False}  # of this process's stderr
 _repeats: list[threading.Timer] = []  # of interruptions, until one is heeded
 
 
-def be_quiet(quiet: bool) -> bool:
-    """Say nothing more than errors and warnings, if so.
+def be_quiet(context: typer.Context, quiet: bool) -> bool:
+    """Say nothing more than errors and warnings until the command ends, if so.
 
     Parameters
     ----------
+    context : typer.Context
+        Of the command.
     quiet : bool
 
     Returns
@@ -33,6 +35,7 @@ def be_quiet(quiet: bool) -> bool:
         The same.
     """
     _voice["quiet"] = quiet
+    context.call_on_close(lambda: _voice.update(quiet=False))
     return quiet
 
 

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
+from mlscorr.cli.terminal import is_quiet
 from mlscorr.io.control import read_control
 from mlscorr.pipeline.faults import Faults, find_faults
 
@@ -177,6 +178,7 @@ def test_the_command_says_what_the_function_returns(survey):
     assert bad.exit_code == 2
     assert bad.stderr.splitlines()[0].startswith("Error: control.file of ")
     assert bad.stderr.splitlines()[-1] == "1 fault"
+    assert not is_quiet()  # a command that was asked to be quiet leaves the next as it was
 
 
 def test_a_fault_is_kept_once_and_where_it_is(tmp_path):
