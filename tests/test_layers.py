@@ -26,7 +26,7 @@ GAP_FLOORS = (  # of the rooms within gap, likewise
     ("observe",),
     ("signatures",),
     ("infer",),
-    ("close", "plan"),
+    ("close", "plan", "train"),
     ("document",),  # and the door, __init__, which opens on all of them
 )
 GAP_FLOOR = {room: number for number, rooms in enumerate(GAP_FLOORS) for room in rooms}
@@ -44,6 +44,7 @@ SIMULATOR = (  # floors inside simulate; its rooms on one floor do not know each
     ("recording", "scenario_file", "simulator_file"),
     ("survey",),
     ("write", "displacement", "random_survey"),
+    ("mechanisms",),
 )
 SIMULATOR_FLOOR = {room: number for number, rooms in enumerate(SIMULATOR) for room in rooms}
 MODULES = sorted(

@@ -1,24 +1,24 @@
 """One survey of a blind check: simulated, sized by its own geometry, stripped of its truth."""
 
-import importlib.util
 import json
 import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
+from mlscorr.blind.grading import grading_mechanisms
 from mlscorr.blind.mix import RANDOM, SYSTEMATIC, Case
 from mlscorr.blind.settings import SETTINGS
-from mlscorr.blind.sizing import Ruler, draw_effect, likeness, shift_by
 from mlscorr.effects import EFFECTS
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
 from mlscorr.io.survey_file import read_survey
+from mlscorr.simulate.mechanisms import load_mechanisms
 
 KINDS = {kind.name: kind for kind in EFFECTS}
 TRUTH = ("truth.json", "truth.npz")
@@ -43,7 +43,7 @@ def make_case(
     find_targets : function
         From a Survey to its Finding, as the diagnosis has it.
     mechanisms : Path, optional
-        File with MECHANISMS, LEADS and UNITS.
+        File with MECHANISMS, LEADS and UNITS; those that grade by default.
 
     Raises
     ------
@@ -141,12 +141,13 @@ def _of_effects(drawn):
     }
 
 
-def load_mechanisms(path: Path) -> ModuleType:
-    """Module with MECHANISMS (functions), LEADS (words) and UNITS (unit, largest) by name.
+def outside_mechanisms(path: Path | None = None) -> dict[str, tuple[Callable, tuple, tuple]]:
+    """Functions, units and leads of mechanisms by name: those that grade, or those of a file.
 
     Parameters
     ----------
-    path : Path
+    path : Path, optional
+        File with MECHANISMS, UNITS and LEADS.
 
     Raises
     ------
@@ -155,29 +156,23 @@ def load_mechanisms(path: Path) -> ModuleType:
     FileNotFoundError
         When the file is.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist; it should hold MECHANISMS.")
-    spec = importlib.util.spec_from_file_location("mechanisms", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    for name in ("MECHANISMS", "LEADS", "UNITS"):
-        if set(getattr(module, name, {})) != set(getattr(module, "MECHANISMS", {"": None})):
-            raise ValueError(
-                f"{path} has no {name} with the names of its MECHANISMS: a file of mechanisms "
-                "needs MECHANISMS (functions), LEADS (words) and UNITS (unit and largest size)."
-            )
-    return module
+    if path is None:
+        return {each.name: (each, each.unit, each.lead) for each in grading_mechanisms()}
+    module = load_mechanisms(path)
+    return {
+        name: (function, module.UNITS[name], module.LEADS[name])
+        for name, function in module.MECHANISMS.items()
+    }
 
 
 def _mechanism(ruler, known, case, path, rng):
     """The part of a label that tells of a mechanism, and how it moves points; None, None when
     the geometry shows none that is unlike all effects.
     """
-    module, names = load_mechanisms(path), list(case.names)
+    outside, names = outside_mechanisms(path), list(case.names)
     for _ in range(SETTINGS.tries):
-        name = names.pop(0) if names else str(rng.choice(list(module.MECHANISMS)))
-        function, (unit, largest) = module.MECHANISMS[name], module.UNITS[name]
+        name = names.pop(0) if names else str(rng.choice(list(outside)))
+        function, (unit, largest), lead = outside[name]
         chance, sign = int(rng.integers(2**32)), float(rng.choice([-1, 1]))
 
         def move(points, size=1.0, function=function, chance=chance):
@@ -195,7 +190,7 @@ def _mechanism(ruler, known, case, path, rng):
             "mdb": [case.mdb],
             "likeness": {name: like},
             "mechanism": {
-                "name": name, "size": size, "unit": unit, "lead": list(module.LEADS[name]),
+                "name": name, "size": size, "unit": unit, "lead": list(lead),
             },
         }  # fmt: skip
         return part, partial(move, size=size)

@@ -24,10 +24,6 @@ class Settings:
     # MDB, of pairs, withheld ones and mechanisms: what a diagnosis should not miss
     noise_sizes: tuple[float, float] = (2.0, 8.0)
     # MDB of noise, whose information grows with the square of its size
-    event_widths: tuple[float, float] = (2.0, 30.0)
-    # s, between which the width of an event is drawn, evenly by its log: a lost fix to a tunnel
-    least_size: float = 0.5
-    # MDB: an effect that stays below at its largest credible value doesn't show
     tries: int = 12
     # surveys, and effects in each, where one shows none of what it should have
     likeness: float = 0.8

@@ -23,7 +23,8 @@ def make(
     cases: Annotated[int, typer.Option(min=1, help="Number of surveys.")] = 300,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same surveys.")] = 1,
     mechanisms: Annotated[
-        Path | None, typer.Option(help="Python file with mechanisms that no library knows.")
+        Path | None,
+        typer.Option(help="Python file with mechanisms of your own, instead of those that grade."),
     ] = None,
     workers: Workers = 2,
     quiet: Quiet = False,

@@ -17,7 +17,7 @@ from time import monotonic
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.blind.cases import load_mechanisms, make_case
+from mlscorr.blind.cases import make_case, outside_mechanisms
 from mlscorr.blind.mix import mix
 from mlscorr.blind.scoring import score
 from mlscorr.effects import EFFECTS
@@ -47,7 +47,7 @@ def make_blind(
     cases : int
     seed : int
     mechanisms : Path, optional
-        File with mechanisms that no library knows; none of these cases without it.
+        File with mechanisms that no library knows; by default the half of the grammar that grades.
     workers : int
     progress : function, optional
         progress(title, total) returns a function of the number of cases just done.
@@ -57,9 +57,7 @@ def make_blind(
     ValueError
         When OUT holds another check, or a case can't be made.
     """
-    out, names = Path(out), ()
-    if mechanisms is not None:
-        names = tuple(load_mechanisms(mechanisms).MECHANISMS)
+    out, names = Path(out), tuple(outside_mechanisms(mechanisms))
     plan = {"cases": cases, "seed": seed, "mechanisms": list(names)}
     key = _opened(out, plan)
     drawn = mix(cases, np.random.default_rng([seed]), names)

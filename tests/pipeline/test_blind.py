@@ -49,7 +49,7 @@ def test_goes_on_where_it_stopped_and_refuses_another_check(made, tmp_path):
     before = (out / "key.json").read_text()
     assert make_blind(out, CASES, SEED) == CASES
     assert (out / "key.json").read_text() == before
-    with pytest.raises(ValueError, match=r"2 cases with seed 5 and 0 mechanisms, not this one"):
+    with pytest.raises(ValueError, match=r"2 cases with seed 5 and 704 mechanisms, not this one"):
         make_blind(out, CASES, SEED + 1)
 
 

@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mlscorr
-from mlscorr.blind.cases import load_mechanisms
 from mlscorr.blind.mix import SYSTEMATIC
 from mlscorr.frames import attitude_from_angles
 from mlscorr.simulate.displacement import RecordedPoints
+from mlscorr.simulate.mechanisms import load_mechanisms
 from mlscorr.survey import Mounting, Trajectory
 
 FILE = Path(__file__).with_name("mechanisms.py")

@@ -7,19 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.blind.settings import SETTINGS
 from mlscorr.collocation import Whitener
 from mlscorr.effects import Effect
 from mlscorr.gap.infer.error_models import error_models
 from mlscorr.gap.infer.observations import Observations, model_likelihood
 from mlscorr.gap.infer.parameters import random_information
 from mlscorr.gap.infer.separability import explained_square
-from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
+from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Rows, background
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.signatures import Signature, signature, signatures
 from mlscorr.simulate.displacement import RecordedPoints
 from mlscorr.survey import Survey
+
+EVENT_WIDTHS = (2.0, 30.0)  # s, drawn evenly by their logs: a lost fix to a tunnel
+LEAST_SIZE = 0.5  # MDB: an effect that stays below at its largest credible value doesn't show
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class Ruler:
 
     def size(self, shift: np.ndarray) -> float:
         """Size of a shift (m,) of the rows, in minimal detectable biases."""
-        return float(np.sqrt(max(self.normal(shift[:, None])[0, 0], 0.0)) / INFERENCE.detectable)
+        return float(np.sqrt(max(self.normal(shift[:, None])[0, 0], 0.0)) / SETTINGS.detectable)
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ def draw_effect(
     if way is None:
         return None
     way, size = _credible(sign, way, mdb)
-    if size < min(SETTINGS.least_size, mdb):
+    if size < min(LEAST_SIZE, mdb):
         return None
     parameters = dict(zip(sign.parameters, map(float, way), strict=True))
     parameters |= {key: sign.fixed[key] for key in kind.moment()}
@@ -128,7 +130,7 @@ def _random(ruler, sign, mdb):
     information, power = random_information(ruler.rows, ruler.observations, sign)
     if information == 0:
         return None
-    return np.array([(mdb * INFERENCE.detectable / np.sqrt(information)) ** (1 / power)])
+    return np.array([(mdb * SETTINGS.detectable / np.sqrt(information)) ** (1 / power)])
 
 
 def _credible(sign, way, mdb):
@@ -153,7 +155,7 @@ def _fixed(kind, ruler, rng):
         time = np.quantile(times, rng.random())  # as dense in time as what was seen
         fixed["time"] = float(round(time - rows.reference.start, 3))
     if "width" in kind.moment():
-        fixed["width"] = float(np.exp(rng.uniform(*np.log(SETTINGS.event_widths))))
+        fixed["width"] = float(np.exp(rng.uniform(*np.log(EVENT_WIDTHS))))
     return fixed
 
 

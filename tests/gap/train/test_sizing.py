@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from mlscorr.blind.mix import RANDOM, SYSTEMATIC
-from mlscorr.blind.sizing import Ruler, draw_effect, likeness, shift_by
 from mlscorr.effects import EFFECTS
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
 
 KINDS = {kind.name: kind for kind in EFFECTS}
 MDB = 3.0
