@@ -205,3 +205,29 @@ def mounting_partials(
     rotation = pose.attitude.as_matrix()
     beam = pose.attitude.inv().apply(position - pose.position) - mounting.lever_arm
     return np.concatenate([rotation, -rotation @ skew(beam)], axis=2)
+
+
+def scanner_partials(
+    trajectory: Trajectory, mounting: Mounting, position: np.ndarray, gps_time: np.ndarray
+) -> np.ndarray:
+    """Partial derivatives (n, 3, 2) of map points by the scanner's ranges and encoder, from Eq. 1.
+
+    The range is longer by so much (m), the scan angle by so much of itself (ratio), from the zero
+    beam X_L about Z_L and from -180 to 180 deg.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    mounting : Mounting
+    position : (n, 3) array
+        The map points. Units: m.
+    gps_time : (n,) array
+        Units: s.
+    """
+    beam = to_scanner(trajectory, mounting, position, gps_time)
+    angle = np.arctan2(beam[:, 1], beam[:, 0])
+    along = beam / np.linalg.norm(beam, axis=1, keepdims=True)
+    across = angle[:, None] * np.cross([0.0, 0.0, 1.0], beam)
+    attitude = trajectory.at(gps_time).attitude
+    turned = [attitude.apply(mounting.boresight.apply(part)) for part in (along, across)]
+    return np.stack(turned, axis=2)

@@ -16,7 +16,11 @@ what they leave open of them is a part of the stated sigmas.
 from mlscorr.estimate.calibration import Calibration, MountingEstimate
 from mlscorr.estimate.guards import COMPONENTS
 from mlscorr.estimate.mounting import believed_mounting, estimate_mounting
-from mlscorr.estimate.mounting_check import MountingCheck, find_mounting_error, scanner_warnings
+from mlscorr.estimate.mounting_check import (
+    find_mounting_error,
+    mounting_warnings,
+    scanner_warnings,
+)
 from mlscorr.estimate.placement import (
     NextControl,
     PlannedAccuracy,
@@ -30,6 +34,7 @@ from mlscorr.estimate.pos_error import (
     previewed_correction,
     with_ties,
 )
+from mlscorr.estimate.scanner_errors import with_scanner_errors
 from mlscorr.estimate.screening import Outlier
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
@@ -43,7 +48,6 @@ __all__ = [
     "SETTINGS",
     "Calibration",
     "Estimate",
-    "MountingCheck",
     "MountingEstimate",
     "NextControl",
     "Outlier",
@@ -59,11 +63,13 @@ __all__ = [
     "estimate_correction",
     "estimate_mounting",
     "find_mounting_error",
+    "mounting_warnings",
     "place_control",
     "predict_accuracy",
     "previewed_correction",
     "previewed_mounting",
     "scanner_warnings",
     "tie_value",
+    "with_scanner_errors",
     "with_ties",
 ]

@@ -29,6 +29,43 @@ MOUNTING_COMPONENTS = (
     "boresight about up",
 )
 
+SCANNER_COMPONENTS = ("range offset", "encoder scale")
+
+
+@dataclass(frozen=True)
+class ScannerErrors:
+    """What a scanner's own ranges and encoder lack.
+
+    Parameters
+    ----------
+    correction, sigma : (2,) array
+        To be added to each range (m), and to each scan angle by its size (ratio).
+    determined, significant : (2,) bool array
+        Whether this geometry can tell it at all; whether the mounting is free of it.
+    """
+
+    correction: np.ndarray
+    sigma: np.ndarray
+    determined: np.ndarray
+    significant: np.ndarray
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence where something is significant."""
+        rows = zip(SCANNER_COMPONENTS, self.correction, self.sigma, self.significant, strict=True)
+        lacks = [
+            f"{part} {1000 * a:.1f} ± {1000 * s:.1f} {unit}"
+            for (part, a, s, wrong), unit in zip(rows, ("mm", "mrad per rad"), strict=True)
+            if wrong
+        ]
+        if not lacks:
+            return ()
+        return (
+            f"The scanner itself is off: it lacks {', '.join(lacks)}. The mounting is given free "
+            "of that, but the points keep it: set it in the scanner's own software, export the "
+            "clouds anew, and calibrate again.",
+        )
+
 
 @dataclass(frozen=True)
 class MountingEstimate:
@@ -86,6 +123,8 @@ class Calibration(Summary):
         Of warnings, those on the inputs.
     ties : TieResiduals, optional
         What two passes both saw, and what the mounting and the POS error leave of it.
+    scanner : ScannerErrors, optional
+        What ranges and encoder lack.
     """
 
     trajectory: Trajectory
@@ -99,6 +138,7 @@ class Calibration(Summary):
     equations: Equations
     notes: tuple[str, ...] = ()
     ties: TieResiduals | None = None
+    scanner: ScannerErrors | None = None
 
     @property
     def posterior(self) -> Posterior:
@@ -120,6 +160,7 @@ class Calibration(Summary):
             *global_test_warnings(self.guards),
             *self.screening.warnings,
             *(() if self.ties is None else self.ties.warnings),
+            *(() if self.scanner is None else self.scanner.warnings),
         )
 
     @property

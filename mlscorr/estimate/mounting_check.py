@@ -1,20 +1,17 @@
 """Whether ties disagree as a wrong mounting makes them, rather than as a POS drifts.
 
-Drift depends on time, a boresight's part on the direction of travel. The mounting's parameters
-stand beside trend and signals as six more columns M of A; with P = V^-1 - V^-1 A (A'V^-1 A)^-1
-A'V^-1, which the solver applies to any misclosures, they are (M'PM)^-1 M'Pl (Mao et al. 2015,
-Eq. 13-18). Nothing in the estimate changes.
+Drift depends on time, a boresight's part on the direction of travel.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from mlscorr.estimate.added_unknowns import AddedUnknowns
 from mlscorr.estimate.calibration import MOUNTING_COMPONENTS
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.pos_error import Estimate
@@ -24,58 +21,48 @@ from mlscorr.frames import mounting_partials
 from mlscorr.survey import Matched, Mounting
 
 
-@dataclass(frozen=True)
-class MountingCheck:
-    """What a mounting lacks by the ties of a correction, and whether that is chance.
+def mounting_warnings(check: AddedUnknowns | None) -> tuple[str, ...]:
+    """A sentence where a wrong mounting is significant, and large enough to matter.
 
     Parameters
     ----------
-    correction, sigma : (6,) array
-        Lever arm (m) and boresight (rad) about right, forward, up.
-    statistic, critical : float
-        Chi-squared of six degrees of freedom, and its critical value.
+    check : AddedUnknowns, optional
+        Of find_mounting_error.
     """
-
-    correction: np.ndarray
-    sigma: np.ndarray
-    statistic: float
-    critical: float
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """A sentence where a wrong mounting is significant, and large enough to matter."""
-        size, sigma = np.abs(self.correction), self.sigma
-        least = np.repeat(SETTINGS.determined_sigma, 3)
-        is_wrong = size > np.maximum(SETTINGS.setup_sigmas * sigma, least)
-        if self.statistic <= self.critical or not is_wrong.any():
-            return ()
-        scale = np.repeat([1.0, np.degrees(1.0)], 3)
-        values = [
-            f"{part} {a:.{decimals}f} ± {s:.{decimals}f} {unit}"
-            for part, a, s, decimals, unit in zip(
-                MOUNTING_COMPONENTS,
-                self.correction * scale,
-                sigma * scale,
-                [3] * 3 + [2] * 3,
-                ["m"] * 3 + ["deg"] * 3,
-                strict=True,
-            )
-        ]
-        lacks = ", ".join(value for value, wrong in zip(values, is_wrong, strict=True) if wrong)
-        return (
-            "Passes disagree by their direction of travel (arrows of opposite passes are "
-            f"opposite), as a wrong mounting makes them: it lacks {lacks} "
-            f"(chi-squared {self.statistic:.0f}, critical {self.critical:.0f}). "
-            "This correction takes that for drift. Run mlscorr calibrate first, and correct with "
-            "the mounting that it writes.",
+    is_wrong = np.zeros(6, bool)
+    if check is not None:
+        is_wrong = check.is_wrong(np.repeat(SETTINGS.determined_sigma, 3))
+    if not is_wrong.any():
+        return ()
+    scale = np.repeat([1.0, np.degrees(1.0)], 3)
+    values = [
+        f"{part} {a:.{decimals}f} ± {s:.{decimals}f} {unit}"
+        for part, a, s, decimals, unit in zip(
+            MOUNTING_COMPONENTS,
+            check.correction * scale,
+            check.sigma * scale,
+            [3] * 3 + [2] * 3,
+            ["m"] * 3 + ["deg"] * 3,
+            strict=True,
         )
+    ]
+    lacks = ", ".join(value for value, wrong in zip(values, is_wrong, strict=True) if wrong)
+    return (
+        "Passes disagree by their direction of travel (arrows of opposite passes are "
+        f"opposite), as a wrong mounting makes them: it lacks {lacks} "
+        f"(chi-squared {check.statistic:.0f}, critical {check.critical:.0f}). "
+        "This correction takes that for drift. Run mlscorr calibrate first, and correct with "
+        "the mounting that it writes.",
+    )
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def find_mounting_error(
     estimate: Estimate, matched: Matched, mounting: Mounting
-) -> MountingCheck | None:
+) -> AddedUnknowns | None:
     """Test the recorded mounting by the ties of a correction; None without any.
+
+    Lever arm (m) and boresight (rad) about right, forward, up are the unknowns.
 
     Parameters
     ----------
@@ -97,15 +84,7 @@ def find_mounting_error(
         trajectory, mounting, targets.observations.position, targets.gps_time
     )
     columns = np.vstack([control.reshape(-1, 6), ties])
-    weights = [_weights(estimate, control[:, :, k], ties[:, k]) for k in range(6)]
-    weights = np.column_stack(weights)
-    matrix = columns.T @ weights + np.diag(prior_sigma(mounting) ** -2)
-    covariance = np.linalg.inv(matrix)
-    right = weights.T @ np.append(equations.misclosure.ravel(), equations.ties.misclosure)
-    correction = covariance @ right
-    critical = float(chi2.isf(SETTINGS.significance, len(correction)))
-    sigma = np.sqrt(np.diag(covariance))
-    return MountingCheck(correction, sigma, float(right @ correction), critical)
+    return AddedUnknowns.of(equations, estimate.parameters, columns, prior_sigma(mounting))
 
 
 def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
@@ -141,10 +120,3 @@ def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
                 "but its points keep it. Run mlscorr calibrate first, and correct with the "
                 "mountings that it writes."
             )
-
-
-def _weights(estimate, control, ties):
-    """V^-1 (l - A x) of any misclosures, with the parameters of the estimate."""
-    equations = estimate.equations
-    changed = replace(equations, misclosure=control, ties=replace(equations.ties, misclosure=ties))
-    return changed.solve(estimate.parameters).weights

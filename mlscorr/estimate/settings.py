@@ -72,6 +72,11 @@ class Settings:
     iterations: int = 10  # of Gauss-Newton; a boresight wrong by degrees needs four
     # One sigma of what is known without any measurement: a vehicle's size, and a drawing
     unmeasured: tuple[float, float] = (1.0, float(np.radians(5.0)))  # m, rad
+    # Of a scanner's ranges (m) and encoder (ratio), without any measurement: ten times what data
+    # sheets state of them (RIEGL VQ-250: 5 to 10 mm; 0.001 deg of resolution at 100 deg)
+    unmeasured_scanner: tuple[float, float] = (0.1, 1e-3)
+    # What is as large as the accuracy of a lever arm, or as much at a point 10 m and 60 deg away
+    least_scanner_error: tuple[float, float] = (0.005, 5e-4)
     # A site determines what it tells better than a tape: 2 cm, or as much at a point 10 m away
     determined_sigma: tuple[float, float] = (0.02, 0.002)  # m, rad
 

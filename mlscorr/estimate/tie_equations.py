@@ -74,7 +74,7 @@ class TieEquations:
             number of their scanner.
         """
         times, places = ties.gps_time.ravel(), ties.place.reshape(-1, 3)
-        along = _along(ties.direction, pose_partials(trajectory, places, times))
+        along = along_ties(ties.direction, pose_partials(trajectory, places, times))
         epochs = _epochs(times, stated.history)
         return cls(
             gps_time=epochs.reshape(-1, 2),
@@ -160,7 +160,7 @@ def mounting_columns(
     for number, mounting in mountings.items():
         partials = mounting_partials(trajectory, mounting, places, times)
         is_its = (ties.scanner == number)[:, :, None]
-        columns.append((_along(ties.direction, partials) * is_its).sum(axis=1))
+        columns.append((along_ties(ties.direction, partials) * is_its).sum(axis=1))
     return np.hstack(columns)
 
 
@@ -178,7 +178,14 @@ def _epochs(gps_time, history):
     return (gps_time - since) + mean[number]
 
 
-def _along(direction, partials):
-    """n^T of partial derivatives (n, 2, j) at both views (2 n, 3, j), the second with minus."""
+def along_ties(direction: np.ndarray, partials: np.ndarray) -> np.ndarray:
+    """Partial derivatives (n, 2, j) of ties by what moves both views, the second with minus.
+
+    Parameters
+    ----------
+    direction : (n, 3) array
+    partials : (2 n, 3, j) array
+        Of the places of both views, one after the other.
+    """
     by_view = partials.reshape(len(direction), 2, 3, partials.shape[2])
     return SIGNS[:, None] * np.einsum("ni,nvij->nvj", direction, by_view)

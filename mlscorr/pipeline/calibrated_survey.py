@@ -11,7 +11,7 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import Calibration
-from mlscorr.estimate.calibration import MOUNTING_COMPONENTS
+from mlscorr.estimate.calibration import MOUNTING_COMPONENTS, SCANNER_COMPONENTS
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.evaluate.scores import score
 from mlscorr.evaluate.target_rows import surveyed_rows
@@ -141,6 +141,7 @@ class CalibratedSurvey(Summary):
             },
             **{method: self._method(method) for method in ("lsc", "ls")},
             "determined": calibration.determined.tolist(),
+            "scanner_errors": _scanner_errors(calibration.scanner),
             "parameters": _parameters(calibration.parameters),
             "outliers": [vars(outlier) for outlier in calibration.outliers],
             "targets": [row.document() for row in rows],
@@ -235,6 +236,18 @@ def write_calibrated_survey(
 
 def _mounting(mounting):
     return dict(zip(("lever_arm", "boresight"), mounting_values(mounting), strict=True))
+
+
+def _scanner_errors(errors):
+    """What ranges (m) and encoder (ratio) lack; None where nobody looked."""
+    if errors is None:
+        return None
+    columns = {name: values.tolist() for name, values in vars(errors).items()}
+    rows = zip(*columns.values(), strict=True)
+    names = (component.replace(" ", "_") for component in SCANNER_COMPONENTS)
+    return {
+        name: dict(zip(columns, row, strict=True)) for name, row in zip(names, rows, strict=True)
+    }
 
 
 def _parameters(weighed):

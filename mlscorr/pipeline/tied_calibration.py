@@ -14,6 +14,7 @@ from mlscorr.estimate import (
     calibration_with_ties,
     estimate_mounting,
     previewed_mounting,
+    with_scanner_errors,
 )
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces
@@ -69,7 +70,7 @@ def estimate_site(
     if not ties:
         control, check, finding = find_control(survey, rng, progress)
         calibration = estimate_mounting(survey.trajectory, survey.mounting, control, survey.pos)
-        return control, check, finding, calibration
+        return control, check, finding, with_scanner_errors(calibration, control)
     collector = TieCollector(survey)
 
     def read(file):
@@ -88,7 +89,7 @@ def estimate_site(
     calibration = tie_mounting(survey, start, control, collector.features())
     if not is_enough and (calibration.ties is None or not calibration.ties.used.any()):
         raise ValueError(" ".join([NOTHING_CALIBRATES.format(survey.path, number), *notes]))
-    return control, check, finding, calibration
+    return control, check, finding, with_scanner_errors(calibration, control)
 
 
 def tie_mounting(

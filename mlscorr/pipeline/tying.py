@@ -14,6 +14,7 @@ from mlscorr.estimate import (
     believed_correction,
     estimate_correction,
     find_mounting_error,
+    mounting_warnings,
     previewed_correction,
     scanner_warnings,
     with_ties,
@@ -112,7 +113,7 @@ def _with_mounting_checked(survey, estimate, control):
     if survey.mounting is None:
         return estimate
     check = find_mounting_error(estimate, control, survey.mounting)
-    return replace(estimate, notes=(*estimate.notes, *check.warnings)) if check else estimate
+    return replace(estimate, notes=(*estimate.notes, *mounting_warnings(check)))
 
 
 def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Estimate:

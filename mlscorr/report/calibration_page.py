@@ -45,7 +45,8 @@ def calibration_screen(content: dict[str, Any], rows: list[TargetRow]) -> dict[s
     if control.surveyed:
         facts.append(control_statement(control))
     facts.append(check_statement(PointCounts.of(rows, "check")))
-    return statements_section([*facts, *_ties(content), *warning_statements(content["warnings"])])
+    facts += [*_scanner(content), *_ties(content)]
+    return statements_section([*facts, *warning_statements(content["warnings"])])
 
 
 def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
@@ -118,6 +119,25 @@ def _remainder(content):
         return Statement("Result", "amber", f"{sentence}: the fit alone, which proves little.")
     rating = "green" if after <= before else "red"
     return Statement("Result", rating, f"{sentence}; they took no part.")
+
+
+def _scanner(content) -> Iterator[Statement]:
+    """What the scanner's own ranges and encoder lack."""
+    errors = content["scanner_errors"]
+    if errors is None:
+        return
+    ranges, encoder = errors["range_offset"], errors["encoder_scale"]
+    sentence = (
+        f"Ranges lack {millimetres(ranges['correction'])} ± {millimetres(ranges['sigma'])} mm, "
+        f"scan angles {1e3 * encoder['correction']:.2f} ± {1e3 * encoder['sigma']:.2f} mrad per "
+        "rad"
+    )
+    if any(row["significant"] for row in errors.values()):
+        yield Statement("Scanner", "amber", f"{sentence}; the mounting is free of it.")
+    elif all(row["determined"] for row in errors.values()):
+        yield Statement("Scanner", "green", f"{sentence}: nothing significant.")
+    else:
+        yield Statement("Scanner", "green", f"{sentence}; this geometry hardly tells it.")
 
 
 def _ties(content) -> Iterator[Statement]:

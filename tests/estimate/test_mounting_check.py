@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import MountingCheck, estimate_correction, find_mounting_error, with_ties
+from mlscorr.estimate import (
+    estimate_correction,
+    find_mounting_error,
+    mounting_warnings,
+    with_ties,
+)
+from mlscorr.estimate.added_unknowns import AddedUnknowns
 from mlscorr.survey import Mounting
 from tests.beds.tied_passes import tied_passes
 
@@ -36,13 +42,13 @@ def checked(seed, degrees, number=120):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_drift_alone_is_no_boresight(seed):
     "Half a metre of drift and a right mounting: no sentence"
-    assert checked(seed, [0.0, 0.0, 0.0]).warnings == ()
+    assert mounting_warnings(checked(seed, [0.0, 0.0, 0.0])) == ()
 
 
 def test_a_boresight_of_a_degree_is_named():
     "The sentence says by how much, and which command finds it"
     check = checked(1, [0.0, 1.0, 0.0])
-    (sentence,) = check.warnings
+    (sentence,) = mounting_warnings(check)
     assert "mlscorr calibrate" in sentence
     error = np.degrees(check.correction[3:]) - [0.0, 1.0, 0.0]
     assert (np.abs(error) < 3 * np.degrees(check.sigma[3:])).all()
@@ -52,10 +58,11 @@ def test_a_boresight_of_a_degree_is_named():
 def test_a_lever_arm_is_named_where_it_exceeds_its_sigma_and_alone():
     "As two passes of a good POS tell of 9 cm; up, which they don't tell, is not named"
     lacks, sigma = [-0.087, 0.004, 0.094, 0.0, 0.0, 0.0], [0.011, 0.011, 0.129, 4e-4, 3e-4, 2e-4]
-    check = MountingCheck(np.array(lacks), np.array(sigma), 68.6, 22.5)
-    (sentence,) = check.warnings
+    covariance = np.diag(np.square(sigma))
+    check = AddedUnknowns(np.array(lacks), covariance, np.zeros((0, 6)), 68.6, 22.5)
+    (sentence,) = mounting_warnings(check)
     assert "it lacks lever arm right -0.087 ± 0.011 m (chi-squared 69" in sentence
-    assert replace(check, statistic=20.0).warnings == ()
+    assert mounting_warnings(replace(check, statistic=20.0)) == ()
 
 
 def test_without_ties_nothing_is_tested():

@@ -6,10 +6,12 @@ from mlscorr.report import calibration_page, calibration_screen
 from tests.beds.reports import drive, fabricate, score_of, words
 
 MOUNTING = {"lever_arm": [0.1, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0]}
+RANGES = {"correction": 0.012, "sigma": 0.001, "determined": True, "significant": False}
+SCANNER = {"range_offset": RANGES, "encoder_scale": RANGES | {"correction": 1e-4, "sigma": 2e-4}}
 PARAMETERS = {"position_scale": 1.0, "position_time": 30.0}
 
 
-def calibrated(determined=True, worse=False):
+def calibrated(determined=True, worse=False, significant=False):
     "Content of calibration.json of a scanner whose lever arm lacks 9 cm to the left, and its rows"
     rows = fabricate(drive())[2].targets
     scores = {role: score_of([r for r in rows if r.group == role]) for role in ("control", "check")}
@@ -26,6 +28,7 @@ def calibrated(determined=True, worse=False):
         "lsc": method,
         "ls": method,
         "determined": [True, True, determined, True, True, True],
+        "scanner_errors": SCANNER | {"range_offset": RANGES | {"significant": significant}},
         "parameters": PARAMETERS,
         "targets": [row.document() for row in rows],
         "ties": None,
@@ -50,6 +53,18 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
 def test_a_calibration_that_makes_check_points_worse_is_red():
     "A surveyor must not go on with it unwarned"
     assert calibrated(worse=True)["rating"] == "red"
+
+
+def test_a_scanner_that_is_off_is_amber():
+    "Ranges that lack 12 mm, and an encoder that lacks nothing, are said with their sigmas"
+    sentence = "Ranges lack 12 ± 1.0 mm, scan angles 0.10 ± 0.20 mrad per rad"
+    for significant, rating, end in (
+        (False, "green", ": nothing significant."),
+        (True, "amber", "; the mounting is free of it."),
+    ):
+        rows = calibrated(significant=significant)["statements"]
+        (row,) = (row for row in rows if row["what"] == "Scanner")
+        assert (row["rating"], row["sentence"]) == (rating, sentence + end)
 
 
 def test_each_scanner_has_its_part():

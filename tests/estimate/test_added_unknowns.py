@@ -1,0 +1,56 @@
+"""Further unknowns beside trend and signals: what they are is what the full solution says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.added_unknowns import AddedUnknowns, misclosures_of, with_misclosures
+from mlscorr.estimate.tie_equations import TieEquations
+from tests.beds.tied_passes import tied_passes
+
+
+@pytest.fixture(scope="module")
+def tied():
+    "Equations of control and ties, and parameters"
+    survey = tied_passes(1, number=60)
+    alone = estimate_correction(survey.trajectory, survey.matched)
+    equations = alone.equations
+    rows = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
+    return replace(equations, ties=rows), alone.parameters
+
+
+def columns_of(equations, seed):
+    "Two columns at random"
+    return np.random.default_rng(seed).standard_normal((len(misclosures_of(equations)), 2))
+
+
+def test_what_was_added_to_the_misclosures_is_found(tied):
+    "Columns times known sizes of centimetres, within three sigmas, and highly significant"
+    equations, parameters = tied
+    columns, sizes = columns_of(equations, 1), np.array([0.03, -0.02])
+    changed = with_misclosures(equations, misclosures_of(equations) + columns @ sizes)
+    added = AddedUnknowns.of(changed, parameters, columns, np.ones(2))
+    assert (np.abs(added.correction - sizes) < 3 * added.sigma).all()
+    assert (added.sigma < 0.002).all()  # m
+    assert added.statistic > 10 * added.critical
+    assert added.is_wrong(np.array([0.005, 0.025])).tolist() == [True, False]
+
+
+def test_the_response_is_what_the_trend_takes_of_a_unit(tied):
+    "The trend without the unknowns differs by response times size from that of clean misclosures"
+    equations, parameters = tied
+    columns, sizes = columns_of(equations, 2), np.array([0.03, -0.02])
+    added = AddedUnknowns.of(equations, parameters, columns, np.ones(2))
+    changed = with_misclosures(equations, misclosures_of(equations) + columns @ sizes)
+    before, after = (each.solve(parameters).trend for each in (equations, changed))
+    assert np.abs(after - before - added.response @ sizes).max() < 1e-9  # m
+
+
+def test_nothing_added_is_chance(tied):
+    "Columns at random explain no more than chance does"
+    equations, parameters = tied
+    added = AddedUnknowns.of(equations, parameters, columns_of(equations, 3), np.ones(2))
+    assert added.statistic < added.critical
+    assert not added.is_wrong(np.zeros(2)).any()
