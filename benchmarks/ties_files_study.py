@@ -1,11 +1,12 @@
 """What ties between passes add through files: clouds there and back, targets and ties found.
 
-python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--scanners 2]
+python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--scanners 2] [--elsewhere]
 
 RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
 far apart the trajectories of both passes are left in a place. Without control only the latter is
 claimed. Drives are the simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each
-pass of 150 s alone: its smoothed drift is 0.6 to 1 m. A second scanner is turned to the other side.
+pass of 150 s alone: its smoothed drift is 0.6 to 1 m. With --elsewhere each pass loses it once, for
+70 to 120 s from a random moment. A second scanner is turned to the other side.
 """
 
 import argparse
@@ -28,18 +29,23 @@ from mlscorr.ties import TieCollector
 POINTS_PER_LINE = 400  # of 700: a survey takes two minutes
 DURATION = 150.0  # s of each pass
 GNSS = 5.0  # s, at both ends of a pass
+OUTAGE = 70.0, 120.0  # s: shortest and longest of a pass, where passes lose GNSS by themselves
 NEAREST = 5.0  # m between two passes that are compared in a place
 
 
-def scenario(scanners=1, duration=DURATION):
-    """The canyon as a MEMS unit records it, with GNSS at the ends of the passes alone."""
+def scenario(scanners=1, duration=DURATION, rng=None):
+    """The canyon as a MEMS unit records it, with GNSS at the ends of the passes alone.
+
+    With a generator of random numbers, without it once in each pass.
+    """
     canyon = read_scenario(FOLDER / "canyon.toml")
-    starts = (0.0, duration + canyon.drive.passes[1].pause)
-    pos = {
-        "grade": "mems",
-        "sky_view": False,
-        "outages": tuple((start + GNSS, duration - 2 * GNSS) for start in starts),
-    }
+    outages = []
+    for start in (0.0, duration + canyon.drive.passes[1].pause):
+        length = duration - 2 * GNSS if rng is None else rng.uniform(*OUTAGE)
+        latest = duration - GNSS - length
+        begin = GNSS if rng is None else rng.uniform(GNSS, latest)
+        outages.append((start + begin, length))
+    pos = {"grade": "mems", "sky_view": False, "outages": tuple(outages)}
     first = canyon.scanner[0].model_copy(update={"points_per_line": POINTS_PER_LINE})
     turn = np.array([1.0, 1.0, -1.0])
     second = first.model_copy(update={"boresight": tuple(turn * first.boresight)})
@@ -106,12 +112,14 @@ def main():
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scanners", type=int, choices=(1, 2), default=1)
+    parser.add_argument("--elsewhere", action="store_true", help="outages by pass")
     parser.add_argument("--control", type=int, nargs="+", default=[0, 3, 6, 12])
     arguments = parser.parse_args()
-    drive = scenario(arguments.scanners)
     print("control  seed     raw   alone  within    ties  within   apart   ratio")
     ratios = {number: [] for number in arguments.control}
     for seed in range(arguments.first, arguments.first + arguments.seeds):
+        rng = np.random.default_rng([seed, 1]) if arguments.elsewhere else None
+        drive = scenario(arguments.scanners, rng=rng)
         with tempfile.TemporaryDirectory() as folder:
             simulated = simulate(drive, np.random.default_rng(seed))
             simulated.write(Path(folder) / "survey")

@@ -33,7 +33,7 @@ from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import Support, find_support
 from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tied import TieResiduals, graduated, screen_with_ties
+from mlscorr.estimate.tied import TieResiduals, robust_ties, screen_with_ties
 from mlscorr.survey import Matched, Mounting, Pos, Ties, Trajectory
 from mlscorr.survey.summary import Summary
 
@@ -216,7 +216,7 @@ def with_ties(estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
 def previewed_correction(
     estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
 ) -> Correction:
-    """The correction with ties that were paired so far, under the parameters of control alone.
+    """The correction with ties that were paired so far, under parameters that they didn't choose.
 
     Parameters
     ----------
@@ -226,8 +226,8 @@ def previewed_correction(
         As of with_ties.
     """
     before, rows = _tie_equations(estimate.equations, ties, mountings)
-    tied = graduated(before, estimate.parameters, rows)
-    pose = predict_under(tied, estimate.parameters)
+    tied, parameters = robust_ties(before, estimate.parameters, rows)
+    pose = predict_under(tied, parameters)
     return Correction.by_pose_error(estimate.correction.recorded, *pose)
 
 

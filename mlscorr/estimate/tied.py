@@ -2,8 +2,8 @@
 
 Of a thousand ties some are wrong: a car has gone, a row of windows was taken for the next. Robust
 weights come before parameters, since a likelihood that believes all ties prefers noise to drift:
-graduated ones under the control points' parameters (Geman-McClure, whose scale shrinks: Black and
-Rangarajan 1996), then Student's t in turn with the restricted likelihood, at last a cut.
+graduated ones under what control chose or what is believed (Geman-McClure, whose scale shrinks:
+Black and Rangarajan 1996), then Student's t in turn with the restricted likelihood, at last a cut.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import norm
 
 from mlscorr.collocation import reweight
+from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.correction import Correction
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.outages import with_likely_starts
@@ -105,7 +106,7 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
         That these chose.
     ties : TieEquations
     """
-    tied = graduated(equations, parameters, ties)
+    tied, parameters = robust_ties(equations, parameters, ties)
     tied = tied.with_starts(with_likely_starts(sample(tied))[0].stated.starts)
     rows = tied.ties
     parameters = _most_probable(tied, parameters)
@@ -198,6 +199,30 @@ def _ratio(tied, parameters, solved=None):
     variance = tied.ties.variance / tied.ties.weight
     residual = variance * solved.weights[-len(tied.ties) :]  # N V^-1 (l - A x)
     return residual / np.sqrt(tied.ties.variance)
+
+
+def robust_ties(
+    equations: Equations, parameters: SignalParameters, ties: TieEquations
+) -> tuple[Equations, SignalParameters]:
+    """The equations with graduated weights of ties, and the parameters under which more hold.
+
+    Few control points may choose drift that is too slow or too small; then ties that agree with
+    each other contradict it. So they are also weighed by what is believed without control.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the control points.
+    parameters : SignalParameters
+        That these chose.
+    ties : TieEquations
+    """
+    tied = replace(equations, ties=ties)
+    prior = Objective((), tied.prior(tied))
+    believed = prior.parameters(INTEGRATED, prior.initial)
+    weighed = [(graduated(equations, each, ties), each) for each in (parameters, believed)]
+    least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)  # of a tie that holds
+    return max(weighed, key=lambda pair: np.count_nonzero(pair[0].ties.weight > least))
 
 
 def graduated(equations: Equations, parameters: SignalParameters, ties: TieEquations) -> Equations:

@@ -74,12 +74,14 @@ def _beyond_chance(features, correction, sigma, radius, angle, pairs):
     """Which pairs (k,) are no chance for the most part, as are all of both passes and a direction.
 
     Chance is judged within gates as wide as sigmas make them, whatever the radius, and displaced by
-    two of them, where no two views of one thing are a pair: nearer, a rough surface pairs with
-    itself. The correction chose the place where most agree: so of the displaced the fullest counts.
+    two of the widest near by, where no two views of one thing are a pair, however well the place of
+    one of them is known: nearer, a rough surface pairs with itself. The correction chose the place
+    where most agree: so of the displaced the fullest counts.
     """
     radius = max(radius, SETTINGS.least_gate)
     sigma = np.maximum(sigma, SETTINGS.roughest)
-    variance = 2 * (sigma**2 + features.variance + SETTINGS.surface_sigma**2)
+    widest = _largest_near(features.centre + correction, sigma, radius)
+    variance = 2 * (widest**2 + features.variance + SETTINGS.surface_sigma**2)
     gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))
     way = features.direction.copy()
     is_pole = features.kind == "pole"
@@ -94,6 +96,14 @@ def _beyond_chance(features, correction, sigma, radius, angle, pairs):
         for chance in displaced:
             is_chance |= 2 * _count(own, group(features, chance)) > _count(own, number)
     return ~is_chance
+
+
+def _largest_near(place, sigma, edge):
+    """The largest sigma (n,) in each one's cell of an edge."""
+    cell = np.unique(np.floor(place / edge), axis=0, return_inverse=True)[1].ravel()
+    largest = np.zeros(cell.max(initial=-1) + 1)
+    np.maximum.at(largest, cell, sigma)
+    return largest[cell]
 
 
 def _passes(features, pairs):

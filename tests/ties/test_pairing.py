@@ -115,6 +115,15 @@ def test_chance_in_one_direction_takes_nothing_from_another():
     assert (~is_road[1]).sum() < (~is_road[0]).sum() / 10
 
 
+@pytest.mark.parametrize("uncertain", [1, 2])
+def test_a_pass_whose_place_is_hardly_known_pairs_with_one_that_is(uncertain):
+    "Metres of sigma in either pass, centimetres in the other: gates are wide, yet no chance"
+    features = street.features()
+    sigma = np.where(features.pass_number == uncertain, 1.0, 0.02)
+    ties = pair_features(features, np.zeros((len(features), 3)), sigma, 4.0)
+    assert len(ties) > 300
+
+
 def test_a_rough_surface_is_no_chance():
     "Ground that varies by 3 cm from metre to metre pairs with itself, within a gate of 2 cm too"
     rng = np.random.default_rng(1)
