@@ -187,16 +187,16 @@ def separability_document(compared: Separability) -> dict:
 
 
 def _closure(closure):
-    labels = closure.labels or (closure.effect,) * len(closure.folds)
-    names = ("effect", "kind", "before", "after", "unit", "shrink")
+    names = ("effect", "probability", "kind", "before", "after", "unit", "shrink")
     return {name: getattr(closure, name) for name in names} | {
         "interval": list(closure.interval),
         "null_band": list(closure.null_band),
         "held_out": closure.held_out,
         "folds": [
-            {"label": label, "before": float(before), "after": float(after)}
-            for label, (before, after) in zip(labels, closure.folds, strict=False)
+            {"label": closure.effect, "before": float(before), "after": float(after)}
+            for before, after in closure.folds
         ],
+        "over_sigma": asdict(closure.over_sigma) | {"beyond": list(closure.over_sigma.beyond)},
     }
 
 

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-STEPS = 6  # of the progress beside reading: the inference, folds, plan
+STEPS = 5  # of the progress beside reading: the inference, closure, plan
 LEAST_VIEWS = 6  # with a residual in m: fewer than the pose has parameters say nothing
 
 
@@ -122,7 +122,6 @@ def diagnose(
         cause_for_simulator(part, signs_of_part, inference),
         simulator_of_beams.added,
         rng,
-        impostor=inference.verdict.label == "unknown" and not inference.verdict.is_hidden,
         progress=step,
     )
     labels = [n for n in (*inference.verdict.set, *inference.same) if n != "unknown"]

@@ -1,15 +1,30 @@
 """Surveys of features with an effect, whose gap is to be closed."""
 
+from dataclasses import replace
+from functools import cached_property
+
 import gap_features
 import numpy as np
+from gap_mechanisms import ACTUAL
 
 from mlscorr.gap.close.closure import close_gap
-from mlscorr.gap.close.folds import make_folds
+from mlscorr.gap.close.folds import FoundCause, make_folds
 from mlscorr.gap.infer.causes import cause_of
 from mlscorr.gap.infer.labels import weigh_labels
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import signatures
 from tests.beds.gap_inference import surveyed
+
+
+def noise_of_positions(g, effect, rng):
+    "What noise of the recorded positions makes of rows of one time (m,)"
+    trajectory, rows = g.survey.trajectory, g.rows
+    moved = effect.apply(trajectory, rows.reference, rng).position - trajectory.position
+    at_rows = [np.interp(rows.gps_time, trajectory.gps_time, axis) for axis in moved.T]
+    return np.einsum("mi,im->m", rows.partials[:, :3], at_rows)
+
 
 KINDS = ("time_offset", "range_bias", "lever_arm", "position_bump", "position_noise")
 
@@ -19,7 +34,11 @@ class Bed:
 
     def __init__(self, *effects):
         g = gap_features.geometry(3, targets=24, patches=80)
-        self.rows, self.survey = surveyed(g, 31, *effects), g.survey
+        fixed = [effect for effect in effects if not effect.random]
+        self.rows, self.survey, self.effects = surveyed(g, 31, *fixed), g.survey, effects
+        for effect in effects[len(fixed) :]:
+            moved = noise_of_positions(g, effect, np.random.default_rng(7))
+            self.rows = replace(self.rows, residual=self.rows.residual + moved)
         signs, _ = signatures(self.rows, self.survey)
         self.signs = tuple(sign for sign in signs if sign.name in KINDS)
         self.used = np.arange(len(self.rows)) % 7 != 0
@@ -32,14 +51,27 @@ class Bed:
     def simulated(self, effects):
         return expected(self.rows, self.survey, effects).shift
 
-    def arguments(self, cause):
-        rng = np.random.default_rng(2)
-        return self.rows, self.used, self.survey, self.signs, cause, self.simulated, rng
+    @cached_property
+    def observations(self):
+        return Observations.of(self.rows, background(self.rows, self.survey))
 
-    def close(self, label):
-        rows, used, survey, signs, cause, simulated, rng = self.arguments(self.cause(label))
-        return close_gap(rows, used, survey, signs, self.evidence, cause, simulated, rng)
+    def found(self, cause):
+        return FoundCause(self.rows, self.used, self.survey, self.signs, self.evidence, cause)
 
-    def folds(self, cause):
-        rows, used, survey, signs, cause, simulated, rng = self.arguments(cause)
-        return make_folds(rows, used, survey, signs, cause, False, simulated, rng)
+    def whitened(self, shift):
+        "Square of a shift (m,) in the metric of the drift that was made"
+        observed = self.observations
+        white = observed.whitener(ACTUAL).whiten(observed.columns(shift[:, None]))
+        return float(white.squares[0])
+
+    def close(self, label, simulated=None):
+        simulated, rng = simulated or self.simulated, np.random.default_rng(2)
+        f = self.found(self.cause(label))
+        return close_gap(
+            f.rows, f.used, f.survey, f.signatures, f.evidence, f.cause, simulated, rng
+        )
+
+    def folds(self, cause, simulated=None, progress=None):
+        simulated, rng = simulated or self.simulated, np.random.default_rng(2)
+        model = self.evidence.likely_model(cause.effect)
+        return make_folds(self.found(cause), self.observations, model, simulated, rng, progress)

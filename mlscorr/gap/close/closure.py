@@ -1,8 +1,8 @@
 """How far the gap shrinks, on data not used to find the cause, once the simulator has it.
 
-The survey is cut into blocks of time. For each fold of blocks the whole diagnosis, the choice of
-the label included, is done on the others; the simulator runs again with that cause, and the gap is
-measured where the cause was not looked for. Check points are never looked at but here.
+Which effect it is, all blocks of time say; its size is found without each fifth of them. The
+simulator runs again with it, and the gap is measured where its size was not looked for. Check
+points are never looked at but here.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.close.folds import Folds, Simulated, make_folds
+from mlscorr.gap.close.folds import FoundCause, Simulated, make_folds
+from mlscorr.gap.close.over_sigma import OverSigma, errors_over_sigma
 from mlscorr.gap.close.settings import SETTINGS
+from mlscorr.gap.close.systematic import SystematicGap, share_gone
 from mlscorr.gap.infer.causes import Cause
 from mlscorr.gap.infer.error_models import ErrorModel
 from mlscorr.gap.infer.evidence import ColumnTable, column_table, nuisance_columns
@@ -24,8 +26,6 @@ from mlscorr.gap.infer.measure import (
     position_terms,
     scatter_terms,
     signed_root,
-    systematic_square,
-    unit_square,
 )
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
@@ -47,33 +47,37 @@ class Gap:
 
 @dataclass(frozen=True)
 class Closure:
-    """The gap before and after a cause is added, where it was not looked for.
+    """The gap before and after a cause is added, where its size was not looked for.
 
     Parameters
     ----------
     effect : str
         The label that was added; the best known one where the verdict is unknown.
+    probability : float
+        Of that label.
     kind, unit : str
         How the gap is measured, see measure.
     before, after : float
         Signed.
     shrink : float
-        1 - after^2 / before^2 with their signs; 0 where nothing was added.
+        1 - after^2 / before^2, at most 1; 0 where nothing was added. Where the gap grew,
+        before^2 / after^2 - 1, which is -1 at least.
     interval : (float, float)
-        95 % of it, by the jackknife over groups of blocks of time.
+        95 % of it, within [-1, 1].
     null_band : (float, float)
         95 % of what the gap is when nothing is wrong.
     held_out : str
         A sentence.
-    labels : tuple of str
-        Chosen in each fold.
     folds : (f, 2) array
         The gap in each fold alone, before and after. In the unit.
     gap : Gap
         That of the rows in which the cause was found.
+    over_sigma : OverSigma
+        Errors over the sigma that the simulator gives them.
     """
 
     effect: str
+    probability: float
     kind: str
     unit: str
     before: float
@@ -82,9 +86,9 @@ class Closure:
     interval: tuple[float, float]
     null_band: tuple[float, float]
     held_out: str
-    labels: tuple[str, ...]
     folds: np.ndarray
     gap: Gap
+    over_sigma: OverSigma
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -97,7 +101,6 @@ def close_gap(
     cause: Cause,
     simulated: Simulated,
     rng: np.random.Generator,
-    impostor: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> Closure:
     """Closure of a cause.
@@ -119,59 +122,47 @@ def close_gap(
     simulated : function of a tuple of Effect
         What the simulator, run again with these too, adds to the rows' residuals: (m,).
     rng : numpy.random.Generator
-    impostor : bool
-        Whether the cause stands for an unknown one.
-    progress : function of a number of folds, optional
+    progress : function of a number of steps, one in all, optional
     """
     kind = gap_kind(cause.effect, evidence.noisy, rows)
     unit = UNITS[kind]
-    folds = make_folds(rows, used, survey, signatures, cause, impostor, simulated, rng, progress)
-    ruler = _Ruler.of(kind, rows, survey, signatures, evidence, cause)
-    group = (folds.block * SETTINGS.groups) // (folds.block.max() + 1)
-    group = np.unique(group, return_inverse=True)[1]
-    measured = ruler.compare(folds, group, rng)
-    shrink, spread = _shrink(measured.square), 0.0
-    if len(measured.left) > 1 and cause.effect != "none":
-        each, g = np.array([_shrink(square) for square in measured.left]), len(measured.left)
-        spread = INFERENCE.quantile * np.sqrt((g - 1) / g * ((each - each.mean()) ** 2).sum())
-    gap = measured.gap(unit)
-    whole = replace(folds, fold=np.where(used, 0, 1), predicted=(folds.whole,))
+    case = FoundCause(rows, used, survey, signatures, evidence, cause)
+    ruler = _Ruler.of(kind, case)
+    folds = make_folds(case, ruler.observations, ruler.model, simulated, rng, progress)
+    held = ruler.compare(folds, rng)
+    whole = replace(folds, fold=np.where(used, 0, -1), predicted=(folds.whole,))
+    gap, in_sample = held.gap(unit), ruler.compare(whole, rng, used).gap(unit)
+    nothing = cause.effect == "none"
     return Closure(
         cause.effect,
+        float(cause.probability),
         kind,
         unit,
         gap.before,
-        gap.after,
-        shrink,
-        (float(shrink - spread), float(shrink + spread)),
+        gap.before if nothing else gap.after,
+        0.0 if nothing else share_gone(*held.square),
+        (0.0, 0.0) if nothing else held.interval,
         gap.null_band,
         folds.held_out,
-        folds.labels,
-        signed_root(measured.folds, unit),
-        ruler.compare(whole, np.zeros_like(group), rng).gap(unit),
+        signed_root(held.folds, unit),
+        in_sample,
+        errors_over_sigma(rows, ruler.observations, folds, rng),
     )
 
 
 @dataclass(frozen=True)
 class _Measured:
-    """Squares before and after (2,), the same without each group (g, 2) and in each fold (f, 2),
-    and by chance (k,).
-    """
+    """Squares before and after (2,), in each fold (f, 2), by chance (k,); 95 % of the share."""
 
     square: np.ndarray
-    left: np.ndarray
     folds: np.ndarray
     chance: np.ndarray
+    interval: tuple[float, float]
 
     def gap(self, unit):
         before, after = (float(v) for v in signed_root(self.square, unit))
         band = np.percentile(signed_root(self.chance, unit), INFERENCE.band)
         return Gap(before, after, tuple(float(v) for v in band))
-
-
-def _shrink(square):
-    before, after = square
-    return float(1 - after / before) if before != after else 0.0
 
 
 @dataclass(frozen=True)
@@ -180,66 +171,50 @@ class _Ruler:
 
     kind: str
     rows: Rows
+    used: np.ndarray
     observations: Observations
     table: ColumnTable
     model: ErrorModel
+    probability: float
 
     @classmethod
-    def of(cls, kind, rows, survey, signatures, evidence, cause):
-        observations = Observations.of(rows, background(rows, survey))
-        unknown = unknown_blocks(rows, survey)
-        table = column_table(rows, signatures, unknown, observations.sigma)
+    def of(cls, kind, case):
+        rows, noise = case.rows, case.cause.model
+        observations = Observations.of(rows, background(rows, case.survey))
+        unknown = unknown_blocks(rows, case.survey)
+        table = column_table(rows, case.signatures, unknown, observations.sigma)
         steady, _ = nuisance_columns(observations, table)
         observations, _ = without_tails(observations, rows, steady)
-        return cls(kind, rows, observations, table, evidence.likely_model(cause.effect))
+        model = case.evidence.likely_model(case.cause.effect)
+        scale = model.scale if noise.scale == 1.0 else noise.scale
+        model = replace(model, scale=scale, fixes=noise.fixes, windows=noise.windows)
+        probability = case.cause.probability
+        return cls(kind, rows, case.used, observations, table, model, probability)
 
-    def compare(self, folds, group, rng):
-        """What each fold's own cause does to the gap of its rows: _Measured."""
+    def compare(self, folds, rng, among=None):
+        """What the size of each fold's others does to the gap of some rows (m,): _Measured."""
+        among = np.ones(len(self.rows), bool) if among is None else among
         if self.kind == "systematic":
-            return self._systematic(folds, group, rng)
+            return self._systematic(folds, rng, among)
         before, after, chance, place = self._terms(folds, rng)
+        keep = among[place]
+        before, after, chance, place = (v[keep] for v in (before, after, chance, place))
         both = np.column_stack([before, after])
-        (count, sums), (in_fold, fold_sums) = (
-            (np.bincount(number)[:, None], np.array([np.bincount(number, v) for v in both.T]).T)
-            for number in (group[place], folds.of_rows[place])
-        )
-        left = (both.sum(axis=0) - sums) / np.maximum(len(both) - count, 1)
-        folded = fold_sums / np.maximum(in_fold, 1)
-        squares = both.mean(axis=0), left, folded, chance.mean(axis=0)
+        of_fold = folds.of_rows[place]
+        folded = np.array([np.bincount(of_fold, v, len(folds.predicted)) for v in both.T]).T
+        folded /= np.maximum(np.bincount(of_fold, minlength=len(folds.predicted)), 1)[:, None]
+        squares = both.mean(axis=0), folded, chance.mean(axis=0)
         if self.kind == "returns":  # a mean of shares, not of squares
-            squares = (np.sign(v) * v**2 for v in squares)
-        return _Measured(*squares)
+            squares = tuple(np.sign(v) * v**2 for v in squares)
+        return _Measured(*squares, _jackknife(both, folds.block[place], squares[0]))
 
-    def _systematic(self, folds, group, rng):
-        """What the cause of each fold leaves of its rows and the check points, by themselves."""
-        drawn = self.observations.whitener(self.model).draw(rng, INFERENCE.replicas)
-        numbers = range(len(folds.predicted))
-        in_fold = np.array([self._fold(folds, number, drawn) for number in numbers])
-        usual = in_fold[:, 2:].mean(axis=1)[:, None]
-        in_fold -= usual
-        left = []
-        for g in range(group.max() + 1):
-            keep = group[self.observations.row] != g
-            squares = np.array([self._fold(folds, number, None, keep) for number in numbers])
-            left.append((squares - usual).sum(axis=0))
-        scale, total = unit_square(self.observations, self.model), in_fold.sum(axis=0)
-        return _Measured(
-            scale * total[:2],
-            scale * np.array(left),
-            scale * len(in_fold) * in_fold[:, :2],
-            scale * total[2:],
+    def _systematic(self, folds, rng, among):
+        """What the sizes leave, in all and in each fold: _Measured."""
+        gap = SystematicGap.of(
+            self.observations, self.model, self.table, self.rows.residual, folds, self.used, among
         )
-
-    def _fold(self, folds: Folds, number, drawn, keep=True):
-        """What can be explained of one fold's rows before and after, and by chance: (2 + k,)."""
-        residual, shift = self.rows.residual, folds.predicted[number].shift
-        both = self.observations.columns(np.column_stack([residual, residual - shift]))
-        both = both if drawn is None else np.hstack([both, drawn])
-        judging = keep & folds.judges(number)[self.observations.row]
-        if not judging.any():
-            return np.zeros(both.shape[1])
-        part = self.observations[judging]
-        return systematic_square(part, self.model, self.table, both[judging])
+        measured = gap.measure(rng, self.probability)
+        return _Measured(measured.square, measured.folds, measured.chance, measured.interval)
 
     def _terms(self, folds, rng):
         """Terms before, after (q,) and by chance (q, k), whose mean is the gap; their rows (q,)."""
@@ -272,3 +247,15 @@ class _Ruler:
         """What each row's own fold predicts (m,)."""
         each = np.array([getattr(predicted, name) for predicted in folds.predicted])
         return each[folds.of_rows, np.arange(len(folds.fold))]
+
+
+def _jackknife(both, block, square):
+    """95 % of the share that is gone by terms (q, 2), by groups of blocks (q,) left out in turn."""
+    groups = 2 * SETTINGS.folds
+    group = np.unique((block * groups) // (block.max() + 1), return_inverse=True)[1]
+    count, sums = np.bincount(group), np.array([np.bincount(group, v) for v in both.T]).T
+    g = len(count)
+    left = (both.sum(axis=0) - sums) / np.maximum(len(both) - count, 1)[:, None]
+    share, each = share_gone(*square), np.array([share_gone(*pair) for pair in left])
+    spread = INFERENCE.quantile * np.sqrt((g - 1) / g * ((each - each.mean()) ** 2).sum())
+    return max(-1.0, share - spread), min(1.0, share + spread)

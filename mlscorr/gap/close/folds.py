@@ -1,19 +1,29 @@
-"""Causes found in some blocks of time alone, for others to judge."""
+"""Sizes of a cause found without some blocks of time, for these to judge.
+
+Which effect it is, all blocks say together, and with what probability: a choice made anew in each
+part of the data is often another one. When an event acts they say too. Sizes are found anew
+without each fifth of the blocks.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from mlscorr.effects import Effect
+from mlscorr.gap.close.cross_fit import cross_fitted
 from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.gap.infer.causes import Cause, Inference, cause_of
-from mlscorr.gap.infer.labels import weigh_labels
+from mlscorr.gap.infer.error_models import ErrorModel
+from mlscorr.gap.infer.labels import LabelEvidence, weigh_labels
 from mlscorr.gap.infer.measure import Predicted
-from mlscorr.gap.infer.verdict import decide, weigh_pairs
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.gap.observe.rows import Rows, background
+from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.expectation import expected
-from mlscorr.gap.signatures.signatures import Signature, select
+from mlscorr.gap.signatures.signatures import Signature, select, signature
 from mlscorr.survey import Survey
 
 Simulated = Callable[[tuple[Effect, ...]], np.ndarray]
@@ -21,7 +31,7 @@ Simulated = Callable[[tuple[Effect, ...]], np.ndarray]
 
 @dataclass(frozen=True)
 class Folds:
-    """Which rows judge which cause.
+    """Which rows judge which size of a cause.
 
     Parameters
     ----------
@@ -30,70 +40,129 @@ class Folds:
     fold : (m,) int array
         Which of `predicted` each row judges; -1 for check points, which judge all.
     predicted : tuple of Predicted
-    labels : tuple of str
-        Chosen in each fold; none where nothing was held out.
     held_out : str
         What was, in a sentence.
     whole : Predicted
         Of the cause that was found in all used rows.
+    columns : (m, p) array
+        What the parts of the cause that shift rows make of them, by their parameters.
     """
 
     block: np.ndarray
     fold: np.ndarray
     predicted: tuple[Predicted, ...]
-    labels: tuple[str, ...]
     held_out: str
     whole: Predicted
+    columns: np.ndarray
 
     @property
     def of_rows(self) -> np.ndarray:
         """Which of `predicted` (m,) is compared with each row where one must be."""
         return np.clip(self.fold, 0, len(self.predicted) - 1)
 
-    def judges(self, number: int) -> np.ndarray:
-        """Which rows (m,) judge one of `predicted`."""
-        return (self.fold == number) | (self.fold < 0)
+
+@dataclass(frozen=True)
+class FoundCause:
+    """A cause, and what it was found in.
+
+    Parameters
+    ----------
+    rows : Rows
+        All of them, check points too.
+    used : (m,) bool array
+        False for those of check points.
+    survey : Survey
+        With what the simulator believes.
+    signatures : sequence of Signature
+        Of all rows.
+    evidence : LabelEvidence
+        Of the used rows.
+    cause : Cause
+        From them.
+    """
+
+    rows: Rows
+    used: np.ndarray
+    survey: Survey
+    signatures: Sequence[Signature]
+    evidence: LabelEvidence
+    cause: Cause
+
+    @property
+    def shifting(self) -> list[tuple[Signature, np.ndarray]]:
+        """The parts of the cause that are no noise, with their estimates."""
+        return [pair for pair in self.cause.parts if pair[0].name not in self.evidence.noisy]
+
+    def columns(self) -> np.ndarray:
+        """What these parts make of all rows (m, p), by their parameters."""
+        bench, rng = Bench(self.rows, self.survey), np.random.default_rng(0)  # nothing is drawn
+        parts = [signature(bench, p.kind, p.fixed, rng).jacobian for p, _ in self.shifting]
+        return np.hstack([np.zeros((len(self.rows), 0)), *parts])
 
 
 def make_folds(
-    rows: Rows,
-    used: np.ndarray,
-    survey: Survey,
-    signatures: Sequence[Signature],
-    cause: Cause,
-    impostor: bool,
+    case: FoundCause,
+    observations: Observations,
+    model: ErrorModel,
     simulated: Simulated,
     rng: np.random.Generator,
     progress: Callable[[int], None] | None = None,
 ) -> Folds:
-    """Folds for a cause that the used rows tell of; see ``close_gap``.
+    """Folds for a cause.
 
-    Every other block of time and the rest: with more folds each judges with less, and steady
-    effects hide in the drift.
+    Parameters
+    ----------
+    case : FoundCause
+    observations : Observations
+        Of all rows.
+    model : ErrorModel
+        Of their covariance, with the cause.
+    simulated, rng, progress
+        As in ``close_gap``.
     """
-    block, whole = _blocks(rows, cause), _predict(rows, survey, cause, simulated)
-    nothing = np.zeros(len(rows), dtype=int)
+    rows, used, cause = case.rows, case.used, case.cause
+    block, whole = _blocks(rows, cause), _predict(rows, case.survey, cause, simulated)
+    nothing, columns = np.zeros(len(rows), dtype=int), case.columns()
     if cause.effect == "none":
         held_out = "Nothing was added to the simulator."
-        return Folds(block, nothing, (whole,), (), held_out, whole)
-    squares = np.bincount(block, (whole.shift * rows.metric) ** 2)
+        return Folds(block, nothing, (whole,), held_out, whole, columns)
+    shift = columns @ np.concatenate([np.zeros(0), *(size for _, size in case.shifting)])
+    squares = np.bincount(block, (shift * rows.metric * used) ** 2)
     if squares.max() > SETTINGS.block_share * squares.sum() > 0:
         held_out = "Nothing could be held out: what acts in one moment is told by no other."
-        return Folds(block, nothing, (whole,), (), held_out, whole)
-    number, predicted, labels = np.where(used, block % 2, -1), [], []
-    for half in range(2):
-        trained = _train(rows, used & (number != half), survey, signatures, impostor, rng)
-        labels.append(trained.effect)
-        predicted.append(_predict(rows, survey, trained, simulated))
-        if progress is not None:
-            progress(1)
+        return Folds(block, nothing, (whole,), held_out, whole, columns)
+    fold = np.where(used, _dealt(squares)[block], -1)
+    if columns.shape[1]:
+        predicted = _with_sizes(case, observations, model, fold, whole, columns)
+    else:
+        keeps = [used & (fold != number) for number in range(SETTINGS.folds)]
+        causes = [_trained(case, observations, model, keep, rng) for keep in keeps]
+        predicted = tuple(_predict(rows, case.survey, each, simulated) for each in causes)
+    if progress is not None:
+        progress(1)
     held_out = (
-        f"Every other one of {block.max() + 1} blocks of time, and then the rest: effect and size "
-        "were found in those between."
+        f"The effect was chosen on all {block.max() + 1} blocks of time; each fifth of them judges "
+        "a size that was found without it."
     )
     if not used.all():
         held_out += f" {len(np.unique(rows.item[~used]))} looks at check points were never used."
-    return Folds(block, number, tuple(predicted), tuple(labels), held_out, whole)
+    return Folds(block, fold, predicted, held_out, whole, columns)
+
+
+def _with_sizes(case, observations, model, fold, whole, columns):
+    """What the simulator expects by the size that all folds but each tell: Predicted of each.
+
+    The run with the size of all blocks, and to the first order what another size changes.
+    """
+    if not whole.shift.any():  # no simulator takes it
+        return (whole,) * SETTINGS.folds
+    learned = observations[case.used[observations.row]]
+    residual = learned.columns(case.rows.residual[:, None])[:, 0]
+    sizes = cross_fitted(
+        learned, model, fold[learned.row], SETTINGS.folds, learned.columns(columns), residual
+    )
+    change = columns @ (sizes[:-1] - sizes[-1]).T
+    return tuple(replace(whole, shift=whole.shift + each) for each in change.T)
 
 
 def _blocks(rows, cause):
@@ -104,19 +173,61 @@ def _blocks(rows, cause):
     return np.unique(number, return_inverse=True)[1]
 
 
-def _train(rows, used, survey, signatures, impostor, rng):
-    """The Cause that some rows (m,) bool tell of, by the whole inference.
+def _dealt(squares):
+    """Which fold each block is in: each holds about as much of what the cause moves.
 
-    Nothing unknown can be added to a simulator: the best known cause is, where an impostor is
-    wanted, and else nothing.
+    In turn to and fro from the largest on; blocks in which nothing moves follow in turn.
     """
-    part, of_part = rows.select(used), select(signatures, used)
-    evidence = weigh_labels(part, background(part, survey), survey, of_part, rng, 0)
-    probability = weigh_pairs(part, of_part, evidence)
-    label = decide(evidence, probability).label
-    if label == "unknown":
-        label = _best_known(probability) if impostor else "none"
-    return cause_of(part, of_part, evidence, label, probability[label])
+    turn = np.append(np.arange(SETTINGS.folds), np.arange(SETTINGS.folds)[::-1])
+    dealt = np.empty(len(squares), dtype=int)
+    dealt[np.argsort(-squares, kind="stable")] = np.resize(turn, len(squares))
+    return dealt
+
+
+def _trained(case, observations, model, used, rng):
+    """The cause of a noise class with the size that some rows (m,) bool tell of.
+
+    The windows of a worse POS are those that all rows tell, as an event's time is.
+    """
+    survey, evidence, cause = case.survey, case.evidence, case.cause
+    if cause.model.windows:
+        part = observations[used[observations.row]]
+        residual = part.columns(case.rows.residual[:, None])
+        windows = _with_factor(part, model, residual)
+        return replace(cause, model=replace(cause.model, windows=windows))
+    names, part = cause.effect.split("+"), case.rows.select(used)
+    of_part = select([sign for sign in case.signatures if sign.name in names], used)
+    anew = weigh_labels(part, background(part, survey), survey, of_part, rng, 0)
+    best = {name: _likeliest(evidence, name) for name in names}
+    noise = [each for each in anew.noise if _is_alike(each, best.get(each.label))]
+    anew = replace(anew, noise=tuple(noise))
+    if not set(names) <= anew.noisy:  # without these rows nothing shows it
+        return cause
+    return cause_of(part, of_part, anew, cause.effect, cause.probability)
+
+
+def _with_factor(observations, model, residual):
+    """Windows of a model with all their factors changed alike, to what residuals (n, 1) tell."""
+
+    def windows(log_ratio):
+        return tuple(w._replace(factor=w.factor * float(np.exp(log_ratio))) for w in model.windows)
+
+    def score(log_ratio):
+        changed = replace(model, windows=windows(log_ratio))
+        return -observations.whitener(changed).log_likelihood(residual)[0]
+
+    widest = np.log(max(INFERENCE.window_factors) / min(INFERENCE.window_factors))
+    return windows(minimize_scalar(score, bounds=(-widest, widest), method="bounded").x)
+
+
+def _likeliest(evidence, name):
+    """The NoiseEvidence of a label that explains most."""
+    return max((e for e in evidence.noise if e.label == name), key=lambda each: each.gain[0])
+
+
+def _is_alike(noise, other):
+    """Whether two NoiseEvidence are of one kind: of all times, of fixes, or in windows."""
+    return type(noise) is type(other) and (noise.member < 0) == (other.member < 0)
 
 
 def cause_for_simulator(rows: Rows, signatures: Sequence[Signature], inference: Inference) -> Cause:

@@ -84,8 +84,7 @@ def systematic_square(
 ) -> np.ndarray:
     """The most that any block of a table explains of the squares of residuals.
 
-    In the metric of V^-1. Each block counts as it does in the evidence: by its trust, less its
-    number of columns, which is what it explains by chance.
+    In the metric of V^-1; see ``Explanations``.
 
     Parameters
     ----------
@@ -99,20 +98,70 @@ def systematic_square(
     -------
     square : (k,) array
     """
-    k, largest = residual.shape[1], np.full(residual.shape[1], -np.inf)
-    both = np.hstack([residual, observations.columns(table.columns)])
-    white = observations.whitener(model).whiten(both)
-    y, a = white[slice(k)], white[slice(k, None)]
-    projected, free = a.product(y), SETTINGS.free_sigma
-    for index, numbers, _ in block_groups(table):
-        value, vector = np.linalg.eigh(a.blocks(index))
-        value = np.maximum(value, 0.0)
-        square = (vector.swapaxes(1, 2) @ projected[index]) ** 2
-        explained = (square / (value + free**-2)[:, :, None]).sum(axis=1)
-        by_chance = (value * free**2 > 1).sum(axis=1)
-        trust = np.array([table.blocks[i].trust for i in numbers])
-        largest = np.maximum(largest, (trust[:, None] * explained - by_chance[:, None]).max(axis=0))
-    return largest
+    whitener = observations.whitener(model)
+    columns = whitener.innovations(observations.columns(table.columns))[0]
+    return Explanations.of(table, columns).largest(whitener.innovations(residual)[0])[0]
+
+
+@dataclass(frozen=True)
+class Explanations:
+    """What each block of a table explains of innovations.
+
+    Parameters
+    ----------
+    table : ColumnTable
+    columns : (n, c) array
+        Innovations of its columns.
+    modes : tuple
+        Of blocks alike, their numbers (h,), columns (h, p), trust (h, 1) and, of each block's
+        normal matrix, values (h, p) and vectors (h, p, p).
+    """
+
+    table: ColumnTable
+    columns: np.ndarray
+    modes: tuple
+
+    @classmethod
+    def of(cls, table: ColumnTable, columns: np.ndarray) -> Explanations:
+        """See the class."""
+        normal, modes = columns.T @ columns, []
+        for index, numbers, _ in block_groups(table):
+            value, vector = np.linalg.eigh(normal[index[:, :, None], index[:, None, :]])
+            trust = np.array([[table.blocks[i].trust] for i in numbers])
+            modes.append((numbers, index, trust, np.maximum(value, 0.0), vector))
+        return cls(table, columns, tuple(modes))
+
+    def largest(self, innovations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The most that any block explains of the squares, and which one does so.
+
+        Each block counts as it does in the evidence: by its trust, less its number of columns,
+        which is what it explains by chance.
+
+        Parameters
+        ----------
+        innovations : (n, k) array
+
+        Returns
+        -------
+        square : (k,) array
+        block : (k,) int array
+        """
+        free, projected, k = SETTINGS.free_sigma, self.columns.T @ innovations, innovations.shape[1]
+        scores, numbers = [np.full((1, k), -np.inf)], [np.array([-1])]
+        for number, index, trust, value, vector in self.modes:
+            square = (vector.swapaxes(1, 2) @ projected[index]) ** 2
+            explained = (square / (value + free**-2)[:, :, None]).sum(axis=1)
+            scores.append(trust * explained - (value * free**2 > 1).sum(axis=1)[:, None])
+            numbers.append(number)
+        score, number = np.vstack(scores), np.concatenate(numbers)
+        best = score.argmax(axis=0)
+        return score[best, np.arange(k)], number[best]
+
+    def fit(self, number: int, innovations: np.ndarray) -> np.ndarray:
+        """What one block makes of innovations (n,): (n,)."""
+        columns = self.columns[:, self.table.blocks[number].columns]
+        normal = columns.T @ columns + np.eye(columns.shape[1]) / SETTINGS.free_sigma**2
+        return columns @ np.linalg.solve(normal, columns.T @ innovations)
 
 
 def unit_square(observations: Observations, model: ErrorModel) -> float:

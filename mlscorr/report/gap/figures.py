@@ -11,9 +11,9 @@ from mlscorr.report.gap.innovations import innovations_figure
 from mlscorr.report.gap.ladder import ladder, ladder_figure
 from mlscorr.report.gap.rows import detectable_rows, worst_rows
 from mlscorr.report.gap.separability import detectable_figure, heat_figure
+from mlscorr.report.gap.shrinking import is_closed
 from mlscorr.report.gap.site_map import site_map
 from mlscorr.report.gap.splits import closure_figure, where_figure
-from mlscorr.report.gap.verdict import is_closed
 
 Figures = dict[str, Callable[[], Figure]]
 

@@ -16,14 +16,13 @@ from mlscorr.report.gap.rows import (
     worst_rows,
 )
 from mlscorr.report.gap.settings import SETTINGS
+from mlscorr.report.gap.shrinking import is_closed, shrunk
 from mlscorr.report.gap.verdict import (
     VerdictBox,
     advice,
     facts,
-    is_closed,
     is_judged,
     is_named,
-    shrunk,
     smallest,
     verdict,
 )

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from mlscorr.effects import Effect
 from mlscorr.effects.wording import DASH, joined, known, size
 from mlscorr.report.gap.labels import family, lowered, meaning, sentences_of, title
-from mlscorr.report.gap.numbers import percent, signed
+from mlscorr.report.gap.shrinking import Fact, is_closed, is_within, shrinking
 
 CERTAINTY = (  # probability from which on one says so
     (0.99, "practically certain"),
@@ -17,11 +17,6 @@ CERTAINTY = (  # probability from which on one says so
 NUMBER_WORDS = ("none", "one", "two", "three", "four")
 SCATTER = "This is scatter: no correction takes it off, but accuracies must be stated larger."
 NEGATIVE = "It is what the two differ by beyond chance; below zero: less than by chance."
-GAPS = {  # by the kind of gap that a closure measures
-    "systematic": "Systematic part of the gap (a mean over all rows)",
-    "scatter": "Scatter beyond the stated one",
-    "returns": "Returns beyond the expected ones",
-}
 
 
 class VerdictBox(NamedTuple):
@@ -42,14 +37,6 @@ class VerdictBox(NamedTuple):
     kicker: str
     sentences: list[str]
     large: int = 1
-
-
-class Fact(NamedTuple):
-    """A number beside the verdict: what it is, it, and more in words."""
-
-    title: str
-    number: str
-    more: str = ""
 
 
 def verdict(document: dict) -> VerdictBox:
@@ -92,18 +79,6 @@ def is_named(document: dict) -> bool:
         The content of gap.json.
     """
     return is_judged(document) and family(document["verdict"]["label"]) in ("effect", "noise")
-
-
-def is_closed(document: dict) -> bool:
-    """Whether anything was put into the simulator.
-
-    Parameters
-    ----------
-    document : dict
-        The content of gap.json.
-    """
-    closure = document["closure"]
-    return closure["effect"] not in (None, "", "none") and known(closure["shrink"])
 
 
 def _nothing(document):
@@ -211,10 +186,10 @@ def facts(document: dict) -> list[Fact]:
     if not is_named(document) and not is_closed(document):
         whole = Fact("The gap between survey and simulation", headline, NEGATIVE)
         return [_certainty(document), whole]
-    is_pattern = _is_within(gap["before"], gap["null_band"])
+    is_pattern = is_within(gap["before"], gap["null_band"])
     more = "What gives it away is its pattern, not its size." if is_pattern else ""
     where = Fact("Where it shows most", headline, more)
-    return [_certainty(document), where, _shrinking(document)]
+    return [_certainty(document), where, shrinking(document)]
 
 
 def _certainty(document):
@@ -260,62 +235,6 @@ def chance(p_value: float | None) -> str:
     count = f"{number * p_value:.0f}" if p_value >= 1e-4 else "not one"
     words = f"{number:,}".replace(",", " ") if number > 1000 else number
     return f"Of {words} surveys in which nothing is wrong, {count} would look as odd."
-
-
-def _is_within(value, band):
-    """Whether a gap is what it may be when nothing is wrong; not, when one is not known."""
-    return all(map(known, [value, *band])) and value <= band[1]
-
-
-def _shrinking(document):
-    """How far the gap shrinks once the simulator has the cause."""
-    closure, gap = document["closure"], document["gap"]
-    if not is_closed(document):
-        before, more = signed(gap["before"], gap["unit"]), f"When nothing is wrong: {span(gap)}."
-        return Fact("The gap between survey and simulation", before, more)
-    pair = " → ".join(signed(closure[when], closure["unit"]) for when in ("before", "after"))
-    if document["verdict"]["label"] == "unknown":
-        nearest = f"With the nearest known effect, {lowered(title(closure['effect']))},"
-        return Fact(f"{nearest} in the simulator", pair, shrunk(closure))
-    more = ""
-    if _is_within(closure["after"], closure["null_band"]):
-        more = " What is left is what chance leaves when nothing is wrong."
-    part = f"{GAPS.get(closure.get('kind'), 'Gap')} on held-out data"
-    return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)
-
-
-def shrunk(closure: dict) -> str:
-    """By how much the squared gap shrinks, with its interval, in words.
-
-    Parameters
-    ----------
-    closure : dict
-        Of gap.json.
-    """
-    (low, high), share, between = closure["interval"], closure["shrink"], ""
-    if known(low) and known(high):
-        between = f" (95 %: {percent(low)} to {percent(min(high, 1.0))})"
-    if share < 0:
-        text = f"The squared gap grew by {percent(-share)}{between}."
-    else:
-        part = "All" if share > 1 else percent(share)
-        text = f"{part} of the squared gap is gone{between}."
-    if _is_within(closure["before"], closure["null_band"]):
-        text += " Before, it was within chance already: the share says little."
-    return text
-
-
-def span(gap: dict) -> str:
-    """What a gap is when nothing is wrong, in words.
-
-    Parameters
-    ----------
-    gap : dict
-        Of gap.json.
-    """
-    if not all(map(known, gap["null_band"])):
-        return DASH
-    return " to ".join(signed(end, gap["unit"]) for end in gap["null_band"])
 
 
 def advice(document: dict) -> tuple[str, list[str]]:

@@ -40,3 +40,9 @@ def case(tmp_path_factory):
 def late():
     "A clock that is 6 ms off"
     return Bed(make_effect("time_offset", magnitude=0.006))
+
+
+@pytest.fixture(scope="session")
+def shaky():
+    "Positions with 8 cm of noise from fix to fix, of which nothing is stated"
+    return Bed(make_effect("position_noise", magnitude=0.08))

@@ -1,17 +1,19 @@
-"""Each row is judged by a cause that was found without it."""
+"""Each row is judged by a size that was found without it."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.close.folds import Folds, cause_for_simulator, make_folds
+from mlscorr.effects.vehicle import PositionStep
+from mlscorr.gap.close.folds import Folds, cause_for_simulator
 from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.gap.infer.causes import Inference
 from mlscorr.gap.infer.measure import Predicted
 from mlscorr.gap.infer.verdict import GapVerdict
+from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.signatures.signatures import signature
 
 
 def test_blocks_are_short_enough_for_an_event(late):
@@ -28,57 +30,53 @@ def test_blocks_are_short_enough_for_an_event(late):
         assert block.min() == 0
 
 
-def test_each_row_is_judged_by_a_cause_found_without_it(late):
-    "Used rows judge one half's cause, check points both; neighbouring blocks take turns"
-    folds = late.folds(late.cause("time_offset"))
-    assert set(np.unique(folds.fold)) == {-1, 0, 1}
+def test_each_row_is_judged_by_a_size_found_without_it(late):
+    "Five folds of whole blocks, each with a fifth of what the clock moves; check points judge all"
+    cause = late.cause("time_offset")
+    folds = late.folds(cause)
+    assert set(np.unique(folds.fold)) == {-1, 0, 1, 2, 3, 4}
     assert (folds.fold[~late.used] == -1).all()
-    assert (folds.judges(0) & folds.judges(1) == (folds.fold == -1)).all()
-    halves = {b: f for b, f in zip(folds.block, folds.fold, strict=True) if f >= 0}
-    assert all(halves[a] != halves[b] for a, b in pairwise(sorted(halves)) if b == a + 1)
+    for block in np.unique(folds.block):
+        assert len(np.unique(folds.fold[late.used & (folds.block == block)])) <= 1
+    moved = np.where(late.used & late.rows.metric, folds.whole.shift, 0.0) ** 2
+    share = [moved[folds.fold == number].sum() / moved.sum() for number in range(5)]
+    assert min(share) > 0.15
 
 
 def test_rows_are_compared_with_what_their_fold_predicts():
-    "Used rows with their own, check points with the first; check points judge every fold"
+    "Used rows with their own, check points with the first"
     nothing = Predicted(*np.zeros((3, 5)))
     fold = np.array([0, 1, -1, 1, 0])
-    folds = Folds(np.arange(5), fold, (nothing, nothing), ("a", "b"), "", nothing)
+    folds = Folds(np.arange(5), fold, (nothing, nothing), "", nothing, np.zeros((5, 0)))
     assert folds.of_rows.tolist() == [0, 1, 0, 1, 0]
-    assert folds.judges(0).tolist() == [True, False, True, False, True]
-    assert folds.judges(1).tolist() == [False, True, True, True, False]
 
 
 def test_a_cause_of_one_moment_holds_nothing_out(late):
-    "What shifts rows of one block of time alone is told by no other: one prediction judges all"
-    cause = late.cause("time_offset")
-    block = late.folds(replace(cause, effect="none")).block
-
-    def in_one_block(effects):
-        return np.where(block == 1, 0.05, 0.0)
-
-    rows, used, survey, signs, _, _, rng = late.arguments(cause)
-    folds = make_folds(rows, used, survey, signs, cause, False, in_one_block, rng)
+    "A jump in the last second shifts rows of one block alone: one prediction judges all"
+    rows, bench = late.rows, Bench(late.rows, late.survey)
+    time = float(rows.gps_time[rows.metric & late.used].max() - rows.reference.start - 1.0)
+    jump = signature(bench, PositionStep, {"time": time}, np.random.default_rng(0))
+    cause = replace(late.cause("time_offset"), parts=((jump, np.full(3, 0.05)),))
+    folds = late.folds(cause)
     assert folds.held_out.startswith("Nothing could be held out")
-    assert folds.labels == () and len(folds.predicted) == 1 and not folds.fold.any()
+    assert len(folds.predicted) == 1 and not folds.fold.any()
     np.testing.assert_array_equal(folds.predicted[0].shift, folds.whole.shift)
 
 
-def test_halves_find_the_size_of_the_clock_by_themselves(late):
-    "Found in half of the blocks each, the predicted shifts are those of 6 ms to a quarter"
-    cause = late.cause("time_offset")
+def test_each_fold_finds_the_size_of_the_clock_by_the_others(late):
+    "Found in four fifths of the blocks each, the predicted shifts are those of 6 ms to a fifth"
     truth = late.simulated((make_effect("time_offset", magnitude=0.006),))
     metric = late.rows.metric
-    for predicted in late.folds(cause).predicted:
+    for predicted in late.folds(late.cause("time_offset")).predicted:
         off = np.sqrt(np.mean((predicted.shift - truth)[metric] ** 2))
-        assert off < 0.25 * np.sqrt(np.mean(truth[metric] ** 2))
+        assert off < 0.2 * np.sqrt(np.mean(truth[metric] ** 2))
 
 
-def test_training_is_counted(late):
-    "Each half reports once when it is done"
-    rows, used, survey, signs, cause, simulated, rng = late.arguments(late.cause("time_offset"))
+def test_the_folds_are_counted(late):
+    "They report once when they are done"
     steps = []
-    make_folds(rows, used, survey, signs, cause, False, simulated, rng, steps.append)
-    assert steps == [1, 1]
+    late.folds(late.cause("time_offset"), progress=steps.append)
+    assert steps == [1]
 
 
 def inference(late, label, probability, is_hidden=False):

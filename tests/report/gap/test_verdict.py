@@ -60,19 +60,3 @@ def test_a_pattern_within_chance_is_explained():
     said = "What gives it away is its pattern, not its size."
     assert said in summary(gap_document(gap=gap))
     assert said not in summary(gap_document())
-
-
-@pytest.mark.parametrize(
-    ("shrink", "interval", "said"),
-    [
-        (0.42, [0.1, 0.7], "42 % of the squared gap is gone (95 %: 10 % to 70 %)."),
-        (1.03, [0.97, 1.1], "All of the squared gap is gone (95 %: 97 % to 100 %)."),
-        (-0.2, [-0.5, 0.1], "The squared gap grew by 20 % (95 %: −50 % to 10 %)."),
-        (0.9, [None, None], "90 % of the squared gap is gone."),
-    ],
-)
-def test_a_gap_that_shrinks_or_grows_is_said_in_words(shrink, interval, said):
-    "More than all can't be gone; a gap that grew is called so"
-    document = gap_document()
-    document["closure"] |= {"shrink": shrink, "interval": interval}
-    assert said in summary(document)

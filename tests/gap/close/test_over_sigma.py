@@ -1,0 +1,35 @@
+"""Errors over the sigma that the simulator gives them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.gap.close.over_sigma import OverSigma, errors_over_sigma
+
+
+def test_errors_that_are_simulated_are_about_one_sigma(late):
+    "With the clock in the simulator no axis is beyond what chance makes"
+    folds = late.folds(late.cause("time_offset"))
+    errors = errors_over_sigma(late.rows, late.observations, folds, np.random.default_rng(1))
+    assert errors.axes == ("E", "N", "H")
+    assert errors.beyond == ()
+    assert min(errors.after) > 0.3 and max(errors.after) < max(errors.before)
+
+
+def test_a_height_of_eight_sigma_is_not_closed(late):
+    "Heights that are eight times their simulated sigma are said so, easting and northing are not"
+    folds, rows = late.folds(late.cause("time_offset")), late.rows
+    up = rows.covariates["axis"] == 2
+    moved = np.where(up & rows.metric, rows.residual + 0.2, rows.residual)
+    late_and_high = replace(rows, residual=moved)
+    errors = errors_over_sigma(late_and_high, late.observations, folds, np.random.default_rng(1))
+    assert errors.beyond == ("H",)
+    assert errors.after[2] > 5
+
+
+@pytest.mark.parametrize(("after", "beyond"), [(1.5, ()), (1.9, ()), (2.4, ()), (2.6, ("H",))])
+def test_twice_the_sigma_may_be_chance(after, beyond):
+    "Beyond is what is more than 1.96 sigma and more than chance makes of this survey"
+    errors = OverSigma(("E", "H"), (9.0, 9.0), (1.0, after), (1.3, 2.5))
+    assert errors.beyond == beyond

@@ -1,0 +1,41 @@
+"""How far the gap shrinks, in words."""
+
+import pytest
+
+from mlscorr.report.gap.shrinking import is_within, shrunk
+from tests.beds.gap_documents import gap_document
+from tests.report.gap.test_verdict import summary
+
+
+@pytest.mark.parametrize(
+    ("shrink", "interval", "said"),
+    [
+        (0.42, [0.1, 0.7], "42 % of the squared gap is gone (95 %: 10 % to 70 %)."),
+        (1.0, [0.97, 1.0], "All of the squared gap is gone (95 %: 97 % to 100 %)."),
+        (-0.2, [-0.5, 0.1], "The squared gap did not shrink, it grew (95 %: −50 % to 10 %)."),
+        (0.9, [None, None], "90 % of the squared gap is gone."),
+    ],
+)
+def test_a_gap_that_shrinks_or_grows_is_said_in_words(shrink, interval, said):
+    "More than all can't be gone; a gap that grew is called so"
+    document = gap_document()
+    document["closure"] |= {"shrink": shrink, "interval": interval}
+    assert said in summary(document)
+
+
+def test_heights_of_eight_sigma_are_not_closed():
+    "Where an axis stays far beyond its simulated sigma, that is said before any share that is gone"
+    errors = {"axes": ["E", "N", "H"], "before": [30.0, 31.0, 9.0], "after": [1.1, 0.9, 8.0]}
+    closure = gap_document()["closure"] | {"shrink": 0.92, "interval": [0.8, 0.97]}
+    closed = closure | {"over_sigma": errors | {"beyond": []}}
+    assert shrunk(closed).startswith("92 % of the squared gap is gone")
+    left = closure | {"over_sigma": errors | {"beyond": ["H"]}}
+    assert shrunk(left).startswith(
+        "Not closed: errors are still 8.0 times in height the sigma that the simulator gives them."
+    )
+
+
+@pytest.mark.parametrize(("value", "within"), [(3.0, True), (4.0, False), (None, False)])
+def test_a_gap_below_its_band_is_within_chance(value, within):
+    "Up to the upper end of the band; what is not known is not"
+    assert is_within(value, [-1.0, 3.5]) is within
