@@ -7,7 +7,6 @@ from dataclasses import asdict
 import numpy as np
 
 from mlscorr.effects import Effect, effect_class
-from mlscorr.effects.vehicle import PositionNoise
 from mlscorr.gap.close.closure import Closure
 from mlscorr.gap.infer.causes import Inference
 from mlscorr.gap.infer.separability import Separability
@@ -83,7 +82,7 @@ def gap_document(
         "next_data": [asdict(data) for data in next_data],
         "evidence": _evidence(inference),
         "innovations": _innovations(rows, where),
-        "windows": _windows(inference.cause, rows),
+        "windows": _windows(inference.cause, survey),
         "map": map_document(survey) | {"rows": _on_map(rows, where)},
         "channels": {str(k): int((rows.channel == k).sum()) for k in np.unique(rows.channel)},
         "simulator": {"effects": [effect.document() for effect in effects]},
@@ -154,7 +153,8 @@ def _split(split):
     place = {"bins": list(split.bins)} if split.edges is None else {"edges": split.edges.tolist()}
     columns = {key: getattr(split, key).tolist() for key in ("count", "before", "after", "share")}
     named = {"by": split.by, "name": name, "unit": unit}
-    return named | place | columns | {"null_band": split.band.tolist()}
+    extent = None if split.extent is None else asdict(split.extent)
+    return named | place | columns | {"null_band": split.band.tolist(), "extent": extent}
 
 
 def _cause(rows, cause):
@@ -230,18 +230,12 @@ def _innovations(rows, where):
     }
 
 
-def _windows(cause, rows):
+def _windows(cause, survey):
     """When the events of a cause act."""
-    windows = []
-    for part, _ in cause.parts:
-        if part.kind.moment():
-            start = rows.reference.start + part.fixed["time"]
-            half = part.fixed.get("width", 0.0) / 2
-            end = rows.gps_time.max() if "width" not in part.fixed else start + half
-            windows.append({"effect": part.name, "start": start - half, "end": float(end)})
-    for start, length, *_ in cause.model.windows:
-        windows.append({"effect": PositionNoise.name, "start": start, "end": start + length})
-    return windows
+    return [
+        {"effect": name, "start": start, "end": end}
+        for name, start, end in cause.stretches(survey.trajectory)
+    ]
 
 
 def map_document(survey: Survey) -> dict:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.gap.close.folds import Folds
-from mlscorr.gap.infer.error_models import ErrorModel, window_growth
-from mlscorr.gap.infer.measure import Predicted
+from mlscorr.gap.infer.error_models import window_growth
+from mlscorr.gap.infer.measure import Predicted, simulated_variance
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.where import AXES
@@ -79,11 +79,4 @@ def errors_over_sigma(
 
 def _sigma(observations, predicted):
     """Simulated sigma (n,) of observations. Units: m."""
-    model: ErrorModel = predicted.model
-    e, scale = observations.errors, predicted.model.scale
-    stated = (e.drift**2 + e.jitter**2 + e.attitude**2).sum(axis=1)
-    growth = np.hypot(window_growth(model.windows, e.gps_time), e.growth)[:, 0]
-    variance = scale**2 * stated + growth**2 * ((e.drift + e.jitter) ** 2).sum(axis=1)
-    variance += model.fixes**2 * (e.place**2).sum(axis=1) + model.noise**2 * e.own
-    variance += (observations.shared**2).sum(axis=1)
-    return np.sqrt(variance + predicted.extra[observations.row] * observations.half)
+    return np.sqrt(simulated_variance(observations, predicted.model, predicted.extra))

@@ -27,7 +27,7 @@ from mlscorr.gap.infer.windows import WindowEvidence
 from mlscorr.gap.observe.absence import Absence
 from mlscorr.gap.observe.rows import Background, Rows
 from mlscorr.gap.signatures.signatures import Signature
-from mlscorr.survey import Survey
+from mlscorr.survey import Survey, Trajectory
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,26 @@ class Cause:
     def effects(self) -> tuple[Effect, ...]:
         """Effects for the simulator. Raises ValueError for a size that no survey can have."""
         return tuple(signature.effect(estimate) for signature, estimate in self.parts)
+
+    def stretches(self, trajectory: Trajectory) -> tuple[tuple[str, float, float], ...]:
+        """Name, start and end of each event and window; an event's where it is half as large as
+        at its largest, or larger.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            The recorded one.
+        """
+        stretches = []
+        for part, _ in self.parts:
+            if part.kind.moment():
+                time = trajectory.gps_time[0] + part.fixed["time"]
+                half = np.sqrt(2 * np.log(2)) * part.fixed.get("width", 0.0)
+                end = time + half if half else trajectory.passes[trajectory.segment(time)][1]
+                stretches.append((part.name, float(time - half), float(end)))
+        for start, length, *_ in self.model.windows:
+            stretches.append((PositionNoise.name, start, start + length))
+        return tuple(stretches)
 
 
 @dataclass(frozen=True)
@@ -147,7 +167,9 @@ def infer_causes(
     best = next(cause for cause in causes if cause.effect == verdict.label)
     left = rows.residual - best.shift
     models = _likely_models(evidence, left, rng, max(replicas, 20), best.model.windows)
-    where = locate(rows, background, best.shift, rng, models, best.model, best.extra)
+    acts = best.stretches(survey.trajectory) if len(best.parts) < 2 else ()
+    acts = acts[0][1:] if len(acts) == 1 else None  # several are no stretch
+    where = locate(rows, background, best.shift, rng, models, best.model, best.extra, acts)
     compared = compare_signatures(evidence.observations, signatures, evidence.blocks.models[0])
     same = _same(best, compared)
     return Inference(verdict, causes, same, where, compared, probability, evidence)

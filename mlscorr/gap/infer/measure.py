@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.effects import effect_class
-from mlscorr.gap.infer.error_models import STATED, ErrorModel
+from mlscorr.gap.infer.error_models import STATED, ErrorModel, window_growth
 from mlscorr.gap.infer.evidence import ColumnTable, block_groups
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
@@ -218,3 +218,24 @@ def scatter_terms(rows: Rows, predicted: Predicted, residual: np.ndarray) -> np.
     rough = (rows.channel == "roughness")[:, None]
     believed = np.where(rough, rows.believed[:, None], 0.0)
     return believed * (np.exp(np.where(rough, residual, 0.0)) - 1 - predicted.growth[:, None])
+
+
+def simulated_variance(
+    observations: Observations, model: ErrorModel, extra: np.ndarray | None = None
+) -> np.ndarray:
+    """Variance (n,) of observations under a model: the diagonal of V. Units: m^2.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : ErrorModel
+    extra : (m,) array, optional
+        That is added to the rows' own noise. Units: m^2.
+    """
+    e = observations.errors
+    stated = (e.drift**2 + e.jitter**2 + e.attitude**2).sum(axis=1)
+    growth = np.hypot(window_growth(model.windows, e.gps_time), e.growth)[:, 0]
+    variance = model.scale**2 * stated + growth**2 * ((e.drift + e.jitter) ** 2).sum(axis=1)
+    variance += model.fixes**2 * (e.place**2).sum(axis=1) + model.noise**2 * e.own
+    variance += (observations.shared**2).sum(axis=1)
+    return variance if extra is None else variance + extra[observations.row] * observations.half

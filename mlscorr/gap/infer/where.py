@@ -16,7 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from mlscorr.gap.infer.error_models import STATED, ErrorModel
-from mlscorr.gap.infer.measure import signed_root
+from mlscorr.gap.infer.extent import Extent, extent_of
+from mlscorr.gap.infer.measure import signed_root, simulated_variance
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Background, Rows
@@ -62,10 +63,12 @@ class Split:
     before, after : (b,) array
         Signed gap of the rows of each bin. Units: mm.
     share : (b,) array
-        Of what the cause explains of the squared innovations; without a cause, of the squared gap
-        of all rows. Sums to one.
+        Of the squares of what the cause moves rows by, and of the variance that it adds; without a
+        cause, of the squared gap of all rows. Sums to one.
     band : (b, 2) array
         95 % of what each bin's gap is when nothing is wrong. Units: mm.
+    extent : Extent or None
+        Of a continuous covariate: the stretch in which the cause acts.
     """
 
     by: str
@@ -76,6 +79,7 @@ class Split:
     after: np.ndarray
     share: np.ndarray
     band: np.ndarray
+    extent: Extent | None = None
 
 
 @dataclass(frozen=True)
@@ -119,6 +123,7 @@ def locate(
     replicas: Sequence[ErrorModel],
     model: ErrorModel = STATED,
     extra: np.ndarray | None = None,
+    acts: tuple[float, float] | None = None,
 ) -> Where:
     """Where the gap lies, before and after a cause is taken off.
 
@@ -136,6 +141,8 @@ def locate(
         Of V after: another one than stated when the cause is in the noise of the POS.
     extra : (m,) array, optional
         Variance that a noise of the rows' own adds, after.
+    acts : (float, float), optional
+        When the cause acts, where it is known better than by the rows. Units: s.
     """
     observed = Observations.of(rows, background)
     columns = observed.columns(np.column_stack([rows.residual, rows.residual - shift]))
@@ -147,27 +154,48 @@ def locate(
     ]
     u, sigma = observed.whitener().innovations(np.hstack([columns, *drawn]))
     terms = sigma[:, None] ** 2 * (u**2 - 1)
-    explained = u[:, 0] ** 2 - u[:, 1] ** 2 if shift.any() else terms[:, 0].copy()
+    has_cause = bool(shift.any()) or model != STATED or extra is not None
     if model != STATED or extra is not None:
         more = 0.0 if extra is None else extra[observed.row] * observed.half
         after, wider = observed.whitener(model, more).innovations(columns[:, 1:])
         u[:, 1] = after[:, 0]
         terms[:, 1] = wider**2 * (after[:, 0] ** 2 - 1)
     keep = observed.second
-    terms, explained, row = terms[keep], explained[keep], observed.row[keep]
+    terms, row = terms[keep], observed.row[keep]
+    square = _moved(observed, shift, model, extra)[keep] if has_cause else np.zeros(len(row))
+    is_moved = bool(square.any())
+    explained = square if is_moved else terms[:, 0]
     mean = terms.mean(axis=0)
     low, high = (float(v) for v in np.percentile(signed_root(mean[2:]), SETTINGS.band))
     band = low, high
-    splits = tuple(_split(rows, row, by, terms, explained) for by in SPLITS)
+    splits = tuple(_split(rows, row, by, terms, explained, is_moved) for by in SPLITS)
     splits = tuple(split for split in splits if split is not None)
+    if acts is not None:
+        splits = _timed(splits, rows, row, square, acts)
     before, after = (float(v) for v in signed_root(mean[:2]))
     return Where(
         before, after, band, splits, row, observed.errors.gps_time[keep], u[keep, :2], sigma[keep],
-        _headline(before, band, splits, len(row), shift.any()),
+        _headline(before, band, splits, len(row), is_moved),
     )  # fmt: skip
 
 
-def _split(rows, row, by, terms, explained):
+def _moved(observed, shift, model, extra):
+    """Square (n,) of what a cause moves observations by, and the variance that it adds. m^2."""
+    stated = simulated_variance(observed, STATED)
+    more = simulated_variance(observed, model, extra) - stated
+    return shift[observed.row] ** 2 + np.maximum(more, 0.0)
+
+
+def _timed(splits, rows, row, square, acts):
+    """Splits with the extent in time that is known."""
+    first, time = rows.reference.start, rows.gps_time[row]
+    inside = (time >= acts[0]) & (time <= acts[1])
+    share = float(square[inside].sum() / (square.sum() or 1.0))
+    extent = Extent(acts[0] - first, acts[1] - first, share, float(inside.mean()))
+    return tuple(replace(s, extent=extent) if s.by == "time" else s for s in splits)
+
+
+def _split(rows, row, by, terms, explained, is_moved):
     """The gap by one covariate, or None where it is not known or the same for all rows."""
     edges, bins, number = _bins(rows, row, by)
     if number is None:
@@ -179,7 +207,15 @@ def _split(rows, row, by, terms, explained):
         by, edges, bins, count, mean[:, 0], mean[:, 1],
         np.bincount(number, explained, len(bins)) / (explained.sum() or 1.0),
         np.percentile(mean[:, 2:], SETTINGS.band, axis=1).T,
+        _extent(rows, row, by, explained) if is_moved and edges is not None else None,
     )  # fmt: skip
+
+
+def _extent(rows, row, by, square):
+    """Extent of a cause in a covariate."""
+    values = rows.covariates[by][row]
+    turn = 360.0 if by == "scan_angle" else None
+    return extent_of(np.degrees(values) if by in DEGREES else values, square, turn)
 
 
 def _bins(rows, row, by):
@@ -206,34 +242,42 @@ def _bins(rows, row, by):
     )
 
 
-def _headline(before, band, splits, number, explained):
+def _headline(before, band, splits, number, is_moved):
     """One sentence: how large, and where most of it is."""
     low, high = band
     measurable, chance = before > high, f"{low:.1f} to {high:.1f} mm when nothing is wrong"
-    more = "more" if before > 0 else "less"
-    size = f"All rows together differ by {abs(before):.1f} mm {more} than predicted"
-    size += f" ({chance})" if measurable else f", no more than by chance ({chance})"
-    if not measurable and not explained:
+    size = f"All rows together differ by {before:.1f} mm more than predicted ({chance})"
+    if not measurable:
+        size = f"All rows together differ by no more than chance makes them ({chance})"
+    if not measurable and not is_moved:
         return f"Nothing stands out. {size}."
     best, largest = None, 0.0
-    for split in splits:
-        fraction = split.count / number
-        for i in range(len(split.bins)):
-            plain = split.share[i] > SETTINGS.plain * fraction[i]
-            if plain and split.share[i] - fraction[i] > largest:
-                best, largest = (split, i), split.share[i] - fraction[i]
-    of = "what the cause explains" if explained else "the gap"
+    for share, rows, words in _places(splits, number):
+        if share > SETTINGS.plain * rows and share - rows > largest:
+            best, largest = (share, rows, words), share - rows
+    of = "what the cause moves" if is_moved else "the gap"
     if best is None:
         return f"{of.capitalize()} lies everywhere alike. {size}."
-    split, i = best
+    share, rows, words = best
     return (
-        f"{100 * min(split.share[i], 1.0):.0f} % of {of} lies {_place(split, i)}, where "
-        f"{100 * split.count[i] / number:.0f} % of the rows are. {size}."
+        f"{100 * min(share, 1.0):.0f} % of {of} lies {words}, where {100 * rows:.0f} % of the rows "
+        f"are. {size}."
     )
 
 
-def _place(split, i):
-    if split.edges is None:
-        return PLACES[split.by].format(CHANNELS.get(split.bins[i], split.bins[i]))
-    name, unit = NAMES[split.by]
-    return f"at a {name} of {split.bins[i]} {unit}"
+def _places(splits, number):
+    """Share, share of the rows and words of each stretch, and of each bin where none is known."""
+    for split in splits:
+        if split.extent is not None:
+            name, unit = NAMES[split.by]
+            low, high = split.extent.low, split.extent.high
+            words = f"at a {name} of {low:.4g} to {high:.4g} {unit}"
+            yield split.extent.share, split.extent.rows, words
+            continue
+        for share, count, bin_name in zip(split.share, split.count, split.bins, strict=True):
+            if split.edges is None:
+                words = PLACES[split.by].format(CHANNELS.get(bin_name, bin_name))
+            else:
+                name, unit = NAMES[split.by]
+                words = f"at a {name} of {bin_name} {unit}"
+            yield share, count / number, words

@@ -78,7 +78,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "smallest": smallest(detectable) if is_clean else [],
         "splits_in_words": joined(lowered(split_title(split)) for split in document["where"]),
         "bin_rows": bin_rows(document),
-        "shared": "what the cause explains" if is_named(document) else "the squared gap",
+        "shared": "what the cause moves" if is_named(document) else "the squared gap",
         "in_set": joined(lowered(title(label)) for label in answer["set"]),
         "cause_rows": probable,
         "unlikely_rows": unlikely,

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mlscorr.report.gap.innovations import WINDOW
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.rows import split_title
 from mlscorr.report.gap.settings import SETTINGS
@@ -39,7 +40,8 @@ def where_figure(document: dict) -> Figure:
         Line2D([], [], color=BEFORE, linewidth=2.2, label="Before"),
         Line2D([], [], color=AFTER, linewidth=2.2, linestyle="--", label="After"),
     )
-    legend_above(figure, _legend(*lines))
+    acts = [Patch(color=WINDOW, label="Where the cause acts")]
+    legend_above(figure, _legend(*lines) + acts * any(split.get("extent") for split in splits))
     return figure
 
 
@@ -68,6 +70,7 @@ def _split(panel, split, is_explained):
     low, high = _band(split)
     panel.stairs(high, edges, baseline=low, fill=True, color=BAND, zorder=1)
     panel.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
+    _draw_extent(panel, split, edges)
     for key, color, style in (("before", BEFORE, "-"), ("after", AFTER, "--")):
         values = numbers(split[key])
         panel.hlines(values, edges[:-1], edges[1:], color=color, linestyle=style, lw=2.2, zorder=4)
@@ -79,6 +82,17 @@ def _split(panel, split, is_explained):
         names = [label(str(name).replace("_", " "), 12) for name in split["bins"]]
         panel.set_xticks(range(n), names, fontsize=7.5, parse_math=False)
     panel.margins(x=0.01)
+
+
+def _draw_extent(panel, split, edges):
+    """The stretch in which the cause acts, where it holds more than its rows account for."""
+    extent = split.get("extent")
+    if extent and extent["share"] > SETTINGS.excess_share * extent["rows"]:
+        turns = (0.0, 360.0) if split["by"] == "scan_angle" else (0.0,)
+        for turn in turns:  # an angle may be told as one of the next turn
+            low, high = max(extent["low"] - turn, edges[0]), min(extent["high"] - turn, edges[-1])
+            if low < high:
+                panel.axvspan(low, high, color=WINDOW, zorder=0.5)
 
 
 def _write_share(panel, split, edges, high, is_explained):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from mlscorr.report.gap.splits import closure_figure, where_figure
 from tests.beds.gap_documents import gap_document
@@ -39,3 +40,22 @@ def test_the_share_stands_on_the_bin_that_holds_more_than_its_rows():
     assert (text.get_text(), text.xy) == ("70 %", (1.5, 9.0))
     split["share"] = [0.25] * 4
     assert not where_figure(gap_document(where=[split])).axes[0].texts
+
+
+@pytest.mark.parametrize(("by", "extent", "drawn"), [
+    ("time", {"low": 1.5, "high": 3.0, "share": 0.9, "rows": 0.3}, [(1.5, 3.0)]),
+    ("time", {"low": 0.5, "high": 3.5, "share": 0.8, "rows": 0.75}, []),
+    (
+        "scan_angle",
+        {"low": 3.5, "high": 361.0, "share": 0.9, "rows": 0.3},
+        [(3.5, 4.0), (0.0, 1.0)],
+    ),
+])  # fmt: skip
+def test_the_stretch_in_which_the_cause_acts_is_shaded(by, extent, drawn):
+    "From its low to its high end, over the turn of an angle; not what acts nearly everywhere"
+    split = {"by": by, "name": by, "unit": "s", "edges": [0.0, 1.0, 2.0, 3.0, 4.0]}
+    split |= {"count": [10] * 4, "before": [2.0] * 4, "after": [0.0] * 4, "share": [0.25] * 4}
+    split |= {"null_band": [[-3.0, 4.0]] * 4, "extent": extent}
+    panel = where_figure(gap_document(where=[split])).axes[0]
+    pink = [p for p in panel.patches if isinstance(p, Rectangle)]
+    assert [(p.get_x(), p.get_x() + p.get_width()) for p in pink] == drawn

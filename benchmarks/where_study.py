@@ -1,0 +1,126 @@
+"""Whether the stretch that a diagnosis points at is the one in which an effect acts.
+
+    OMP_NUM_THREADS=1 python benchmarks/where_study.py [--seeds 6] [--seed 9000] [--size 4]
+
+Made-up surveys of features (gap_features.py) in which something acts in one stretch of time, way,
+range, incidence or scan angle alone: events of the library, a POS that is worse for a while, and
+mechanisms that no library knows. Of each the stretch that is told of that covariate is compared
+with the true one, in which it is half as large as at its largest or larger: intersection over
+union, zero where nothing is told.
+"""
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+from gap_features import errors, process
+from gap_mechanisms import sized
+from gap_study import Bed
+
+from mlscorr.gap.infer.causes import infer_causes
+from mlscorr.gap.observe.rows import background
+from mlscorr.gap.signatures.displacements import displacements
+
+HALF = np.sqrt(2 * np.log(2))  # of a Gaussian's sigma, at which it is half as large
+BANDS = {  # direction of the error, covariate, share of the rows, times the size, by name
+    "range error in a band of ranges": ("beam", "range", 0.25, 1),
+    "range error in a sector of angles": ("beam", "scan_angle", 0.2, 1),
+    "range error in a band of incidence": ("beam", "incidence", 0.25, 1),
+    "subsidence of a stretch of road": ("height", "location", 0.2, 3),  # drift hides it
+    "error to the right for a while": ("right", "time", 0.12, 3),
+}
+EVENTS = ("position_bump", "position_step", "worse POS for a while")
+
+
+def confined(bed, name, rng, m):
+    """Shift (m,) of rows, covariate and its true stretch."""
+    g = bed.g
+    if name in ("position_bump", "position_step"):
+        shift, _, fixed = sized(g, bed.signs, name, m, rng, bed.size)
+        time = g.survey.trajectory.gps_time
+        if "width" in fixed:
+            away = HALF * fixed["width"]
+            return shift, "time", (fixed["time"] - away, fixed["time"] + away)
+        number = g.survey.trajectory.segment(time[0] + fixed["time"])
+        return shift, "time", (fixed["time"], g.survey.trajectory.passes[number][1] - time[0])
+    if name == "worse POS for a while":
+        start, length = rng.uniform(10, 60), rng.uniform(20, 40)
+        time = g.rows.covariates["time"]
+        inside = (time >= start) & (time < start + length)
+        moved = np.array([process(rng, g.rows.gps_time, "sines") for _ in range(3)])
+        shift = inside * np.einsum("mi,im->m", g.rows.partials[:, :3], moved)
+        return shift * 3 * m / bed.size(shift), "time", (start, start + length)
+    direction, by, width, times = BANDS[name]
+    values, views = g.rows.covariates[by], displacements(g.rows, g.survey)
+    values = np.degrees(values) if by in ("scan_angle", "incidence") else values
+    first = rng.uniform(0.05, 0.95 - width)
+    start, end = np.quantile(values[g.rows.metric], [first, first + width])
+    shift = np.zeros(len(g.rows))
+    at = {item: k for k, item in enumerate(views.item) if views.sign[k] > 0}
+    for i in np.flatnonzero(g.rows.metric & (values >= start) & (values <= end)):
+        shift[i] = g.rows.direction[i] @ views.directions[direction][at[g.rows.item[i]]]
+    return shift * times * m / bed.size(shift), by, (start, end)
+
+
+def overlap(extent, truth):
+    """Intersection over union of two stretches."""
+    if extent is None:
+        return 0.0
+    shares = []
+    for turn in (-360.0, 0.0):  # an angle may be told as one of the next turn
+        low, high = np.array([extent.low, extent.high]) + turn
+        both = max(min(high, truth[1]) - max(low, truth[0]), 0.0)
+        shares.append(both / (max(high, truth[1]) - min(low, truth[0])))
+    return max(shares)
+
+
+def case(bed, rng, kind, name, m):
+    """Label, intersection over union, and whether the headline names the covariate."""
+    g = bed.g
+    shift, by, truth = confined(bed, name, rng, m)
+    rows = replace(g.rows, residual=errors(g, rng, kind) + shift)
+    signs = bed.signs
+    inference = infer_causes(rows, background(rows, g.survey), g.survey, signs, rng, 20)
+    split = next(split for split in inference.where.splits if split.by == by)
+    words = {"scan_angle": "scan angle", "incidence": "incidence angle"}.get(by, by)
+    return {
+        "label": inference.verdict.label, "iou": overlap(split.extent, truth), "truth": truth,
+        "extent": split.extent, "headline": inference.where.headline,
+        "named": f"a {words} of" in inference.where.headline,
+    }  # fmt: skip
+
+
+def run(seeds, seed, m, beds=2):
+    """Yields names and their results."""
+    ground = [Bed.of(seed + 2 * i) for i in range(beds)]
+    for number, name in enumerate((*EVENTS, *BANDS)):
+        results = []
+        for k in range(seeds):
+            rng = np.random.default_rng([seed, number, k])
+            bed, kind = ground[k % beds], ("sines", "walk")[k // beds % 2]
+            results.append(case(bed, rng, kind, name, m))
+        yield name, results
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=9000)
+    parser.add_argument("--size", type=float, default=4.0, help="minimal detectable biases")
+    parser.add_argument("--list", action="store_true", help="each case, too")
+    given = parser.parse_args()
+    for name, several in run(given.seeds, given.seed, given.size):
+        iou = [r["iou"] for r in several]
+        silent = sum(r["label"] == "none" for r in several)
+        print(f"{name:36s} median IoU {np.median(iou):.2f}, least {min(iou):.2f}, named by the "
+              f"headline {sum(r['named'] for r in several)} of {len(several)}, nothing told "
+              f"{silent}", flush=True)  # fmt: skip
+        for r in several if given.list else ():
+            e = r["extent"]
+            told = "-" if e is None else f"{e.low:.1f} to {e.high:.1f} ({e.share:.2f})"
+            print(f"   {r['iou']:.2f} {r['label']:30s} truth {r['truth'][0]:.1f} to "
+                  f"{r['truth'][1]:.1f}, told {told}; {r['headline'][:90]}")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
