@@ -14,13 +14,14 @@ what they leave open of them is a part of the stated sigmas.
 """
 
 from mlscorr.estimate.calibration import Calibration, MountingEstimate
-from mlscorr.estimate.guards import COMPONENTS
+from mlscorr.estimate.guards import COMPONENTS, guard_warnings, guards_of
 from mlscorr.estimate.mounting import believed_mounting, estimate_mounting
 from mlscorr.estimate.mounting_check import (
     find_mounting_error,
     mounting_warnings,
     scanner_warnings,
 )
+from mlscorr.estimate.orders import Alternative
 from mlscorr.estimate.placement import (
     NextControl,
     PlannedAccuracy,
@@ -46,6 +47,7 @@ from mlscorr.estimate.tied_mounting import calibration_with_ties, previewed_moun
 __all__ = [
     "COMPONENTS",
     "SETTINGS",
+    "Alternative",
     "Calibration",
     "Estimate",
     "MountingEstimate",
@@ -63,6 +65,8 @@ __all__ = [
     "estimate_correction",
     "estimate_mounting",
     "find_mounting_error",
+    "guard_warnings",
+    "guards_of",
     "mounting_warnings",
     "place_control",
     "predict_accuracy",

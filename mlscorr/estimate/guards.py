@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -87,18 +87,31 @@ def find_guards(
     corrected : Trajectory
         With its sigmas.
     """
-    passes = equations.trajectory.passes.tolist()
-    times = np.sort(equations.observed)
-    control = [times[(times >= first) & (times <= last)] for first, last in passes]
-    return Guards(
-        gap=_longest_gap(passes, control),
-        passes_without_control=tuple(
-            (first, last)
-            for (first, last), inside in zip(passes, control, strict=True)
-            if not len(inside)
-        ),
-        variance_ratio=_variance_ratio(equations, parameters, corrected),
-        global_test=None if equations.ties is not None else _global_test(equations, parameters),
+    ratio = _variance_ratio(equations, parameters, corrected)
+    test = None if equations.ties is not None else _global_test(equations, parameters)
+    everywhere = Guards((0.0, 0.0), (), ratio, test)
+    return guards_of(equations.trajectory.passes, equations.observed, everywhere)
+
+
+def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guards:
+    """Guards with the gaps of some passes.
+
+    Parameters
+    ----------
+    passes : (k, 2) array
+        Start and end of each. Units: s.
+    observed : (n,) array
+        Times of control points. Units: s.
+    guards : Guards
+        Whose variance ratio and test hold there.
+    """
+    times = np.sort(observed)
+    control = [times[(times >= first) & (times <= last)] for first, last in passes.tolist()]
+    spans = list(zip(passes.tolist(), control, strict=True))
+    return replace(
+        guards,
+        gap=_longest_gap(passes.tolist(), control),
+        passes_without_control=tuple((a, b) for (a, b), inside in spans if not len(inside)),
     )
 
 

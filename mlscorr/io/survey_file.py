@@ -1,6 +1,8 @@
 """survey.toml and the files it names, as one Survey."""
 
 import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from mlscorr.io.control import NO_POINTS, holds_points, read_control_list
@@ -12,13 +14,13 @@ from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
 from mlscorr.io.projection import check_area, check_crs, describe_projection
 from mlscorr.io.session_points import check_belongings
-from mlscorr.io.survey_paths import files_of
+from mlscorr.io.survey_paths import SurveyPaths, files_of
 from mlscorr.io.survey_scanners import clouds_of, mounted_scanners, scanner_notes
 from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
 from mlscorr.io.time_systems import match_times
 from mlscorr.io.toml_file import read_toml
-from mlscorr.io.trajectory_sessions import read_sessions
-from mlscorr.survey import CloudFile, Pos, Scanner, Survey, Trajectory
+from mlscorr.io.trajectory_sessions import Sessions, read_sessions
+from mlscorr.survey import CloudFile, ControlPoints, InputFile, Pos, Scanner, Survey, Trajectory
 
 FILE_NAME = "survey.toml"
 UNKNOWN_POS = (
@@ -52,42 +54,106 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
         For files that aren't there.
     """
     path = survey_toml(path)
-    settings = read_survey_file(path, planned)
+    parts = read_parts(path, read_survey_file(path, planned))
+    return parts.survey([parts.cloud_file(cloud) for cloud in parts.files.clouds])
+
+
+@dataclass(frozen=True)
+class SurveyParts:
+    """All of a survey but its clouds.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file that says it.
+    settings : PlannedSurveyFile
+    files : SurveyPaths
+    recorded : Sessions
+    control, check : ControlPoints
+    layout : str or None
+        How the list of these was understood.
+    inputs : tuple of InputFile
+    """
+
+    path: Path
+    settings: PlannedSurveyFile
+    files: SurveyPaths
+    recorded: Sessions
+    control: ControlPoints
+    check: ControlPoints
+    layout: str | None
+    inputs: tuple[InputFile, ...]
+
+    @property
+    def system(self) -> str:
+        """What is said of the clouds' times."""
+        return self.settings.cloud.gps_time if self.settings.cloud else "auto"
+
+    def cloud_file(self, cloud: Path) -> tuple[CloudFile, str]:
+        """The CloudFile of a path; as the function of this name."""
+        return cloud_file(cloud, self.recorded.trajectory, self.system, self.settings.crs)
+
+    def survey(self, read: Sequence[tuple[CloudFile, str]]) -> Survey:
+        """The survey of these parts and of clouds.
+
+        Parameters
+        ----------
+        read : sequence of (CloudFile, str)
+            With the sentences on their time systems.
+
+        Raises
+        ------
+        ValueError
+            Where clouds, trajectories and scanners don't go together.
+        """
+        settings, recorded, path = self.settings, self.recorded, self.path
+        trajectory = recorded.trajectory
+        layouts = [*recorded.layouts, *filter(None, [self.layout])]
+        layouts += conversion_notes([file.path for file, _ in read])
+        cloud_files = tuple(file for file, _ in read)
+        check_belongings(path, self.files.sessions, recorded.parts, cloud_files)
+        scanners = mounted_scanners(path, settings, cloud_files)
+        is_one = len(scanners) == 1
+        notes = crs_notes(settings.crs, trajectory, recorded.is_sbet)
+        notes += [*recorded.notes, *(note for _, note in read), *scanner_notes(scanners), *layouts]
+        if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
+            notes.append(UNKNOWN_POS)
+        return Survey(
+            name=settings.name or path.absolute().parent.name,
+            path=path,
+            crs=settings.crs,
+            clouds=clouds_of(scanners, cloud_files),
+            trajectory=trajectory,
+            mounting=scanners[0].mounting if is_one else None,
+            control=self.control,
+            check=self.check,
+            scanner=scanners[0].scanner if is_one else Scanner(),
+            pos=settings.pos.pos(),
+            reference=self.files.reference,
+            search_radius=settings.matching.search_radius,
+            use_ties=settings.ties.use == "auto",
+            notes=tuple(notes),
+            layouts=tuple(layouts),
+            inputs=self.inputs,
+            scanners=() if is_one else scanners,
+        )
+
+
+def read_parts(path: Path, settings: PlannedSurveyFile) -> SurveyParts:
+    """All of a survey but its clouds.
+
+    Parameters
+    ----------
+    path : Path
+        Beside which the files lie that are named.
+    settings : PlannedSurveyFile
+        What raises is as of read_survey.
+    """
     files = files_of(path, settings)
     inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
     recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
-    trajectory = recorded.trajectory
-    control, check, layout = _surveyed(files.control, settings.control, trajectory)
-    layouts = [*recorded.layouts, *filter(None, [layout]), *conversion_notes(files.clouds)]
-    notes = crs_notes(settings.crs, trajectory, recorded.is_sbet)
-    system = settings.cloud.gps_time if settings.cloud else "auto"
-    read = [cloud_file(cloud, trajectory, system, settings.crs) for cloud in files.clouds]
-    cloud_files = tuple(file for file, _ in read)
-    check_belongings(path, files.sessions, recorded.parts, cloud_files)
-    scanners = mounted_scanners(path, settings, cloud_files)
-    is_one = len(scanners) == 1
-    notes += [*recorded.notes, *(note for _, note in read), *scanner_notes(scanners), *layouts]
-    if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
-        notes.append(UNKNOWN_POS)
-    return Survey(
-        name=settings.name or path.absolute().parent.name,
-        path=path,
-        crs=settings.crs,
-        clouds=clouds_of(scanners, cloud_files),
-        trajectory=trajectory,
-        mounting=scanners[0].mounting if is_one else None,
-        control=control,
-        check=check,
-        scanner=scanners[0].scanner if is_one else Scanner(),
-        pos=settings.pos.pos(),
-        reference=files.reference,
-        search_radius=settings.matching.search_radius,
-        use_ties=settings.ties.use == "auto",
-        notes=tuple(notes),
-        layouts=tuple(layouts),
-        inputs=inputs,
-        scanners=() if is_one else scanners,
-    )
+    surveyed = _surveyed(files.control, settings.control, recorded.trajectory)
+    return SurveyParts(path, settings, files, recorded, *surveyed, inputs)
 
 
 def _surveyed(path, section, trajectory):

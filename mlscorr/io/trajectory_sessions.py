@@ -89,7 +89,7 @@ def read_sessions(
     joined, notes = parts[0], []
     if len(parts) > 1:
         check_systems(names, parts)
-        parts, notes = _with_sigmas(names, parts, pos)
+        parts, notes = with_sigmas(names, parts, pos)
         joined, joints = join_sessions(names, parts, pos or Pos())
         notes = [_summary(names, parts, joined), *joints, *notes]
     layouts = tuple(filter(None, (file.layout for file in read)))
@@ -133,8 +133,25 @@ def check_systems(names: Sequence[str], parts: Sequence[Trajectory]) -> None:
             )
 
 
-def _with_sigmas(names, parts, pos):
-    """All parts with the sigmas that one of them states, and sentences on those of [pos]."""
+def with_sigmas(
+    names: Sequence[str], parts: Sequence[Trajectory], pos: Pos | None
+) -> tuple[list[Trajectory], list[str]]:
+    """All trajectories with the sigmas that one of them states, and sentences on those of [pos].
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the files, for messages.
+    parts : sequence of Trajectory
+    pos : Pos or None
+        What is believed of those without sigmas.
+
+    Raises
+    ------
+    ValueError
+        Where nothing is.
+    """
+    parts = list(parts)
     notes = []
     for kind in KINDS:
         key = f"{kind}_sigma"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlscorr.correction import PointSigma
-from mlscorr.estimate import Estimate, NextControl, place_control
+from mlscorr.estimate import Estimate, NextControl, Support, place_control
 from mlscorr.evaluate.model import largest_sigma, model_section
 from mlscorr.evaluate.rows import PointCounts, Score, TargetRow
 from mlscorr.evaluate.scores import accuracy, score
@@ -23,7 +23,7 @@ from mlscorr.io.result_tables import write_targets_csv
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.io.trajectory_exports import check_exports, export_trajectory
 from mlscorr.io.weak_files import write_weak
-from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.clouds import WrittenClouds, write_counted
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Survey, Trajectory
 from mlscorr.survey.data_frame import rows_frame
@@ -180,25 +180,44 @@ class CorrectedSurvey(Summary):
         OSError
             When writing fails.
         """
-        from mlscorr.report import first_screen
-
         check_exports(trajectories, self.survey.crs, is_read=True)
         with output_folder(out, self.survey.inputs, overwrite) as folder:
-            files, uncontrolled = self._write_clouds(folder, progress or silent, sigma)
-            write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
-            exports = [
-                name
-                for export in trajectories
-                for name in export_trajectory(folder / export, self.trajectory, self.survey.crs)
-            ]
-            write_targets_csv(folder / "targets.csv", [row.document() for row in self.targets])
-            weak = [stretch.document() for stretch in self.estimate.support.weak]
-            weak_names = write_weak(folder, weak, self.trajectory, self.survey.crs)
-            report = self._report(folder, files, uncontrolled, exports, weak_names)
-            content = document("report", first_screen(report) | report.document())
-            write_json(folder / "report.json", content)
-            if page:
-                self._draw(folder, report, progress or silent)
+            done = (progress or silent)("Writing the cloud", self.survey.points)
+            moved = self.survey, folder, self.estimate.correction, self.held
+            written = write_counted(*moved, done, self.point_sigma if sigma else None)
+            return self.write_beside(folder, written, progress, page, trajectories)
+
+    @property
+    def held(self) -> tuple[tuple[float, float], Support]:
+        """First and last control epoch (s), and what holds the correction along the drive."""
+        span = self.estimate.span if self.estimate.used.any() else (np.inf, -np.inf)
+        return span, self.estimate.support
+
+    def write_beside(
+        self,
+        folder: Path,
+        written: WrittenClouds,
+        progress: Callable | None = None,
+        page: bool = True,
+        trajectories: Sequence[str] = (),
+    ) -> dict:
+        """Write all but the clouds into a folder that is there, as ``write`` does."""
+        from mlscorr.report import first_screen
+
+        write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
+        exports = [
+            name
+            for export in trajectories
+            for name in export_trajectory(folder / export, self.trajectory, self.survey.crs)
+        ]
+        write_targets_csv(folder / "targets.csv", [row.document() for row in self.targets])
+        weak = [stretch.document() for stretch in self.estimate.support.weak]
+        weak_names = write_weak(folder, weak, self.trajectory, self.survey.crs)
+        report = self._report(folder, written, exports, weak_names)
+        content = document("report", first_screen(report) | report.document())
+        write_json(folder / "report.json", content)
+        if page:
+            self._draw(folder, report, progress or silent)
         return content
 
     def _draw(self, folder, report, progress):
@@ -217,6 +236,11 @@ class CorrectedSurvey(Summary):
         """Where one more control point each would help most, the best first."""
         return place_control(self.estimate)
 
+    @cached_property
+    def tie_section(self) -> dict | None:
+        """What ties did, as report.json has it."""
+        return tie_section(self.estimate)
+
     def point_sigma(self, survey: Survey | None = None) -> PointSigma:
         """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m.
 
@@ -228,33 +252,13 @@ class CorrectedSurvey(Summary):
         survey = survey or self.survey
         return PointSigma.of(self.estimate.correction, survey.scanner, survey.mounting)
 
-    def _write_clouds(self, folder, progress, sigma):
-        """Write the clouds: (path, points, outside) of each, and points outside of control and
-        extrapolated (2,).
-        """
-        first, last = self.estimate.span if self.estimate.used.any() else (np.inf, -np.inf)
-        uncontrolled = np.zeros(2, int)
-        done = progress("Writing the cloud", self.survey.points)
-
-        def watch(times):
-            is_outside = (times < first) | (times > last)
-            is_weak = self.estimate.support.contains(times)
-            uncontrolled[:] += np.count_nonzero([is_outside, is_weak], axis=1)
-            done(len(times))
-
-        sigmas = self.point_sigma if sigma else None
-        files = write_clouds(self.survey, folder, self.estimate.correction, watch, sigmas)
-        return files, uncontrolled.tolist()
-
-    def _report(self, folder, files, uncontrolled, exports, weak_names):
+    def _report(self, folder, written, exports, weak_names):
         """The CorrectionReport, once all that it names stands in the folder."""
         from mlscorr.report.correction_report import FileRow
 
         def described(what, path):
             return FileRow(path.name, sha256(path), what, bytes=path.stat().st_size)
 
-        outside, total = (sum(file[k] for file in files) for k in (2, 1))
-        outside_control, extrapolated = uncontrolled
         names = ["trajectory.csv", *exports]
         outputs = [*(("corrected trajectory", name) for name in names), ("targets", "targets.csv")]
         outputs += [("extrapolated stretches", name) for name in weak_names]
@@ -262,12 +266,12 @@ class CorrectedSurvey(Summary):
             self._draft,
             coverage=replace(
                 self._draft.coverage,
-                points_outside_trajectory=outside,
-                points_outside_control=outside_control,
-                points_extrapolated=extrapolated,
-                points_corrected=total - outside,
+                points_outside_trajectory=written.outside,
+                points_outside_control=written.uncontrolled,
+                points_extrapolated=written.extrapolated,
+                points_corrected=sum(n for _, _, n in written.files) - written.outside,
             ),
-            files=tuple(FileRow(path.name, sha256(path), points=n) for path, n, _ in files),
+            files=tuple(FileRow(name, digest, points=n) for name, digest, n in written.files),
             inputs=tuple(described(file.what, file.path) for file in self.survey.inputs),
             outputs=tuple(described(what, folder / name) for what, name in outputs),
             next_control=self.next_control,
@@ -291,6 +295,6 @@ class CorrectedSurvey(Summary):
             model=model_section(self.estimate, self.warnings),
             coverage=Coverage(self.estimate.span, longest),
             support=self.estimate.support,
-            ties=tie_section(self.estimate),
+            ties=self.tie_section,
             position_sigma=largest_sigma(self.trajectory),
         )

@@ -91,18 +91,38 @@ def estimate_survey(
 
     if ties == "only":
         control, check, finding = find_check(survey, progress, read)
-        estimate = believed_correction(survey.trajectory, survey.pos)
     else:
         control, check, finding = find_control(survey, rng, progress, read)
-        estimate = estimate_correction(survey.trajectory, control, survey.pos, order)
-    if ties == "off":
-        estimate = replace(estimate, untied=LEFT_OUT)
-    else:
-        estimate = tie_passes(survey, estimate, collector.features())
-        estimate = _with_mounting_checked(survey, estimate, control)
+    features = None if ties == "off" else collector.features()
+    estimate = estimate_together(survey, control, features, order)
     if ties == "only" and estimate.ties is None:
         raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
     return survey, control, check, finding, estimate
+
+
+def estimate_together(
+    survey: Survey, control: Matched, features: TieFeatures | None, order: int
+) -> Estimate:
+    """The POS error by matched control points, and by what two passes both saw.
+
+    Parameters
+    ----------
+    survey : Survey
+    control : Matched
+        Without any, ties alone bring passes together where the POS says that they are.
+    features : TieFeatures or None
+        None where ties are left out.
+    order : int
+        Of the trend.
+    """
+    if len(control):
+        estimate = estimate_correction(survey.trajectory, control, survey.pos, order)
+    else:
+        estimate = believed_correction(survey.trajectory, survey.pos)
+    if features is None:
+        return replace(estimate, untied=LEFT_OUT)
+    estimate = tie_passes(survey, estimate, features)
+    return _with_mounting_checked(survey, estimate, control)
 
 
 def _with_mounting_checked(survey, estimate, control):

@@ -1,7 +1,7 @@
 """Pass 1 over the cloud: keep the points near control points, whatever the file's size."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
@@ -30,12 +30,15 @@ class Candidates:
         Those that have no pose.
     passes : dict
         Numbers of passes by (number of the file, segment of the trajectory).
+    starts : dict
+        When these begin, likewise. Units: s.
     """
 
     cloud: PointCloud
     pass_number: np.ndarray
     unplaced: PointCloud
     passes: dict[tuple[int, int], int]
+    starts: dict[tuple[int, int], float] = field(default_factory=dict)
 
 
 def search_radius(survey: Survey, points: ControlPoints) -> np.ndarray:
@@ -102,11 +105,22 @@ def collect(
         else:
             kept.append(held)
             numbers.append(np.column_stack([np.full(len(segments), number), segments]))
-    passes = {key: i for i, key in enumerate(sorted(starts, key=starts.get), start=1)}
+    passes = number_passes(starts)
     keys = map(tuple, np.concatenate(numbers).tolist())
     pass_number = np.array([passes[key] for key in keys], int)
     clouds = map(PointCloud.concatenate, (kept, unplaced))
-    return Candidates(next(clouds), pass_number, next(clouds), passes)
+    return Candidates(next(clouds), pass_number, next(clouds), passes, starts)
+
+
+def number_passes(starts: dict[tuple[int, int], float]) -> dict[tuple[int, int], int]:
+    """Numbers of passes from 1 in time, by (number of the file, segment of the trajectory).
+
+    Parameters
+    ----------
+    starts : dict
+        When each begins. Units: s.
+    """
+    return {key: i for i, key in enumerate(sorted(starts, key=starts.get), start=1)}
 
 
 class Neighbourhoods:

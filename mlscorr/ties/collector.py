@@ -1,5 +1,6 @@
 """Tie features of a survey's clouds, found while these are read."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -22,13 +23,20 @@ class TieCollector:
     survey : Survey
     held_cells : int, optional
         Above as many, cells of moments that have passed are looked at and left.
+    origin : (3,) array, optional
+        Whole metres, near the survey; that of its trajectory by default. Units: m.
     """
 
-    def __init__(self, survey: Survey, held_cells: int = SETTINGS.held_cells):
+    def __init__(
+        self,
+        survey: Survey,
+        held_cells: int = SETTINGS.held_cells,
+        origin: np.ndarray | None = None,
+    ):
         self._survey, self._held_cells = survey, held_cells
         self._segments = survey.trajectory.passes
         start = np.floor(survey.trajectory.gps_time[0])
-        self._origin = np.floor(survey.trajectory.position[0])
+        self._origin = np.floor(survey.trajectory.position[0]) if origin is None else origin
         self._cells = CellTable(self._origin, start, SETTINGS.cell, SETTINGS.moment)
         self._starts = np.full((len(survey.clouds), len(self._segments)), np.inf)
         self._kept: list[TieFeatures] = []
@@ -77,10 +85,23 @@ class TieCollector:
         """Features of all chunks so far, in order of pass and time; chunks may still follow."""
         rest = self._shapes(np.ones(self._cells.count, bool))
         features = TieFeatures.concatenate([*self._kept, rest])
-        features = features[thin(features, self._origin)]
+        group = features.pass_number
         number = np.empty(self._starts.size, int)
         number[np.argsort(self._starts.ravel(), kind="stable")] = np.arange(1, number.size + 1)
-        group = features.pass_number
         features = replace(features, pass_number=number[group], scanner=self._scanner(group))
-        keys = (*features.centre.T, features.gps_time, features.pass_number)
-        return features[np.lexsort(keys)]
+        return join_features([features], self._origin)
+
+
+def join_features(parts: Iterable[TieFeatures], origin: np.ndarray) -> TieFeatures:
+    """Those that stay of the features of some passes, in order of pass and time.
+
+    Parameters
+    ----------
+    parts : iterable of TieFeatures
+    origin : (3,) array
+        As of TieCollector. Units: m.
+    """
+    features = TieFeatures.concatenate(parts)
+    features = features[thin(features, origin)]
+    keys = (*features.centre.T, features.gps_time, features.pass_number)
+    return features[np.lexsort(keys)]

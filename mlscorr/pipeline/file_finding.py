@@ -1,0 +1,144 @@
+"""What one cloud file holds of targets and ties, and the findings of several files as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.io.las import read_chunks
+from mlscorr.matching import Matches
+from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets
+from mlscorr.survey import PointCloud, Survey, TieFeatures
+from mlscorr.targets import NO_POINTS, Candidates, PassTarget, as_observations, number_passes
+from mlscorr.ties import TieCollector
+
+
+@dataclass(frozen=True)
+class FileFinding:
+    """What a cloud file holds.
+
+    Parameters
+    ----------
+    starts : dict
+        When its points begin in each segment of the trajectory. Units: s.
+    targets : list of (segment, FittedTarget)
+    unplaced : PointCloud
+        Points near surveyed points without a pose.
+    scanned : frozenset of str
+        Names of the surveyed points that have points of it about them.
+    warnings : tuple of str
+        On beams that can't have been measured so.
+    features : TieFeatures
+        Planes and poles; the number of the pass is that of the segment.
+    """
+
+    starts: dict[int, float]
+    targets: list[PassTarget]
+    unplaced: PointCloud
+    scanned: frozenset[str]
+    warnings: tuple[str, ...]
+    features: TieFeatures
+
+
+def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> FileFinding:
+    """What the one cloud file of a survey holds.
+
+    Parameters
+    ----------
+    survey : Survey
+        With the surveyed points near the file at least.
+    origin : (3,) array
+        Of the cells of planes and poles, the same for all files. Units: m.
+    with_ties : bool
+        Whether planes and poles are looked for.
+    """
+    collector = TieCollector(survey, origin=origin)
+
+    def read(file):
+        for chunk in read_chunks(file):
+            if with_ties:
+                collector.add(file, chunk)
+            yield chunk
+
+    fitted, candidates, near = fit_while_reading(survey, read)
+    segments = {number: segment for (_, segment), number in candidates.passes.items()}
+    features = collector.features()
+    numbers = [segments[number] for number in features.pass_number.tolist()]
+    names = survey.surveyed.name
+    return FileFinding(
+        starts={segment: start for (_, segment), start in candidates.starts.items()},
+        targets=[(segments[number], target) for number, target in fitted],
+        unplaced=candidates.unplaced,
+        scanned=frozenset(names[i] for i in np.flatnonzero(near.is_scanned)),
+        warnings=tuple(near.beams.warnings()),
+        features=replace(features, pass_number=np.array(numbers, int)),
+    )
+
+
+@dataclass(frozen=True)
+class DriveFinding:
+    """What the files of a drive hold together.
+
+    Parameters
+    ----------
+    finding : Finding
+    features : TieFeatures
+        With the numbers of the drive's passes.
+    """
+
+    finding: Finding
+    features: TieFeatures
+
+
+def join_findings(survey: Survey, files: Sequence[FileFinding]) -> DriveFinding:
+    """The finding of a survey by those of its files.
+
+    Parameters
+    ----------
+    survey : Survey
+    files : sequence of FileFinding
+        Of each of its clouds, in their order.
+    """
+    starts = {
+        (number, segment): start
+        for number, file in enumerate(files)
+        for segment, start in file.starts.items()
+    }
+    passes = number_passes(starts)
+    targets = [
+        (passes[number, segment], target)
+        for number, file in enumerate(files)
+        for segment, target in file.targets
+    ]
+    targets.sort(key=lambda pair: (pair[0], pair[1].gps_time))
+    unplaced = PointCloud.concatenate([NO_POINTS, *(file.unplaced for file in files)])
+    candidates = Candidates(NO_POINTS, np.empty(0, int), unplaced, passes, starts)
+    finding = _matched(survey, targets, candidates)
+    parts = [
+        replace(
+            file.features,
+            pass_number=np.array(
+                [passes[number, segment] for segment in file.features.pass_number.tolist()], int
+            ),
+            scanner=np.full(len(file.features), survey.scanner_numbers[number]),
+        )
+        for number, file in enumerate(files)
+    ]
+    return DriveFinding(
+        replace(
+            finding,
+            scanned=frozenset().union(*(file.scanned for file in files)),
+            warnings=tuple(sentence for file in files for sentence in file.warnings),
+        ),
+        TieFeatures.concatenate(parts),
+    )
+
+
+def _matched(survey, targets, candidates):
+    """The Finding of some targets; without a match where nothing was surveyed."""
+    if len(survey.surveyed):
+        return match_targets(targets, candidates, survey)
+    nothing = as_observations([])
+    return Finding(Matches(nothing, nothing, (), np.empty(0), ()), candidates, {})
