@@ -14,6 +14,7 @@ from typer.main import get_command
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import catalogue, known_effects
+from mlscorr.io.project_sections import ProjectFile
 from mlscorr.io.survey_sections import SurveyFile
 from mlscorr.simulate import Scenario
 from mlscorr.simulate.simulator_file import SimulatorFile
@@ -57,7 +58,8 @@ def test_every_survey_toml_can_be_read(page):
     "The sections that the pages show are those that a survey has, or a simulator"
     for block in re.findall(r"```toml\n(.*?)```", page.read_text(), flags=re.S):
         document = tomllib.loads(block)
-        (SurveyFile if "cloud" in document else SimulatorFile).model_validate(document)
+        model = ProjectFile if isinstance(document.get("drive"), list) else SimulatorFile
+        (SurveyFile if "cloud" in document else model).model_validate(document)
 
 
 def test_the_readme_is_short_and_leads_to_every_page():

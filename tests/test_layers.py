@@ -50,6 +50,15 @@ SIMULATOR_FLOOR = {room: number for number, rooms in enumerate(SIMULATOR) for ro
 MODULES = sorted(
     path for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.stem[0] != "_"
 )
+PROJECT_FLOORS = (  # of the modules within pipeline/project, which stands on top of one survey
+    ("settings", "engine", "tasks", "joint"),
+    ("file_tasks", "running", "progress", "drive_estimate"),
+    ("stages", "corrected"),
+    ("document",),
+    ("correction",),
+    ("status",),
+)
+PROJECT_FLOOR = {room: number for number, rooms in enumerate(PROJECT_FLOORS) for room in rooms}
 GAP_MODULES = sorted((PACKAGE / "gap").rglob("*.py"))
 
 
@@ -88,6 +97,23 @@ def test_imports_within_the_gap_point_downward(path):
         if parts[:2] == ["mlscorr", "gap"] and len(parts) > 2 and parts[2] in GAP_FLOOR:
             below = GAP_FLOOR[parts[2]] < GAP_FLOOR.get(room, len(GAP_FLOORS))
             assert below or parts[2] == room, f"{room} imports {name}"
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "pipeline").glob("*.py")), ids=lambda p: p.stem)
+def test_a_survey_knows_no_project(path):
+    "Commands for one survey do without those for many"
+    assert not any(name.startswith("mlscorr.pipeline.project") for name in imports_of(path))
+
+
+@pytest.mark.parametrize(
+    "path", sorted((PACKAGE / "pipeline" / "project").glob("[a-z]*.py")), ids=lambda p: p.stem
+)
+def test_imports_within_a_project_point_downward(path):
+    "Tasks and engines, what touches files, what joins drives, the story: each knows those below"
+    for name in imports_of(path):
+        parts = name.split(".")
+        if parts[:3] == ["mlscorr", "pipeline", "project"] and len(parts) > 3:
+            assert PROJECT_FLOOR[parts[3]] < PROJECT_FLOOR[path.stem], f"{path.stem}: {name}"
 
 
 def test_the_gap_is_a_story_of_few_rooms():

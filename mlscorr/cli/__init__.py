@@ -19,6 +19,7 @@ from mlscorr.cli.doctor import doctor
 from mlscorr.cli.extract import extract
 from mlscorr.cli.init import init
 from mlscorr.cli.plan import plan
+from mlscorr.cli.project import status
 from mlscorr.cli.render import render
 from mlscorr.cli.simulate import simulate
 from mlscorr.cli.terminal import deafen, listen, warn
@@ -26,7 +27,7 @@ from mlscorr.cli.ties import ties
 
 COMMANDS = (
     *(init, check, correct, extract, ties, calibrate, compare, render, demo),
-    *(simulate, diagnose, apply, plan, doctor),
+    *(simulate, diagnose, apply, plan, doctor, status),
 )
 
 app = typer.Typer(

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 import mlscorr
+from mlscorr.cli.project import correct_drives
 from mlscorr.cli.terminal import (
     Exit,
     Json,
@@ -55,25 +56,49 @@ def correct(
             '0.1", "weak.sigma > 0.1" (m). Exit code 6 if one is met; all results are written.'
         ),
     ] = (),
+    workers: Annotated[
+        int, typer.Option(min=1, help="Of a project.toml: processes of this machine that share it.")
+    ] = 1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Of a project.toml: address of a dask.distributed cluster's scheduler."),
+    ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Of a project.toml: do what is missing or changed in OUT."),
+    ] = False,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Correct the cloud of a survey with its control points, and report on it."""
+    """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
     with exit_code(Exit.USAGE):
         from mlscorr.evaluate.quality import failures, read_gate
+        from mlscorr.io.project_file import is_project
         from mlscorr.io.trajectory_exports import check_exports
 
         check_exports(trajectory)
         gates = [read_gate(text) for text in fail_if]
         if no_ties and ties_only:
             raise ValueError("--no-ties and --ties-only leave nothing to correct with: give one.")
+        ties: Literal["off", "only"] | None = "off" if no_ties else "only" if ties_only else None
+        shared = workers, scheduler, resume
+        if is_project(survey):
+            from mlscorr.pipeline.project import Options
+
+            given = order, ties, sigma, not no_report, tuple(trajectory), *shared, overwrite
+            correct_drives(survey, out, Options(*given), gates, as_json)
+            return
+        if shared != (1, None, False):
+            raise ValueError(
+                f"--workers, --scheduler and --resume are of a project.toml, and {survey} is one "
+                'survey. Two lines make a project of it: [[drive]] and survey = "survey.toml".'
+            )
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
         for sentence in recorded.layouts:
             say(sentence)
         check_exports(trajectory, recorded.crs, is_read=True)
-        ties: Literal["off", "only"] | None = "off" if no_ties else "only" if ties_only else None
         result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
         report = result.write(
             out, overwrite, progress, sigma, page=not no_report, trajectories=trajectory

@@ -110,7 +110,7 @@ def deafen() -> None:
 
 
 @contextmanager
-def exit_code(code: Exit, has_results: Callable[[], bool] = lambda: False) -> Iterator[None]:
+def exit_code(code: Exit, has_results: Callable[[], bool | str] = lambda: False) -> Iterator[None]:
     """End with one sentence and an exit code where the user's input or the system is at fault.
 
     Parameters
@@ -118,7 +118,8 @@ def exit_code(code: Exit, has_results: Callable[[], bool] = lambda: False) -> It
     code : Exit
         For a ValueError.
     has_results : function
-        Whether results stand already; asked when an interruption comes.
+        Whether results stand already, or what is to be said of them; asked when an interruption
+        comes.
 
     Raises
     ------
@@ -157,7 +158,7 @@ def _stop(has_results):
     """End as interrupted."""
     deafen()
     done = "all results were written before" if has_results else "nothing was written"
-    warn(f"Interrupted; {done}.")
+    warn(f"Interrupted; {has_results if isinstance(has_results, str) else done}.")
     raise typer.Exit(Exit.INTERRUPTED) from None
 
 

@@ -17,6 +17,7 @@ class Settings:
     largest_chunk: int = 10_000_000  # points; lazrs allocates whole LAZ chunks, aborts if it can't
     sigma_step: float = 1e-4  # m, of a point's sigma in 16 bits: up to 6.5 m
     copied_bytes: int = 1 << 20  # at a time, where bytes are copied as they are
+    identified_bytes: int = 1 << 16  # of head and tail: header, first points, table of LAZ chunks
 
     glanced_points: int = 5_000_000  # of a cloud that is no LAS, by check and init: 3 s
     single_step: float = 1e-3  # m, of coordinates in single precision, within 8 km of zero

@@ -7,7 +7,7 @@ from tests.beds.places import ROOT
 SHARED = "In several documents"
 # fields whose keys are names: of effects, of kinds of rows, of families, of what a method gives
 NAMED = {"detectable", "left_out", "channels", "families", "details", "determined"}
-NAMED |= {"variance_ratio", "passes"}
+NAMED |= {"variance_ratio", "passes", "tied_with"}
 
 
 def keys_of(value):

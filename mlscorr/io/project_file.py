@@ -1,0 +1,255 @@
+"""project.toml: several drives, one control list, and what is believed of all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.io.control import NO_POINTS, holds_points, read_control_list
+from mlscorr.io.inputs import input_file
+from mlscorr.io.nearness import check_together
+from mlscorr.io.project_sections import ProjectFile
+from mlscorr.io.projection import check_crs
+from mlscorr.io.survey_file import SurveyParts, read_parts, read_survey_file, survey_toml
+from mlscorr.io.survey_paths import existing, matching
+from mlscorr.io.survey_sections import CloudSection, SurveyFile
+from mlscorr.io.toml_file import read_toml
+from mlscorr.io.trajectory_sessions import check_systems
+from mlscorr.survey import ControlPoints, InputFile, Trajectory
+
+FILE_NAME = "project.toml"
+BELIEFS = ("pos", "matching", "ties")  # sections that hold for all drives
+SHARED = ("mounting", "scanner", *BELIEFS)  # and those that hold where a drive has none of its own
+
+
+@dataclass(frozen=True)
+class DriveParts:
+    """A drive by all but its clouds.
+
+    Parameters
+    ----------
+    name : str
+    parts : SurveyParts
+    notes : tuple of str
+    """
+
+    name: str
+    parts: SurveyParts
+    notes: tuple[str, ...] = ()
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """As recorded."""
+        return self.parts.recorded.trajectory
+
+
+@dataclass(frozen=True)
+class ProjectParts:
+    """A project as its files say it, but for the clouds.
+
+    Parameters
+    ----------
+    name : str
+    path : Path
+        Of project.toml.
+    crs : str or None
+    drives : tuple of DriveParts
+    control, check : ControlPoints
+        Of all drives.
+    layout : str or None
+        How the list of these was understood.
+    inputs : tuple of InputFile
+        project.toml and the control list.
+    """
+
+    name: str
+    path: Path
+    crs: str | None
+    drives: tuple[DriveParts, ...]
+    control: ControlPoints
+    check: ControlPoints
+    layout: str | None
+    inputs: tuple[InputFile, ...]
+
+    @property
+    def files(self) -> list[Path]:
+        """Every file that is read."""
+        named = [file.path for drive in self.drives for file in drive.parts.inputs]
+        return list(dict.fromkeys([*(file.path for file in self.inputs), *named]))
+
+
+def is_project(path: str | Path) -> bool:
+    """Whether a path is that of a project.toml, or of a folder that holds one and no survey.toml.
+
+    Parameters
+    ----------
+    path : path
+    """
+    path = Path(path)
+    if path.is_dir():
+        return (path / FILE_NAME).is_file() and not (path / "survey.toml").is_file()
+    return path.name == FILE_NAME or path.name.endswith(f".{FILE_NAME}")
+
+
+def read_project(path: str | Path) -> ProjectParts:
+    """All of a project but its clouds.
+
+    Parameters
+    ----------
+    path : path
+        project.toml, or the folder that holds it.
+
+    Raises
+    ------
+    ValueError
+        For anything wrong in project.toml, in the files it names, or between drives.
+    FileNotFoundError
+        For files that aren't there.
+    """
+    path = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
+    settings = read_project_file(path)
+    drives = tuple(_drive(path, settings, name, section) for name, section in settings.drives)
+    _check_tiles(path, settings, drives)
+    _check_alike(path, settings, drives)
+    drives = tuple(_with_beliefs(path, drives))
+    crs = settings.crs or drives[0].parts.settings.crs
+    inputs, surveyed = [input_file("project", path)], (NO_POINTS, NO_POINTS, None)
+    if settings.control is not None:
+        file = existing(path, "control.file", settings.control.file)
+        inputs.append(input_file("control", file))
+        surveyed = _surveyed(file, settings.control, _everywhere(drives))
+    name = settings.name or path.absolute().parent.name
+    return ProjectParts(name, path, crs, drives, *surveyed, tuple(inputs))
+
+
+def read_project_file(path: str | Path) -> ProjectFile:
+    """What stands in a project.toml; no other file is opened.
+
+    Parameters
+    ----------
+    path : path
+        project.toml, or the folder that holds it.
+
+    Raises
+    ------
+    ValueError
+        For anything wrong in it.
+    FileNotFoundError
+        Where there is none.
+    """
+    path = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
+    settings = read_toml(path, ProjectFile, "a project")
+    _check_url(path, settings)
+    if settings.crs is not None:
+        check_crs(settings.crs)
+    return settings
+
+
+def _check_url(path, settings):
+    """Refuse addresses: files are read where they lie."""
+    names = [*(settings.cloud.files or ()), *(n for d in settings.drive for n in d.files or ())]
+    names += [drive.survey for drive in settings.drive if drive.survey]
+    if urls := [name for name in names if "://" in name]:
+        raise ValueError(
+            f"{len(urls)} names in {path} are addresses (first: {urls[0]}), and files are read "
+            "from disks that all workers share: mount the store there, or copy the files."
+        )
+
+
+def _drive(path, settings, name, section):
+    """DriveParts of a [[drive]]."""
+    if section.survey is None:
+        shared = {n: getattr(settings, n) for n in SHARED if n in settings.model_fields_set}
+        own = {n: getattr(section, n) for n in ("mounting", "scanner") if getattr(section, n)}
+        files = CloudSection(files=section.files, gps_time=settings.cloud.gps_time)
+        given = {"name": name, "crs": settings.crs, "cloud": files} | shared | own
+        own_settings = SurveyFile(trajectory=section.trajectory, **given)
+        return DriveParts(name, read_parts(path, own_settings))
+    toml = survey_toml(path.parent / section.survey)
+    stated = read_survey_file(toml)
+    given = {n: getattr(settings, n) for n in BELIEFS if n in settings.model_fields_set}
+    notes = []
+    if stated.control is not None:
+        if settings.control is None:
+            raise ValueError(
+                f"{toml} has a [control] of its own ({stated.control.file}), and {path} none: a "
+                "project has one list for all drives. Name it under [control] in project.toml."
+            )
+        notes.append(f"Control points are those of the project, not {stated.control.file}.")
+    whole = stated.model_copy(update={**given, "control": None, "name": name})
+    return DriveParts(name, read_parts(toml, whole), tuple(notes))
+
+
+def _check_tiles(path, settings, drives):
+    """Refuse a tile of no drive, and one of two."""
+    owners: dict[Path, list[str]] = {}
+    for drive in drives:
+        for file in drive.parts.files.clouds:
+            owners.setdefault(file.resolve(), []).append(drive.name)
+    if shared := {file: own for file, own in owners.items() if len(own) > 1}:
+        file, own = next(iter(shared.items()))
+        raise ValueError(
+            f"{len(shared)} of {len(owners)} cloud files of {path} are of two drives (first: "
+            f"{file}, of {' and '.join(own)}), and each file is of one. Where a tile holds the "
+            "points of several, split it by drive first, as by point_source_id."
+        )
+    named = [f for name in settings.cloud.files or () for f in matching(path, "cloud.files", name)]
+    if orphans := [file for file in named if file.resolve() not in owners]:
+        raise ValueError(
+            f"{len(orphans)} of {len(named)} files under [cloud] in {path} are of no drive (first: "
+            f"{orphans[0]}). Name them in files of the [[drive]] whose trajectory covers them."
+        )
+
+
+def _check_alike(path, settings, drives):
+    """Refuse drives in two CRS, or in two systems of time."""
+    stated = {drive.name: drive.parts.settings.crs or settings.crs for drive in drives}
+    crs = settings.crs or drives[0].parts.settings.crs
+    other = [name for name, own in stated.items() if own != crs]
+    if other:
+        raise ValueError(
+            f"{len(other)} of {len(drives)} drives of {path} are in another CRS than the project, "
+            f"{crs} (first: {other[0]}, {stated[other[0]]}). Bring their clouds into one CRS, and "
+            "say it in their survey.toml: an SBET is projected into it by itself."
+        )
+    check_systems([drive.name for drive in drives], [drive.trajectory for drive in drives])
+
+
+def _with_beliefs(path, drives):
+    """Drives that all believe what some of them state; refuses what two state differently."""
+    beliefs = {}
+    for what in BELIEFS:
+        stated = [drive for drive in drives if what in drive.parts.settings.model_fields_set]
+        values = [getattr(drive.parts.settings, what) for drive in stated]
+        unlike = [d.name for d, own in zip(stated, values, strict=True) if own != values[0]]
+        if unlike:
+            raise ValueError(
+                f"[{what}] of {unlike[0]} is not that of {stated[0].name}, and drives of a project "
+                f"share it: say under [{what}] in {path} what holds for all {len(drives)}."
+            )
+        beliefs |= {what: values[0]} if values else {}
+    for drive in drives:
+        settings = drive.parts.settings.model_copy(update=beliefs)
+        yield replace(drive, parts=replace(drive.parts, settings=settings))
+
+
+def _everywhere(drives):
+    """A Trajectory that comes by wherever one of some drives does, an epoch each second."""
+    seconds = [np.floor(drive.trajectory.gps_time) for drive in drives]
+    rows = [np.unique(each, return_index=True)[1] for each in seconds]
+    places = [d.trajectory.position[some] for d, some in zip(drives, rows, strict=True)]
+    position = np.concatenate(places)
+    number = np.arange(len(position), dtype=float)
+    return Trajectory(number, position, Rotation.identity(len(position)))
+
+
+def _surveyed(path, section, trajectory):
+    """Control points, check points, and how their list was understood."""
+    if not holds_points(path):
+        return NO_POINTS, NO_POINTS, None
+    points = read_control_list(path, section, trajectory)
+    check_together(path, points.control + points.check, trajectory)
+    return points.control, points.check, points.layout

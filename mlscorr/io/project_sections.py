@@ -1,0 +1,100 @@
+"""What stands in project.toml, section by section."""
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from mlscorr.io.survey_sections import (
+    CalibratedMountingSection,
+    ControlSection,
+    MatchingSection,
+    PosSection,
+    Scanners,
+    ScannerSection,
+    TiesSection,
+    Trajectories,
+)
+from mlscorr.io.toml_file import TomlSection
+
+FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system
+RESERVED = ("tasks",)  # what a project keeps beside the drives
+
+
+class TilesSection(TomlSection):
+    """All cloud files of the project, and the system of their times."""
+
+    files: Annotated[list[str], Field(min_length=1)] | None = None
+    gps_time: Literal["auto", "week", "standard"] = "auto"
+
+
+class DriveSection(TomlSection):
+    """A drive: a survey.toml, or files and a trajectory."""
+
+    name: Annotated[str, Field(min_length=1)] | None = None
+    survey: str | None = None
+    files: Annotated[list[str], Field(min_length=1)] | None = None
+    trajectory: Trajectories | None = None
+    mounting: CalibratedMountingSection | None = None
+    scanner: Scanners | None = None
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        own = ("files", "trajectory", "mounting", "scanner")
+        given = [name for name in own if getattr(self, name) is not None]
+        if self.survey is not None and given:
+            raise ValueError(
+                f"a drive is a survey.toml or has {given[0]} of its own, not both: say it there"
+            )
+        if self.survey is None and (self.files is None or self.trajectory is None):
+            raise ValueError(
+                "give a drive its survey (a survey.toml), or files and [drive.trajectory]"
+            )
+        return self
+
+
+class ProjectFile(TomlSection):
+    """What stands in project.toml, in its own units (deg)."""
+
+    name: str | None = None
+    crs: str | None = None
+    cloud: TilesSection = TilesSection()
+    control: ControlSection | None = None
+    mounting: CalibratedMountingSection | None = None
+    scanner: Scanners = ScannerSection()
+    pos: PosSection = PosSection()
+    matching: MatchingSection = MatchingSection()
+    ties: TiesSection = TiesSection()
+    drive: Annotated[list[DriveSection], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _names_drives(self) -> Self:
+        names = [name.casefold() for name, _ in self.drives]
+        doubled = sorted({name for name in names if names.count(name) > 1})
+        if doubled:
+            raise ValueError(
+                f"the {len(names)} [[drive]] need names of their own, as each is a folder of the "
+                f"results, and {len(doubled)} stand twice or more (first: {doubled[0]})"
+            )
+        wrong = [n for n, _ in self.drives if not FOLDER_NAME.fullmatch(n) or n in RESERVED]
+        if wrong:
+            raise ValueError(
+                f"{len(wrong)} of the {len(names)} drives have a name that can't be a folder of "
+                f"the results (first: {wrong[0]!r})"
+            )
+        return self
+
+    @property
+    def drives(self) -> list[tuple[str, DriveSection]]:
+        """Each [[drive]] with its name, or that of its folder, or its number from 1."""
+        return [
+            (section.name or _folder(section) or f"drive-{number}", section)
+            for number, section in enumerate(self.drive, start=1)
+        ]
+
+
+def _folder(section):
+    """Name of the folder of a drive's survey.toml."""
+    path = Path(section.survey or "")
+    return (path.parent if path.suffix else path).name

@@ -1,0 +1,211 @@
+"""Results of tasks as files, each named by the hash of what it was made of."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import pickle
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.io.folders import remove
+from mlscorr.io.output import PART
+
+try:
+    import fcntl
+except ImportError:  # Windows: nothing tells that another run is at work
+    fcntl = None
+
+ROOMS = ("mlscorr", "numpy", "scipy", "pathlib")  # whose classes results hold
+MAKERS = {  # functions that make values; no other is called while a result is loaded
+    ("mlscorr.estimate.prior", "position_prior"),
+    ("numpy._core.multiarray", "_reconstruct"),
+    ("numpy._core.multiarray", "scalar"),
+    ("numpy._core.numeric", "_frombuffer"),
+    ("numpy.core.multiarray", "_reconstruct"),
+    ("numpy.core.multiarray", "scalar"),
+    ("numpy.core.numeric", "_frombuffer"),
+}
+PLAIN = ("complex", "frozenset", "range", "set", "slice")  # of Python itself
+
+
+def digest(*values: object) -> str:
+    """SHA-256 of values: numbers, texts, arrays, dataclasses and collections of these.
+
+    Parameters
+    ----------
+    *values : object
+
+    Raises
+    ------
+    TypeError
+        For a value of another kind.
+
+    Examples
+    --------
+    >>> digest(1, "a") == digest(1, "a"), digest(1, "a") == digest(1.0, "a")
+    (True, False)
+    """
+    hashed = hashlib.sha256()
+    for value in values:
+        _feed(hashed.update, value)
+    return hashed.hexdigest()
+
+
+def _feed(update: Callable[[bytes], object], value: Any) -> None:
+    """Feed a hash with a value and its kind."""
+    update(f"({type(value).__name__}".encode())
+    if isinstance(value, np.ndarray):
+        update(f"{value.dtype}{value.shape}".encode())
+        update(np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, Rotation):
+        _feed(update, value.as_quat())
+    elif is_dataclass(value):
+        for field in fields(value):
+            _feed(update, getattr(value, field.name))
+    elif isinstance(value, dict):
+        for pair in sorted(value.items()):
+            _feed(update, pair)
+    elif isinstance(value, tuple | list):
+        for item in value:
+            _feed(update, item)
+    elif value is None or isinstance(value, str | int | float | Path | np.generic):
+        update(repr(value).encode())
+    else:
+        raise TypeError(f"A {type(value).__name__} has no digest.")
+    update(b")")
+
+
+class _Unpickler(pickle.Unpickler):
+    """Loads values of ours alone: a folder of results runs no code of others."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        value = super().find_class(module, name)
+        is_class = isinstance(value, type) and value.__module__.partition(".")[0] in ROOMS
+        is_plain = module == "builtins" and name in PLAIN
+        if is_class or is_plain or (module, name) in MAKERS:
+            return value
+        raise pickle.UnpicklingError(f"{module}.{name} is no value of a result")
+
+
+@dataclass(frozen=True)
+class TaskStore:
+    """A folder of results, each whole or not there.
+
+    Parameters
+    ----------
+    folder : Path
+    """
+
+    folder: Path
+
+    def path(self, kind: str, key: str) -> Path:
+        """Where a result stands, or would stand.
+
+        Parameters
+        ----------
+        kind : str
+            Of the task.
+        key : str
+            Digest of what it was made of.
+        """
+        return self.folder / kind / f"{key}.result"
+
+    def put(self, kind: str, key: str, value: object) -> None:
+        """Keep a result; a checksum stands before it.
+
+        Parameters
+        ----------
+        kind, key : str
+        value : object
+            Dataclasses of ours, arrays, and what Python has built in.
+
+        Raises
+        ------
+        OSError
+            Where the disk refuses.
+        """
+        content = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
+        path = self.path(kind, key)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with self.part() as part:
+            with open(part, "wb") as file:
+                file.write(hashlib.sha256(content).digest() + content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, path)
+
+    def get(self, kind: str, key: str) -> Any:
+        """A result.
+
+        Parameters
+        ----------
+        kind, key : str
+
+        Raises
+        ------
+        KeyError
+            Where there is none, or where it is damaged.
+        """
+        try:
+            content = self.path(kind, key).read_bytes()
+        except OSError:
+            raise KeyError(key) from None
+        size = hashlib.sha256().digest_size
+        if hashlib.sha256(content[size:]).digest() != content[:size]:
+            raise KeyError(key)
+        try:
+            return _Unpickler(io.BytesIO(content[size:])).load()
+        except (pickle.UnpicklingError, AttributeError, ImportError):  # of another version
+            raise KeyError(key) from None
+
+    @contextmanager
+    def part(self, suffix: str = "") -> Iterator[Path]:
+        """A place for what isn't whole yet, on the same disk; what is left there is removed.
+
+        Parameters
+        ----------
+        suffix : str
+            Of its name.
+        """
+        folder = self.folder / f"part.{secrets.token_hex(8)}"
+        folder.mkdir(parents=True)
+        path = folder / f"part{suffix}"
+        try:
+            yield path
+        finally:
+            for left in (path, path.with_name(path.name + PART)):
+                left.unlink(missing_ok=True)
+            with suppress(OSError):
+                folder.rmdir()
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs out, and remove what killed ones left half made.
+
+        Raises
+        ------
+        ValueError
+            Where another run is at work.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with open(self.folder / "lock", "w") as lock:
+            try:
+                if fcntl is not None:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise ValueError(
+                    f"Another run is at work in {self.folder.parent}: wait for its end, or end it "
+                    "first. mlscorr status tells how far it has come."
+                ) from None
+            for folder in self.folder.glob("part.*"):
+                remove(folder)
+            yield

@@ -1,0 +1,175 @@
+"""From what files hold to corrected drives: matched, estimated together, and parted again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.correction import Correction
+from mlscorr.estimate import place_control
+from mlscorr.evaluate.datum import datum_warnings
+from mlscorr.evaluate.target_rows import unseen_rows
+from mlscorr.evaluate.ties import misfit, misfit_section, tie_section
+from mlscorr.pipeline.corrected_survey import CorrectedSurvey
+from mlscorr.pipeline.file_finding import FileFinding, join_findings
+from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, drive_estimates
+from mlscorr.pipeline.project.file_tasks import DriveMotion
+from mlscorr.pipeline.project.joint import FoundDrive, JointEstimate
+from mlscorr.survey import Matched, Survey
+
+STATES = {
+    "controlled": "held by control points of its own",
+    "tied": "held by control points of other drives, through ties",
+    "relative": "no control point holds it: ties bring its passes together, no more",
+    "uncorrected": "nothing corrects it: no control point was found, and no overlap that is tied",
+}
+
+
+@dataclass(frozen=True)
+class DriveState:
+    """What holds a drive.
+
+    Parameters
+    ----------
+    name : str
+    state : str
+        Of STATES.
+    tied_with : dict
+        Number of used ties with each other drive, and their RMS before and after (m).
+    """
+
+    name: str
+    state: str
+    tied_with: dict[str, dict]
+
+
+def found_drive(survey: Survey, files: Sequence[FileFinding]) -> FoundDrive:
+    """A drive with its matched points.
+
+    Parameters
+    ----------
+    survey : Survey
+    files : sequence of FileFinding
+        Of each of its clouds.
+    """
+    contents = join_findings(survey, files)
+    matched = Matched.by_name(contents.finding.matches.matched, survey.surveyed)
+    is_control = np.isin(matched.name, survey.control.name)
+    return FoundDrive(survey, contents, matched[is_control], matched[~is_control])
+
+
+def corrected_drives(part: JointEstimate) -> list[tuple[CorrectedSurvey, DriveState]]:
+    """The results of drives that were estimated together.
+
+    Parameters
+    ----------
+    part : JointEstimate
+    """
+    joint, estimate = part.joint, part.estimate
+    states = [_state(part, number) for number in range(len(joint.drives))]
+    if len(joint.drives) == 1:
+        whole = CorrectedSurvey(**_fields(joint.drives[0], estimate))
+        return [(whole, states[0])]
+    notes = [_tied_with(state) for state in states]
+    estimates = drive_estimates(joint, estimate, notes)
+    places, section = place_control(estimate), tie_section(estimate) or {}
+    results = []
+    for drive, own, shift, note in zip(joint.drives, estimates, joint.shifts, notes, strict=True):
+        first, last = drive.survey.trajectory.gps_time[[0, -1]]
+        near = [replace(place, gps_time=place.gps_time - shift) for place in places]
+        shared = {
+            name: section[name] for name in ("share", "sufficient_control") if name in section
+        }
+        misfits = misfit_section(own.ties) or {"n": 0, "used": 0, "reason": own.untied}
+        ties = misfits | (shared if own.ties else {})
+        survey = replace(drive.survey, notes=(*drive.survey.notes, *joint.survey.notes, note))
+        corrected = CorrectedDrive(
+            **_fields(replace(drive, survey=survey), own),
+            places=tuple(place for place in near if first <= place.gps_time <= last),
+            section=ties,
+        )
+        results.append(corrected)
+    return list(zip(results, states, strict=True))
+
+
+def _fields(drive, estimate):
+    """Fields of a CorrectedSurvey."""
+    survey, finding = drive.survey, drive.contents.finding
+    datum = datum_warnings(drive.control[estimate.used], survey.trajectory, survey.pos)
+    missing = unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned)
+    return {
+        "survey": survey,
+        "estimate": estimate,
+        "matched_control": drive.control,
+        "matched_check": drive.check,
+        "missing": missing,
+        "fitted": finding.fitted,
+        "warnings": (*finding.warnings, *datum),
+    }
+
+
+def _state(part, number):
+    """The DriveState of one of some drives that were estimated together."""
+    joint, estimate, drive = part.joint, part.estimate, part.joint.drives[number]
+    owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
+    if estimate.used[owner == number].any():
+        state = "controlled"
+    elif part.is_controlled:
+        state = "tied"
+    else:
+        state = "relative" if part.is_tied else "uncorrected"
+    return DriveState(drive.survey.name, state, _ties(part, number))
+
+
+def _ties(part, number):
+    """Used ties of a drive with each other one."""
+    residuals = part.estimate.ties
+    shared: dict[str, dict] = {}
+    if residuals is None:
+        return shared
+    owner = part.joint.drive_numbers(residuals.ties.pass_number)
+    for other, drive in enumerate(part.joint.drives):
+        rows = residuals.used & (np.sort(owner) == sorted((number, other))).all(axis=1)
+        if other != number and rows.any():
+            shared[drive.survey.name] = {
+                "n": int(rows.sum()),
+                "before": misfit(residuals.ties.misclosure[rows])["rms"],
+                "after": misfit(residuals.after[rows])["rms"],
+            }
+    return shared
+
+
+def _tied_with(state):
+    """A sentence on a drive's ties with others."""
+    listed = "; ".join(
+        f"{ties['n']} with {name}, {ties['before']:.3f} m apart before and {ties['after']:.3f} m "
+        "after (RMS)"
+        for name, ties in state.tied_with.items()
+    )
+    return f"Estimated together with other drives of the project, by ties: {listed}."
+
+
+def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> DriveMotion:
+    """How a drive's clouds are moved, without what only a report needs.
+
+    Parameters
+    ----------
+    corrected : CorrectedSurvey
+    with_sigma : bool
+        Whether points get their sigmas.
+    """
+    survey, correction = corrected.survey, corrected.estimate.correction
+    if not with_sigma:
+        correction = Correction(correction.recorded, correction.corrected)
+    bare = replace(
+        survey,
+        trajectory=correction.recorded,
+        control=survey.control[[]],
+        check=survey.check[[]],
+        notes=(),
+        layouts=(),
+        inputs=(),
+    )
+    return DriveMotion(bare, correction, corrected.held)

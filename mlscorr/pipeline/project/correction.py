@@ -1,0 +1,295 @@
+"""``correct`` of a project: from several drives to the corrected clouds and reports of all."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.output import check_output, output_file, write_json
+from mlscorr.io.project_file import ProjectParts, read_project
+from mlscorr.io.task_store import TaskStore, digest
+from mlscorr.io.trajectory_exports import check_exports
+from mlscorr.pipeline.clouds import WrittenClouds
+from mlscorr.pipeline.project.corrected import corrected_drives, found_drive, motion_of
+from mlscorr.pipeline.project.document import ProjectResult, drive_result, project_document
+from mlscorr.pipeline.project.engine import engine
+from mlscorr.pipeline.project.file_tasks import ReportInput
+from mlscorr.pipeline.project.joint import estimate_drives
+from mlscorr.pipeline.project.progress import Progress
+from mlscorr.pipeline.project.running import Run
+from mlscorr.pipeline.project.stages import (
+    PlannedDrive,
+    cloud_tasks,
+    finding_tasks,
+    planned_drive,
+    report_task,
+    tile_tasks,
+)
+from mlscorr.pipeline.project.tasks import VERSION
+from mlscorr.pipeline.tying import TieUse, without_control
+
+STORE = "tasks"  # of the folder within the results
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a project is corrected.
+
+    Parameters
+    ----------
+    order, ties
+        As of mlscorr.correct.
+    sigma, page, trajectories
+        As of CorrectedSurvey.write.
+    workers, scheduler
+        As of mlscorr.pipeline.project.engine.engine.
+    resume : bool
+        Whether results that are there already are used.
+    overwrite : bool
+        Whether what is there already may be replaced.
+    """
+
+    order: int = 1
+    ties: TieUse | None = None
+    sigma: bool = False
+    page: bool = True
+    trajectories: tuple[str, ...] = ()
+    workers: int = 1
+    scheduler: str | None = None
+    resume: bool = False
+    overwrite: bool = False
+
+
+def correct_project(
+    path: str | Path,
+    out: str | Path,
+    options: Options | None = None,
+    tell: Callable[[str], object] = lambda _: None,
+) -> ProjectResult:
+    """Correct all drives of a project together, and write the results of each.
+
+    Parameters
+    ----------
+    path : path
+        project.toml, or the folder that holds it.
+    out : path
+        Folder for the results: a folder of each drive, project.json, project.html, log.txt, and
+        the results of tasks.
+    options : Options, optional
+    tell : function of a sentence
+        Is told how far it has come.
+
+    Returns
+    -------
+    ProjectResult
+        What failed is named there.
+
+    Raises
+    ------
+    ValueError
+        For anything wrong in project.toml or between its drives, where the folder holds anything
+        without ``resume`` or ``overwrite``, and where no control point was found at all.
+    OSError
+        When writing fails.
+    """
+    options, out = options or Options(), Path(out).absolute()
+    project = read_project(Path(path).absolute())
+    check_exports(options.trajectories, project.crs, is_read=True)
+    _check_out(project, out, options)
+    store = TaskStore(out / STORE)
+    with store.locked(), _progress(out, tell) as progress:
+        with engine(options.workers, options.scheduler) as chosen:
+            work = _Work(project, out, options, Run(store, chosen, progress.ended), progress)
+            result = work.result()
+        progress.note(result.sentence)
+    return result
+
+
+@contextmanager
+def _progress(out: Path, tell: Callable[[str], object]) -> Iterator[Progress]:
+    """Progress with its log; what ends the run early stands there, too."""
+    with open(out / "log.txt", "a", encoding="utf-8") as log:
+        progress = Progress(log, out / STORE / "plan.json", tell)
+        try:
+            yield progress
+        except BaseException as error:
+            progress.note(f"Ended early: {type(error).__name__} {error}")
+            raise
+
+
+def _check_out(project, out, options):
+    """Refuse a folder of other results; an old run's go where nothing is resumed."""
+    is_ours = (out / STORE).is_dir()
+    check_output(out, project.files, options.overwrite or (options.resume and is_ours))
+    for drive in project.drives:
+        check_output(out / drive.name, drive.parts.files.clouds, overwrite=True)
+    if options.overwrite and not options.resume and is_ours:
+        with TaskStore(out / STORE).locked():
+            shutil.rmtree(out / STORE)
+    out.mkdir(parents=True, exist_ok=True)
+
+
+@dataclass(frozen=True)
+class _Work:
+    """A run through all stages."""
+
+    project: ProjectParts
+    out: Path
+    options: Options
+    run: Run
+    progress: Progress
+
+    @property
+    def ties(self) -> TieUse:
+        """Which ties are used."""
+        first = self.project.drives[0].parts.settings
+        return self.options.ties or ("auto" if first.ties.use == "auto" else "off")
+
+    def result(self) -> ProjectResult:
+        """The stages in their order."""
+        planned = self._planned()
+        origin = np.floor(planned[0].survey.trajectory.position[0])
+        keys = self._estimated(planned, origin)
+        clouds = self._clouds(planned, keys)
+        drives = self._reports(planned, keys, clouds)
+        result = project_document(self.project, drives, self.run)
+        write_json(self.out / "project.json", result.document)
+        if self.options.page:
+            from mlscorr.report.project_page import write_project
+
+            with output_file(self.out / "project.html") as part:
+                write_project(part, result.document, result.tracks)
+        return result
+
+    def _planned(self) -> list[PlannedDrive]:
+        """The drives with the clouds that can be read."""
+        tasks = [task for drive in self.project.drives for task in tile_tasks(drive)]
+        self.progress.begin("tiles", tasks)
+        tiles = self.run.results(tasks)
+        planned = []
+        for drive in self.project.drives:
+            own = [tiles[t.name] for t in tasks if t.drive == drive.name and t.name in tiles]
+            if own:
+                planned.append(planned_drive(self.project, drive, own))
+        if not planned:
+            raise ValueError(
+                f"None of the {len(tasks)} cloud files of {self.project.path} can be read. The "
+                f"first: {self.run.faults[0].fault}"
+            )
+        if self.ties == "only":
+            planned = [replace(d, survey=without_control(d.survey)) for d in planned]
+        return planned
+
+    def _estimated(self, planned, origin):
+        """Keys of each drive's results in the store: (corrected, motion) by its name."""
+        with_ties, store = self.ties != "off", self.run.store
+        tasks = {d.survey.name: finding_tasks(store, d, origin, with_ties) for d in planned}
+        every = [task for own in tasks.values() for task in own]
+        self.progress.begin("findings", every)
+        findings = self.run.results(every)
+        planned[:] = [_without(d, tasks[d.survey.name], findings) for d in planned]
+        planned[:] = [drive for drive in planned if drive.survey.clouds]
+        files = [task.key for task in every if task.name in findings]
+        lists = [d.survey.control for d in planned], [d.survey.check for d in planned]
+        key = digest(VERSION, files, *lists, self.options.order, self.ties, self.options.sigma)
+        keys = {d.survey.name: digest(key, d.survey.name) for d in planned}
+        if not all(_is_there(store, own) for own in keys.values()):
+            self._estimate(planned, tasks, findings, keys, origin)
+        return keys
+
+    def _estimate(self, planned, tasks, findings, keys, origin):
+        """Put each drive's results into the store."""
+        self.progress.say(f"Estimating {len(planned)} drives together.")
+        drives = []
+        for drive in planned:
+            names = [task.name for task in tasks[drive.survey.name] if task.name in findings]
+            drives.append(found_drive(drive.survey, [findings[name] for name in names]))
+        if self.ties != "only" and not any(len(drive.control) for drive in drives):
+            raise ValueError(_nothing_found(self.project, drives))
+        parts = estimate_drives(drives, self.options.order, origin, self.ties != "off")
+        for part in parts:
+            for corrected, state in corrected_drives(part):
+                key = keys[state.name]
+                self.run.store.put("motions", key, motion_of(corrected, self.options.sigma))
+                self.run.store.put("corrected", key, corrected)
+                self.run.store.put("states", key, drive_result(corrected, state))
+
+    def _clouds(self, planned, keys):
+        """WrittenClouds of each drive by its name."""
+        tasks = {
+            d.survey.name: cloud_tasks(
+                self.run.store, d, keys[d.survey.name], self.out / d.survey.name, self.options.sigma
+            )
+            for d in planned
+        }
+        every = [task for own in tasks.values() for task in own]
+        self.progress.begin("clouds", every)
+        written = self.run.results(every)
+        return {
+            name: WrittenClouds.join(written[t.name].value for t in own if t.name in written)
+            for name, own in tasks.items()
+        }
+
+    def _reports(self, planned, keys, clouds):
+        """DriveResult and report.json of each drive."""
+        tasks = [
+            report_task(
+                ReportInput(
+                    self.run.store.folder,
+                    keys[d.survey.name],
+                    clouds[d.survey.name],
+                    self.out / d.survey.name,
+                    self.options.page,
+                    self.options.trajectories,
+                ),
+                d,
+            )
+            for d in planned
+        ]
+        self.progress.begin("reports", tasks)
+        reports = self.run.results(tasks)
+        return [
+            (self.run.store.get("states", keys[task.drive]), reports[task.name].value)
+            for task in tasks
+            if task.name in reports
+        ]
+
+
+def _without(drive, tasks, findings):
+    """A drive without the files that could not be read."""
+    lost = [task.name for task in tasks if task.name not in findings]
+    if not lost:
+        return drive
+    survey = drive.survey
+    clouds = [f for f in survey.clouds if f"{survey.name}/{f.name}" not in lost]
+    mounted = [
+        replace(m, clouds=tuple(file for file in m.clouds if file in clouds))
+        for m in survey.scanners
+    ]
+    return replace(drive, survey=replace(survey, clouds=tuple(clouds), scanners=tuple(mounted)))
+
+
+def _is_there(store, key):
+    """Whether all of a drive's results are in the store, undamaged."""
+    try:
+        for kind in ("states", "motions", "corrected"):
+            store.get(kind, key)
+    except KeyError:
+        return False
+    return True
+
+
+def _nothing_found(project, drives: Sequence) -> str:
+    """The sentence for drives without any control point."""
+    near = sum(len(drive.survey.control) for drive in drives)
+    return (
+        f"None of the {len(project.control)} control points of {project.path} was found in the "
+        f"clouds of {len(drives)} drives; {near} times one lies within a cloud's bounds. Are "
+        "control and clouds in the same CRS, and kind and size of the targets right? Ties alone "
+        "bring drives together with --ties-only."
+    )

@@ -1,0 +1,198 @@
+"""project.json: what became of each drive, and what failed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from mlscorr.evaluate.model import largest_sigma
+from mlscorr.io.output import document
+from mlscorr.io.project_file import ProjectParts
+from mlscorr.pipeline.corrected_survey import CorrectedSurvey
+from mlscorr.pipeline.project.corrected import STATES, DriveState
+from mlscorr.pipeline.project.running import Run
+
+RATINGS = {"controlled": "green", "tied": "green", "relative": "red", "uncorrected": "red"}
+
+
+@dataclass(frozen=True)
+class DriveResult:
+    """What a project shows of a drive.
+
+    Parameters
+    ----------
+    state : DriveState
+    position_sigma : dict or None
+        As largest_sigma has it.
+    track : (k, 3) array
+        Easting, northing (m) and 3D sigma (m) along the drive, NaN in its gaps.
+    """
+
+    state: DriveState
+    position_sigma: dict[str, float] | None
+    track: np.ndarray
+
+
+def drive_result(corrected: CorrectedSurvey, state: DriveState) -> DriveResult:
+    """What a project shows of a drive.
+
+    Parameters
+    ----------
+    corrected : CorrectedSurvey
+    state : DriveState
+    """
+    trajectory = corrected.trajectory
+    sigma = np.linalg.norm(trajectory.position_sigma, axis=1)
+    seconds = np.floor(trajectory.gps_time)
+    rows = np.unique(seconds, return_index=True)[1]
+    parts = trajectory.segment(trajectory.gps_time[rows])
+    track = np.column_stack([trajectory.position[rows, :2], sigma[rows]])
+    track = np.insert(track, np.flatnonzero(np.diff(parts)) + 1, np.nan, axis=0)
+    return DriveResult(state, largest_sigma(trajectory), track)
+
+
+@dataclass(frozen=True)
+class ProjectResult:
+    """What became of a project.
+
+    Parameters
+    ----------
+    document : dict
+        The content of project.json.
+    tracks : dict
+        Track of each drive by its name, as of DriveResult.
+    reports : dict
+        report.json of each drive by its name.
+    """
+
+    document: dict
+    tracks: dict[str, np.ndarray]
+    reports: dict[str, dict]
+
+    @property
+    def sentence(self) -> str:
+        """What stands first."""
+        return self.document["statements"][0]["sentence"]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing failed, and no point was left as it was."""
+        return not self.document["faults"] and not any(
+            report["coverage"]["points_untouched"] for report in self.reports.values()
+        )
+
+
+def project_document(
+    project: ProjectParts, drives: Sequence[tuple[DriveResult, dict]], run: Run
+) -> ProjectResult:
+    """What became of a project.
+
+    Parameters
+    ----------
+    project : ProjectParts
+    drives : sequence of (DriveResult, dict)
+        With the report.json of each.
+    run : Run
+    """
+    rows = [_row(result, report) for result, report in drives]
+    faults = [
+        {"drive": fault.drive, "name": fault.name, "stage": fault.kind, "fault": fault.fault}
+        for fault in run.faults
+    ]
+    statements = [*_statements(project, rows, drives, faults), *_lost(run.engine.lost)]
+    ratings = [row["rating"] for row in statements]
+    content = document(
+        "project",
+        {
+            "name": project.name,
+            "crs": project.crs,
+            "rating": next(r for r in ("red", "amber", "green") if r in ratings),
+            "statements": statements,
+            "drives": rows,
+            "faults": faults,
+        },
+    )
+    names = [row["name"] for row in rows]
+    return ProjectResult(
+        content,
+        {name: result.track for name, (result, _) in zip(names, drives, strict=True)},
+        {name: report for name, (_, report) in zip(names, drives, strict=True)},
+    )
+
+
+def _row(result, report):
+    """The row of a drive in project.json."""
+    state, control, check = result.state, report["control"], report["check"]
+    tested = {"check": (check, "after"), "left_out": (control, "leave_one_out")}
+    by = next((by for by, (points, after) in tested.items() if _rmse(points, after)), None)
+    points, after = tested[by] if by else (control, "after")
+    return {
+        **asdict(state),
+        "meaning": STATES[state.state],
+        "rating": max(report["rating"], RATINGS[state.state], key=_worst),
+        "files": len(report["files"]),
+        "points": sum(file["points"] for file in report["files"]),
+        "control": {key: control[key] for key in ("n_surveyed", "n_seen", "n_scored")},
+        "check": {key: check[key] for key in ("n_surveyed", "n_seen", "n_scored")},
+        "tested_by": by,
+        "before": _rmse(points, "before"),
+        "after": _rmse(points, after),
+        "position_sigma": result.position_sigma,
+        "metres_extrapolated": report["coverage"]["metres_extrapolated"],
+        "headline": report["headline"],
+    }
+
+
+def _worst(rating):
+    return ("green", "amber", "red").index(rating)
+
+
+def _rmse(points, key):
+    return points.get(key, {}).get("rmse_3d")
+
+
+def _statements(project, rows, drives, faults):
+    """What stands first on the page: drives, control, files."""
+    count = {state: [row["name"] for row in rows if row["state"] == state] for state in STATES}
+    held = len(count["controlled"]) + len(count["tied"])
+    states = [(state, names) for state, names in count.items() if names]
+    yield _statement(
+        "Drives",
+        "green" if held == len(project.drives) else "red",
+        f"{held} of {len(project.drives)} drives are held by control points, "
+        f"{len(count['tied'])} of them through ties with other drives.",
+        [(", ".join(names), STATES[state]) for state, names in states if state != "controlled"],
+    )
+    used = {
+        target["name"]
+        for _, report in drives
+        for target in report["targets"]
+        if target["role"] == "control" and target["used"]
+    }
+    yield _statement(
+        "Control points",
+        "green" if len(used) == len(project.control) else "amber",
+        f"{len(used)} of {len(project.control)} surveyed control points are used.",
+    )
+    if faults:
+        yield _statement(
+            "Failures",
+            "red",
+            f"{len(faults)} files could not be corrected, and all else was. When they are whole, "
+            "--resume does what is missing.",
+            [(fault["name"], fault["fault"]) for fault in faults],
+        )
+
+
+def _lost(number):
+    """A statement on lost workers, where there were any."""
+    if number:
+        sentence = f"{number} times a worker was lost; what it worked on was done again."
+        yield _statement("Workers", "amber", sentence)
+
+
+def _statement(what, rating, sentence, items=()):
+    named = [{"name": name, "text": text} for name, text in items]
+    return {"what": what, "rating": rating, "sentence": sentence, "items": named}

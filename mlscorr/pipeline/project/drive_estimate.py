@@ -1,0 +1,209 @@
+"""The part of one drive in an estimate that several drives made together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mlscorr.correction import Correction
+from mlscorr.estimate import (
+    Alternative,
+    Estimate,
+    NextControl,
+    Support,
+    TieResiduals,
+    guard_warnings,
+    guards_of,
+)
+from mlscorr.pipeline.corrected_survey import CorrectedSurvey
+from mlscorr.pipeline.project.joint import JointDrives
+from mlscorr.survey import Trajectory
+
+
+@dataclass(frozen=True, repr=False)
+class DriveEstimate(Estimate):
+    """What several drives tell together of one of them, in its own times.
+
+    Parameters
+    ----------
+    held : Support
+        What holds the correction along the drive.
+    orders : tuple of Alternative
+        Of the trend of all drives.
+    """
+
+    held: Support = field(default_factory=Support)
+    orders: tuple[Alternative, ...] = ()
+
+    @property
+    def support(self) -> Support:
+        """What holds the correction along the drive."""
+        return self.held
+
+    @property
+    def alternatives(self) -> tuple[Alternative, ...]:
+        """Other orders of the trend beside the one in use."""
+        return self.orders
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that a user should read."""
+        has_control = len(self.equations.names) > 0
+        return (
+            *self.notes,
+            *(guard_warnings(self.guards, self.equations, self.parameters) if has_control else ()),
+            *self.screening.warnings,
+            *(() if self.ties is None else self.ties.warnings),
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class CorrectedDrive(CorrectedSurvey):
+    """A drive of several that were corrected together.
+
+    Parameters
+    ----------
+    places : tuple of NextControl
+        Where more control would help all of them most, those on this drive.
+    section : dict
+        What ties did, as report.json has it.
+    """
+
+    places: tuple[NextControl, ...] = ()
+    section: dict | None = None
+
+    @property
+    def next_control(self) -> tuple[NextControl, ...]:
+        """Where one more control point each would help most, the best first."""
+        return self.places
+
+    @property
+    def tie_section(self) -> dict | None:
+        """What ties did, as report.json has it."""
+        return self.section
+
+
+def drive_estimates(
+    joint: JointDrives, estimate: Estimate, notes: Sequence[str]
+) -> list[DriveEstimate]:
+    """The part of each drive in an estimate of all.
+
+    Parameters
+    ----------
+    joint : JointDrives
+    estimate : Estimate
+    notes : sequence of str
+        Sentences on each drive's ties with others.
+    """
+    whole = estimate.support, estimate.alternatives
+    return [_part(joint, estimate, number, *whole, note) for number, note in enumerate(notes)]
+
+
+def _part(joint, estimate, number, support, orders, note):
+    """The DriveEstimate of a drive."""
+    trajectory, shift = joint.drives[number].survey.trajectory, joint.shifts[number]
+    owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
+    rows = owner == number
+    correction, chainage = _cut(estimate.correction, trajectory, shift)
+    names = set(joint.drives[number].control.name)
+    screening = replace(
+        estimate.screening,
+        outliers=tuple(out for out in estimate.screening.outliers if out.name in names),
+        tests=tuple(test for test in estimate.screening.tests if test.name in names),
+    )
+    equations = _equations(estimate.equations, rows[estimate.used], trajectory, shift)
+    guards = guards_of(trajectory.passes, equations.observed, estimate.guards)
+    return DriveEstimate(
+        correction=correction,
+        equations=equations,
+        screening=screening,
+        used=estimate.used[rows],
+        left_out=estimate.left_out[rows],
+        log_likelihood=estimate.log_likelihood,
+        sigma0=estimate.sigma0,
+        guards=guards,
+        notes=estimate.notes,
+        ties=_ties(joint, estimate.ties, number),
+        untied=note or estimate.untied,
+        held=_held(support, trajectory, shift, chainage),
+        orders=orders,
+    )
+
+
+def _cut(correction, trajectory, shift):
+    """The Correction of a drive's epochs, and the way before these (m)."""
+    whole = correction.corrected
+    first = int(np.searchsorted(whole.gps_time, trajectory.gps_time[0] + shift))
+    rows = slice(first, first + len(trajectory))
+    corrected = Trajectory(
+        trajectory.gps_time,
+        whole.position[rows],
+        whole.attitude[rows],
+        whole.position_sigma[rows],
+        whole.attitude_sigma[rows],
+        trajectory.session,
+    )
+    way = np.linalg.norm(np.diff(whole.position[: first + 1], axis=0), axis=1).sum()
+    cut = Correction(trajectory, corrected, covariance=correction.covariance[rows])
+    return cut, float(way)
+
+
+def _equations(equations, rows, trajectory, shift):
+    """The Equations of a drive's own control points, in its own times."""
+    own = equations.select(rows)
+    own = replace(own, gps_time=own.gps_time - shift, trajectory=trajectory, ties=None)
+    kept = np.arange(len(own.names))
+    if len(kept) == len(own.gps_time):
+        return own
+    return replace(
+        own,
+        gps_time=own.gps_time[kept],
+        misclosure=own.misclosure[kept],
+        noise=own.noise.select(kept),
+        partials=own.partials[kept],
+        stated=own.stated.at(kept),
+        mounting=None if own.mounting is None else own.mounting[kept],
+        fallbacks=0,
+    )
+
+
+def _ties(joint, residuals, number):
+    """TieResiduals of a drive's own passes, in its own times; None without any."""
+    if residuals is None:
+        return None
+    ties = residuals.ties
+    rows = (joint.drive_numbers(ties.pass_number) == number).all(axis=1)
+    if not rows.any():
+        return None
+    own = ties[rows]
+    own = replace(
+        own,
+        gps_time=own.gps_time - joint.shifts[number],
+        pass_number=own.pass_number - joint.bases[number],
+    )
+    return TieResiduals(own, residuals.used[rows], residuals.after[rows])
+
+
+def _held(support, trajectory, shift, chainage):
+    """The Support of a drive, in its own times and along its own way."""
+    first, last = trajectory.gps_time[[0, -1]]
+
+    def inside(start, end):
+        return end - shift >= first and start - shift <= last
+
+    return Support(
+        tuple(
+            replace(
+                stretch,
+                start=stretch.start - shift,
+                end=stretch.end - shift,
+                chainage=stretch.chainage - chainage,
+            )
+            for stretch in support.weak
+            if inside(stretch.start, stretch.end)
+        ),
+        tuple((start - shift, end - shift) for start, end in support.outages if inside(start, end)),
+        tuple(step - shift for step in support.steps if inside(step, step)),
+    )

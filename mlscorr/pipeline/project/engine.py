@@ -1,0 +1,200 @@
+"""Who works on tasks: this process, processes of this machine, or a cluster of others."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import Protocol
+
+THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class Engine(Protocol):
+    """Works on calls by an Executor, which may lose a worker."""
+
+    width: int  # calls at a time
+    lost: int  # workers so far
+
+    def submit(self, function: Callable, *arguments: object) -> Future:
+        """The Future of a call."""
+
+    def is_lost(self, error: BaseException) -> bool:
+        """Whether an error means that a worker was lost, and not what it worked on.
+
+        Parameters
+        ----------
+        error : BaseException
+        """
+
+
+class Loop:
+    """No process but this, one call after the other."""
+
+    width, lost = 1, 0
+
+    def submit(self, function: Callable, *arguments: object) -> Future:
+        """A Future that is done."""
+        future: Future = Future()
+        future.set_result(function(*arguments))
+        return future
+
+    def is_lost(self, error: BaseException) -> bool:
+        """Never: it would be lost itself."""
+        return isinstance(error, BrokenProcessPool)
+
+
+class Processes:
+    """Processes of this machine, which are started anew where one is lost.
+
+    Parameters
+    ----------
+    width : int
+        Number of them.
+    """
+
+    def __init__(self, width: int) -> None:
+        self.width, self.lost = width, 0
+        self._executor: Executor | None = None
+
+    def submit(self, function: Callable, *arguments: object) -> Future:
+        """The Future of a call."""
+        try:
+            return self._pool().submit(function, *arguments)
+        except BrokenProcessPool:
+            self.lost += 1
+            self.close()
+            return self._pool().submit(function, *arguments)
+
+    def _pool(self):
+        if self._executor is None:
+            context = multiprocessing.get_context("spawn")  # a fork may inherit held locks
+            self._executor = ProcessPoolExecutor(self.width, context, _start_worker)
+        return self._executor
+
+    def is_lost(self, error: BaseException) -> bool:
+        """Whether a process ended without an answer; the next call starts all anew."""
+        return isinstance(error, BrokenProcessPool)
+
+    def close(self) -> None:
+        """End the processes, without what they have not begun."""
+        if self._executor is not None:
+            self._executor.shutdown(wait=True, cancel_futures=True)
+            self._executor = None
+
+
+def _start_worker():
+    """Leave interruptions to the process that waits for this one, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+class Cluster:
+    """Workers of a cluster by dask.distributed.
+
+    Parameters
+    ----------
+    scheduler : str
+        Its address.
+
+    Raises
+    ------
+    ValueError
+        Where no scheduler answers there, or it has no worker.
+    ImportError
+        Without the extra ``cluster``.
+    """
+
+    def __init__(self, scheduler: str) -> None:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise ImportError(
+                "A cluster needs dask.distributed, which is not installed: pip install "
+                "'mlscorr[cluster]'"
+            ) from None
+        try:
+            self._client = Client(scheduler)
+        except (OSError, ValueError) as error:
+            raise ValueError(
+                f"No scheduler answers at {scheduler} ({error}). Start one with dask scheduler, "
+                "and give the address that it prints."
+            ) from None
+        self.lost, workers = 0, self._client.scheduler_info(n_workers=-1)["workers"]
+        self._present = set(workers)
+        if not workers:
+            self.close()
+            raise ValueError(
+                f"The scheduler at {scheduler} has no worker. Start some, as dask worker "
+                f"{scheduler} --nworkers 8 --nthreads 1, or let its cluster scale."
+            )
+        self.width = sum(worker["nthreads"] for worker in workers.values())
+        self._executor = self._client.get_executor(pure=False)
+
+    def submit(self, function: Callable, *arguments: object) -> Future:
+        """The Future of a call; workers that have gone since the last one are counted."""
+        present = set(self._client.scheduler_info(n_workers=-1)["workers"])
+        self.lost += len(self._present - present)
+        self._present = present
+        return self._executor.submit(function, *arguments)
+
+    def is_lost(self, error: BaseException) -> bool:
+        """Whether workers ended without an answer, more often than the scheduler tries again."""
+        from distributed import KilledWorker
+
+        return isinstance(error, KilledWorker)
+
+    def close(self) -> None:
+        """Leave the cluster as it is."""
+        self._client.close()
+
+
+@contextmanager
+def engine(workers: int = 1, scheduler: str | None = None) -> Iterator[Engine]:
+    """The engine that is asked for.
+
+    Parameters
+    ----------
+    workers : int
+        Processes of this machine; one is this process itself.
+    scheduler : str, optional
+        Address of a cluster's.
+
+    Raises
+    ------
+    ValueError
+        Where both are given, and as of Cluster.
+    """
+    check_engine(workers, scheduler)
+    if scheduler is None and workers == 1:
+        yield Loop()
+        return
+    for name in THREADS:  # of the processes that are started from here
+        os.environ[name] = "1"
+    chosen = Processes(workers) if scheduler is None else Cluster(scheduler)
+    try:
+        yield chosen
+    finally:
+        chosen.close()
+
+
+def check_engine(workers: int, scheduler: str | None) -> None:
+    """Refuse workers of this machine and of a cluster together.
+
+    Parameters
+    ----------
+    workers, scheduler
+        As of engine.
+
+    Raises
+    ------
+    ValueError
+    """
+    if scheduler is not None and workers > 1:
+        raise ValueError(
+            f"--workers {workers} are of this machine and --scheduler {scheduler} is of a cluster, "
+            "which has workers of its own: give one."
+        )

@@ -1,0 +1,251 @@
+"""What touches points: pure functions of one file and small values, whose results are files."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mlscorr.correction import Correction, PointSigma
+from mlscorr.estimate import Support
+from mlscorr.io.identity import FileIdentity
+from mlscorr.io.las_checks import read_layout
+from mlscorr.io.las_crs import cloud_box
+from mlscorr.io.survey_file import cloud_file
+from mlscorr.io.task_store import TaskStore
+from mlscorr.pipeline.clouds import WrittenClouds, write_counted
+from mlscorr.pipeline.corrected_survey import CorrectedSurvey
+from mlscorr.pipeline.file_finding import FileFinding, find_in_file
+from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.project.settings import SETTINGS
+from mlscorr.pipeline.project.tasks import Written
+from mlscorr.survey import CloudFile, ControlPoints, Survey, Trajectory
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A cloud file by its header.
+
+    Parameters
+    ----------
+    file : CloudFile
+    note : str
+        On its times.
+    box : (2, 3) array
+        Corners that its header states. Units: m.
+    """
+
+    file: CloudFile
+    note: str
+    box: np.ndarray
+
+
+def read_tile(path: Path, ends: Trajectory, system: str, crs: str | None) -> Tile:
+    """A cloud file by its header, and by some of its times.
+
+    Parameters
+    ----------
+    path : Path
+    ends : Trajectory
+        First and last epoch of its drive.
+    system, crs
+        As of cloud_file.
+    """
+    file, note = cloud_file(path, ends, system, crs)
+    return Tile(file, note, cloud_box(read_layout(path)))
+
+
+@lru_cache(maxsize=SETTINGS.cached)
+def _kept(folder: Path, kind: str, key: str) -> Any:
+    """A result that many tasks need."""
+    return TaskStore(folder).get(kind, key)
+
+
+@dataclass(frozen=True)
+class FindingInput:
+    """Of which file, where and how targets and ties are looked for.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the store.
+    drive : str
+        Key of the drive's Survey there, without surveyed points.
+    file : CloudFile
+    identity : FileIdentity
+    surveyed : ControlPoints
+        Near the file.
+    origin : (3,) array
+        As of find_in_file. Units: m.
+    with_ties : bool
+    """
+
+    folder: Path
+    drive: str
+    file: CloudFile
+    identity: FileIdentity
+    surveyed: ControlPoints
+    origin: np.ndarray
+    with_ties: bool
+
+
+def find(inputs: FindingInput) -> FileFinding:
+    """What a cloud file holds.
+
+    Parameters
+    ----------
+    inputs : FindingInput
+    """
+    survey: Survey = _kept(inputs.folder, "drives", inputs.drive)
+    survey = replace(survey.of(inputs.file), clouds=(inputs.file,), control=inputs.surveyed)
+    contents = find_in_file(survey, inputs.origin, inputs.with_ties)
+    _check_same(inputs.file.path, inputs.identity)
+    return contents
+
+
+def _check_same(path, identity):
+    """Refuse a file that changed since its task was planned."""
+    if FileIdentity.of(path) != identity:
+        raise OSError(
+            f"{path} was replaced or changed while it was read: another program may still be "
+            "writing. Run again with --resume when it is whole."
+        )
+
+
+@dataclass(frozen=True)
+class DriveMotion:
+    """How a drive's clouds are moved.
+
+    Parameters
+    ----------
+    survey : Survey
+    correction : Correction
+    held : pair of (float, float) and Support
+        As of write_counted.
+    """
+
+    survey: Survey
+    correction: Correction
+    held: tuple[tuple[float, float], Support]
+
+
+@dataclass(frozen=True)
+class CloudInput:
+    """Which file is corrected, and how.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the store.
+    motion : str
+        Key of the drive's DriveMotion there.
+    path : Path
+    identity : FileIdentity
+    target : Path
+        Folder of the drive's results.
+    with_sigma : bool
+        Whether each point gets its sigmas.
+    """
+
+    folder: Path
+    motion: str
+    path: Path
+    identity: FileIdentity
+    target: Path
+    with_sigma: bool
+
+
+def write(inputs: CloudInput) -> Written:
+    """Write the corrected copy of a file, whole or not at all.
+
+    Parameters
+    ----------
+    inputs : CloudInput
+    """
+    motion: DriveMotion = _kept(inputs.folder, "motions", inputs.motion)
+    correction, survey = motion.correction, _of_file(motion.survey, inputs.path)
+
+    def sigma(part):
+        return PointSigma.of(correction, part.scanner, part.mounting)
+
+    with _moved_into(inputs.folder, inputs.target) as (part, outputs):
+        sigmas = sigma if inputs.with_sigma else None
+        written = write_counted(survey, part, correction, motion.held, silent("", 0), sigmas)
+        _check_same(inputs.path, inputs.identity)
+    return Written(written, tuple(outputs))
+
+
+def _of_file(survey, path):
+    """The survey of one of its files."""
+    clouds = tuple(file for file in survey.clouds if file.path == path)
+    mounted = [
+        replace(scanner, clouds=tuple(file for file in scanner.clouds if file in clouds))
+        for scanner in survey.scanners
+    ]
+    return replace(survey, clouds=clouds, scanners=tuple(m for m in mounted if m.clouds))
+
+
+@contextmanager
+def _moved_into(store, target):
+    """A folder whose files go into another one when all are whole; and what becomes of them."""
+    outputs: list[tuple[str, FileIdentity]] = []
+    with TaskStore(store).part() as part:
+        part.mkdir()
+        try:
+            yield part, outputs
+            for path in sorted(path for path in part.rglob("*") if path.is_file()):
+                there = target / path.relative_to(part)
+                there.parent.mkdir(parents=True, exist_ok=True)
+                os.replace(path, there)
+                name = there.relative_to(store.parent).as_posix()
+                outputs.append((name, FileIdentity.of(there)))
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+
+
+@dataclass(frozen=True)
+class ReportInput:
+    """Which drive is reported on.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the store.
+    corrected : str
+        Key of the CorrectedSurvey there.
+    written : WrittenClouds
+        Of all its files.
+    target : Path
+        Folder of the drive's results.
+    page : bool
+    trajectories : tuple of str
+        As of CorrectedSurvey.write.
+    """
+
+    folder: Path
+    corrected: str
+    written: WrittenClouds
+    target: Path
+    page: bool
+    trajectories: tuple[str, ...]
+
+
+def report(inputs: ReportInput) -> Written:
+    """Write all of a drive's results but its clouds.
+
+    Parameters
+    ----------
+    inputs : ReportInput
+    """
+    corrected: CorrectedSurvey = TaskStore(inputs.folder).get("corrected", inputs.corrected)
+    with _moved_into(inputs.folder, inputs.target) as (part, outputs):
+        document = corrected.write_beside(
+            part, inputs.written, page=inputs.page, trajectories=inputs.trajectories
+        )
+    return Written(document, tuple(outputs))

@@ -1,0 +1,279 @@
+"""Drives as one survey: one trajectory, times made distinct, passes counted over all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from mlscorr.estimate import Estimate
+from mlscorr.io.task_store import digest
+from mlscorr.io.time_systems import WEEK
+from mlscorr.io.trajectory_sessions import join_sessions, with_sigmas
+from mlscorr.pipeline.file_finding import DriveFinding
+from mlscorr.pipeline.tying import estimate_together
+from mlscorr.survey import (
+    ControlPoints,
+    Matched,
+    MountedScanner,
+    Survey,
+    TargetObservations,
+    TieFeatures,
+    Trajectory,
+)
+from mlscorr.ties import SETTINGS, join_features
+
+
+@dataclass(frozen=True)
+class FoundDrive:
+    """A drive and what its files hold.
+
+    Parameters
+    ----------
+    survey : Survey
+        With the surveyed points near its clouds.
+    contents : DriveFinding
+    control, check : Matched
+    """
+
+    survey: Survey
+    contents: DriveFinding
+    control: Matched
+    check: Matched
+
+    @property
+    def passes(self) -> int:
+        """Number of its passes."""
+        return len(self.contents.finding.candidates.passes)
+
+
+@dataclass(frozen=True)
+class JointDrives:
+    """Drives as one survey.
+
+    Parameters
+    ----------
+    drives : tuple of FoundDrive
+        In the order of their times in the joint survey.
+    shifts : (k,) array
+        Whole weeks that make times distinct: joint = recorded + shift. Units: s.
+    survey : Survey
+        With the trajectory of all, without clouds.
+    """
+
+    drives: tuple[FoundDrive, ...]
+    shifts: np.ndarray
+    survey: Survey
+
+    @property
+    def bases(self) -> np.ndarray:
+        """Number (k,) of the passes before those of each drive."""
+        counts = [drive.passes for drive in self.drives]
+        return np.cumsum([0, *counts[:-1]])
+
+    def drive_numbers(self, pass_number: np.ndarray) -> np.ndarray:
+        """Number of the drive of each pass, from 0.
+
+        Parameters
+        ----------
+        pass_number : int array
+            Of the joint survey.
+        """
+        return np.searchsorted(self.bases, pass_number - 1, side="right") - 1
+
+    def control(self) -> Matched:
+        """The matched control points of all drives."""
+        observed = [
+            replace(
+                drive.control.observations,
+                gps_time=drive.control.gps_time + shift,
+                pass_number=drive.control.observations.pass_number + base,
+            )
+            for drive, shift, base in zip(self.drives, self.shifts, self.bases, strict=True)
+        ]
+        surveyed = [drive.control.surveyed for drive in self.drives]
+        return Matched(
+            TargetObservations.concatenate(observed), ControlPoints.concatenate(surveyed)
+        )
+
+    def features(self, origin: np.ndarray) -> TieFeatures:
+        """Planes and poles of all drives.
+
+        Parameters
+        ----------
+        origin : (3,) array
+            As they were found with. Units: m.
+        """
+        names = list(self.survey.by_scanner)
+        parts = []
+        for drive, shift, base in zip(self.drives, self.shifts, self.bases, strict=True):
+            part, own = drive.contents.features, list(drive.survey.by_scanner)
+            number = np.array([names.index(n) if n in names else 0 for n in own])
+            parts.append(
+                replace(
+                    part,
+                    gps_time=part.gps_time + shift,
+                    pass_number=part.pass_number + base,
+                    scanner=number[part.scanner],
+                )
+            )
+        return join_features(parts, origin)
+
+
+def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
+    """Drives as one survey.
+
+    Parameters
+    ----------
+    drives : sequence of FoundDrive
+    """
+    if len(drives) == 1:
+        return JointDrives(tuple(drives), np.zeros(1), drives[0].survey)
+    shifts = distinct_times([drive.survey.trajectory for drive in drives])
+    starts = np.array([drive.survey.trajectory.gps_time[0] for drive in drives])
+    order = np.argsort(starts + shifts)
+    drives, shifts = [drives[i] for i in order], shifts[order]
+    surveys = [drive.survey for drive in drives]
+    names = [survey.name for survey in surveys]
+    parts = [
+        replace(survey.trajectory, gps_time=survey.trajectory.gps_time + shift)
+        for survey, shift in zip(surveys, shifts, strict=True)
+    ]
+    parts, notes = with_sigmas(names, parts, surveys[0].pos)
+    trajectory = join_sessions(names, parts, surveys[0].pos)[0]
+    scanners = _scanners(surveys)
+    mountings = {digest(survey.mounting) for survey in surveys}
+    joint = replace(
+        surveys[0],
+        name=", ".join(names),
+        clouds=(),
+        trajectory=trajectory,
+        mounting=surveys[0].mounting if len(mountings) == 1 else None,
+        notes=tuple(notes),
+        inputs=(),
+        scanners=scanners,
+    )
+    return JointDrives(tuple(drives), shifts, joint)
+
+
+def _scanners(surveys):
+    """The scanners of all drives by their names; none where each drive has one."""
+    if not any(survey.scanners for survey in surveys):
+        return ()
+    parts = {n: part for survey in surveys[::-1] for n, part in survey.by_scanner.items()}
+    return tuple(MountedScanner(n, p.scanner, p.mounting, ()) for n, p in parts.items())
+
+
+def distinct_times(trajectories: Sequence[Trajectory]) -> np.ndarray:
+    """Whole weeks (k,) that must be added to times, so that no two drives share any. Units: s.
+
+    Two vehicles drive at the same time, and seconds of the week come again.
+
+    Parameters
+    ----------
+    trajectories : sequence of Trajectory
+    """
+    spans = np.array([trajectory.gps_time[[0, -1]] for trajectory in trajectories])
+    shifts, placed = np.zeros(len(spans)), np.empty((0, 2))
+    for number in np.argsort(spans[:, 0], kind="stable"):
+        span = spans[number] + [-SETTINGS.pause, SETTINGS.pause]
+        while ((span[0] < placed[:, 1]) & (span[1] > placed[:, 0])).any():
+            shifts[number] += WEEK
+            span = span + WEEK
+        placed = np.vstack([placed, spans[number] + shifts[number]])
+    return shifts
+
+
+@dataclass(frozen=True)
+class JointEstimate:
+    """Drives that ties hold together, and the estimate of all of them.
+
+    Parameters
+    ----------
+    joint : JointDrives
+    estimate : Estimate
+    """
+
+    joint: JointDrives
+    estimate: Estimate
+
+    @property
+    def is_controlled(self) -> bool:
+        """Whether a control point takes part."""
+        return bool(self.estimate.used.any())
+
+    @property
+    def is_tied(self) -> bool:
+        """Whether ties take part."""
+        return self.estimate.ties is not None and bool(self.estimate.ties.used.any())
+
+
+def estimate_drives(
+    drives: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool
+) -> list[JointEstimate]:
+    """The POS errors of drives, of those together that saw the same things.
+
+    Parameters
+    ----------
+    drives : sequence of FoundDrive
+    order : int
+        Of the trend of a drive by itself; drives together have a shift in common.
+    origin : (3,) array
+        Of planes and poles. Units: m.
+    with_ties : bool
+        Else each drive is by itself.
+    """
+    groups = _near(drives) if with_ties else [[drive] for drive in drives]
+    return [part for group in groups for part in _estimated(group, order, origin, with_ties)]
+
+
+def _estimated(group, order, origin, with_ties):
+    """JointEstimates of drives near each other, of those together that ties join."""
+    joint = join_drives(group)
+    features = joint.features(origin) if with_ties else None
+    least = order if len(group) == 1 else min(order, 0)
+    estimate = estimate_together(joint.survey, joint.control(), features, least)
+    parts = _tied(joint, estimate)
+    if len(parts) == 1:
+        return [JointEstimate(joint, estimate)]
+    return [result for part in parts for result in _estimated(part, order, origin, with_ties)]
+
+
+def _tied(joint, estimate):
+    """Lists of the drives that used ties join."""
+    number = len(joint.drives)
+    pairs = np.empty((2, 0), int)
+    if estimate.ties is not None:
+        passes = estimate.ties.ties.pass_number[estimate.ties.used]
+        pairs = joint.drive_numbers(passes).T
+    graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(number, number))
+    return _grouped(joint.drives, connected_components(graph, directed=False)[1])
+
+
+def _near(drives):
+    """Lists of drives whose planes and poles lie within the search radius, or about so."""
+    radius = max(drive.survey.search_radius for drive in drives)
+    rows, cells = [np.empty(0, int)], [np.empty((0, 2), int)]
+    for number, drive in enumerate(drives):
+        own = np.unique(
+            np.floor(drive.contents.features.centre[:, :2] / radius).astype(int), axis=0
+        )
+        wide = np.concatenate([own + np.array([i, j]) for i in (0, 1) for j in (0, 1)])
+        rows.append(np.full(len(wide), number))
+        cells.append(wide)
+    cell = np.unique(np.concatenate(cells), axis=0, return_inverse=True)[1].ravel()
+    size = len(drives) + cell.max(initial=-1) + 1
+    edges = np.concatenate(rows), len(drives) + cell
+    graph = coo_array((np.ones(len(cell), bool), edges), shape=(size, size))
+    return _grouped(drives, connected_components(graph, directed=False)[1][: len(drives)])
+
+
+def _grouped(drives, labels):
+    """Lists of drives of one label each, in the order of their first."""
+    groups: dict[int, list[FoundDrive]] = {}
+    for drive, label in zip(drives, labels.tolist(), strict=True):
+        groups.setdefault(label, []).append(drive)
+    return list(groups.values())

@@ -1,0 +1,128 @@
+"""How far a project has come: sentences at intervals, a log, and what status reads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from time import monotonic
+from typing import TextIO
+
+from mlscorr.io.output import output_file
+from mlscorr.pipeline.project.settings import SETTINGS
+from mlscorr.pipeline.project.tasks import Outcome, Task
+
+TITLES = {
+    "tiles": "Reading headers",
+    "findings": "Reading the clouds",
+    "clouds": "Writing the clouds",
+    "reports": "Reporting",
+}
+
+
+@dataclass
+class Progress:
+    """Counts tasks and tells how far they have come.
+
+    Parameters
+    ----------
+    log : text stream
+    plan : Path
+        Where the tasks of each stage are listed, for status.
+    tell : function of a sentence
+    """
+
+    log: TextIO
+    plan: Path
+    tell: Callable[[str], object]
+    stages: dict[str, list[dict]] = field(default_factory=dict)
+    counts: dict[str, float] = field(default_factory=dict)
+    due: float = 0.0
+
+    def note(self, text: str) -> None:
+        """Write a line into the log.
+
+        Parameters
+        ----------
+        text : str
+        """
+        now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S")
+        print(now, " ".join(text.split()), file=self.log, flush=True)
+
+    def say(self, text: str) -> None:
+        """Tell a sentence, and write it into the log.
+
+        Parameters
+        ----------
+        text : str
+        """
+        self.note(text)
+        self.tell(text)
+
+    def begin(self, kind: str, tasks: Sequence[Task]) -> None:
+        """Begin a stage.
+
+        Parameters
+        ----------
+        kind : str
+        tasks : sequence of Task
+        """
+        self.stages[kind] = [
+            {"key": task.key, "drive": task.drive, "name": task.name, "points": task.points}
+            for task in tasks
+        ]
+        with output_file(self.plan) as part:
+            part.write_text(json.dumps(self.stages), encoding="utf-8")
+        self.note(f"{TITLES[kind]}: {len(tasks)} tasks, {sum(t.points for t in tasks)} points.")
+        self.counts = {"done": 0, "points": 0, "worked": 0, "faults": 0, "start": monotonic()}
+        self.due = monotonic() + SETTINGS.interval
+
+    def ended(self, outcome: Outcome) -> None:
+        """Count a task that ended; its warnings and its fault are told.
+
+        Parameters
+        ----------
+        outcome : Outcome
+        """
+        counts, is_new = self.counts, outcome.seconds > 0
+        counts["done"] += 1
+        counts["points"] += outcome.points
+        counts["worked"] += is_new
+        counts["faults"] += bool(outcome.fault)
+        for text in outcome.warnings:
+            self.say(f"Warning: {outcome.name}: {text}")
+        if outcome.fault:
+            self.say(f"Failed: {outcome.name}: {outcome.fault}")
+        elif is_new:
+            self.note(f"{outcome.kind}: {outcome.name} in {outcome.seconds:.1f} s")
+        if monotonic() >= self.due:
+            self.due = monotonic() + SETTINGS.interval
+            self.say(self._sentence(outcome.kind))
+
+    def _sentence(self, kind):
+        """How far a stage has come, its rate, and the time that is left."""
+        counts, tasks = self.counts, self.stages[kind]
+        total = sum(task["points"] for task in tasks)
+        elapsed = monotonic() - counts["start"]
+        share = counts["points"] / total if total else counts["done"] / len(tasks)
+        left = elapsed / share - elapsed if share else 0.0
+        drives = {task["drive"] for task in tasks}
+        return (
+            f"{TITLES[kind]}: {counts['done']} of {len(tasks)} files of {len(drives)} drives, "
+            f"{100 * share:.0f} %, {counts['points'] / elapsed / 1e6:.1f} M points/s, "
+            f"{duration(left)} left, {counts['faults']} failures"
+        )
+
+
+def duration(seconds: float) -> str:
+    """A time in words.
+
+    >>> duration(59.6), duration(3725)
+    ('1 min', '1 h 2 min')
+    """
+    if seconds < 59.5:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"

@@ -1,0 +1,99 @@
+"""Tasks to their ends: those whose results are there are left, lost workers' are tried again."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
+from dataclasses import dataclass, field
+from typing import Any
+
+from mlscorr.io.task_store import TaskStore
+from mlscorr.pipeline.project.engine import Engine
+from mlscorr.pipeline.project.settings import SETTINGS
+from mlscorr.pipeline.project.tasks import Outcome, Task, Written, carry_out, ended
+
+LOSS = (
+    "its worker was lost {} times while nothing else was at work: the system may have ended it for "
+    "want of memory. Give workers more, or take fewer of them."
+)
+
+
+@dataclass
+class Run:
+    """Works on tasks and counts what happens.
+
+    Parameters
+    ----------
+    store : TaskStore
+    engine : Engine
+    watch : function of an Outcome
+        Is told of each task that ended.
+    faults : list of Outcome
+        Of tasks without a result.
+    """
+
+    store: TaskStore
+    engine: Engine
+    watch: Callable[[Outcome], object]
+    faults: list[Outcome] = field(default_factory=list)
+
+    def results(self, tasks: Sequence[Task]) -> dict[str, Any]:
+        """Results by the names of their tasks; those that fail are among the faults, not here.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            Of distinct names.
+        """
+        results: dict[str, Any] = {}
+        rest = []
+        for task in tasks:
+            result = self._present(task)
+            if result is None:
+                rest.append(task)
+                continue
+            results[task.name], texts = result
+            self.watch(ended(task, texts=texts))
+        for task, outcome in self._outcomes(rest):
+            self.watch(outcome)
+            if outcome.fault:
+                self.faults.append(outcome)
+            else:
+                results[task.name] = self.store.get(task.kind, task.key)[0]
+        return {task.name: results[task.name] for task in tasks if task.name in results}
+
+    def _present(self, task):
+        """The result of a task with its warnings, None where it is lacking or damaged."""
+        try:
+            result, texts = self.store.get(task.kind, task.key)
+        except KeyError:
+            return None
+        if isinstance(result, Written) and not result.is_whole(self.store.folder.parent):
+            return None
+        return result, texts
+
+    def _outcomes(self, tasks) -> Iterator[tuple[Task, Outcome]]:
+        """Each task with its Outcome, as they end."""
+        waiting, suspects, running = deque(tasks), deque(), {}
+        losses: dict[str, int] = {}
+        while waiting or suspects or running:
+            is_single = bool(suspects)  # what lost a worker is tried by itself: it may be to blame
+            source = suspects if is_single else waiting
+            limit = 1 if is_single else SETTINGS.waiting * self.engine.width
+            while source and len(running) < limit:
+                task = source.popleft()
+                future = self.engine.submit(carry_out, task, self.store.folder)
+                running[future] = task, is_single
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                task, was_single = running.pop(future)
+                try:
+                    yield task, future.result()
+                except Exception as error:
+                    if not self.engine.is_lost(error):
+                        raise
+                    losses[task.name] = losses.get(task.name, 0) + was_single
+                    if losses[task.name] >= SETTINGS.losses:
+                        yield task, ended(task, LOSS.format(SETTINGS.losses))
+                    else:
+                        suspects.append(task)

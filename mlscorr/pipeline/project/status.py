@@ -1,0 +1,72 @@
+"""``status``: how far a project has come, from what its run keeps."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from mlscorr.io.output import document
+from mlscorr.io.task_store import TaskStore
+from mlscorr.pipeline.project.correction import STORE
+from mlscorr.pipeline.project.progress import TITLES
+
+
+def project_status(out: str | Path) -> dict:
+    """How far a project has come, whether its run is at work or not.
+
+    Parameters
+    ----------
+    out : path
+        Folder of its results.
+
+    Returns
+    -------
+    dict
+        ``all`` and ``drives[]``: tasks and points done and planned, stage by stage; ``failures``
+        of all runs, and the last line of the ``log``, which says rate and time left.
+
+    Raises
+    ------
+    ValueError
+        Where no project was ever corrected into the folder.
+    """
+    out = Path(out)
+    plan = out / STORE / "plan.json"
+    if not plan.is_file():
+        raise ValueError(
+            f"{out} holds no results of a project, or its run has not begun with any file yet: "
+            "mlscorr correct project.toml -o OUT makes them."
+        )
+    stages, store = json.loads(plan.read_text(encoding="utf-8")), TaskStore(out / STORE)
+    tasks = [
+        {**task, "kind": kind, "is_done": store.path(kind, task["key"]).is_file()}
+        for kind in TITLES
+        for task in stages.get(kind, ())
+    ]
+    drives: dict[str, list[dict]] = {}
+    for task in tasks:
+        drives.setdefault(task["drive"], []).append(task)
+    lines = (out / "log.txt").read_text(encoding="utf-8").splitlines()
+    return document(
+        "status",
+        {
+            "all": _stages(tasks),
+            "drives": [{"name": name, "stages": _stages(own)} for name, own in drives.items()],
+            "failures": [line for line in lines if " Failed: " in line],
+            "log": lines[-1] if lines else "",
+        },
+    )
+
+
+def _stages(tasks):
+    """Tasks and points done and planned, stage by stage."""
+    rows = []
+    for kind, title in TITLES.items():
+        own = [task for task in tasks if task["kind"] == kind]
+        done = [task for task in own if task["is_done"]]
+        points = sum(task["points"] for task in own)
+        row = {"stage": kind, "title": title, "done": len(done), "tasks": len(own)}
+        row |= {"points_done": sum(task["points"] for task in done), "points": points}
+        share = row["points_done"] / points if points else len(done) / max(len(own), 1)
+        rows += [{**row, "share": share}] if own else []
+    return rows

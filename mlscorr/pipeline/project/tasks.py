@@ -1,0 +1,137 @@
+"""Tasks, how they are carried out, and how they end."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from mlscorr.io.identity import FileIdentity
+from mlscorr.io.task_store import TaskStore
+
+VERSION = version("mlscorr")  # results of another one are made again
+
+
+@dataclass(frozen=True)
+class Task:
+    """A function and its arguments, named by the hash of what its result depends on.
+
+    Parameters
+    ----------
+    kind : str
+        Of the stage.
+    key : str
+    drive : str
+    name : str
+        Of what it works on.
+    points : int
+        How much work it is.
+    function : function
+    arguments : tuple
+        Paths and small values.
+    """
+
+    kind: str
+    key: str
+    drive: str
+    name: str
+    points: int
+    function: Callable
+    arguments: tuple
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a task ended.
+
+    Parameters
+    ----------
+    kind, key, drive, name, points
+        As of the Task.
+    fault : str
+        Why it has no result; empty where it has.
+    warnings : tuple of str
+    seconds : float
+        That it took; none where its result was there.
+    """
+
+    kind: str
+    key: str
+    drive: str
+    name: str
+    points: int
+    fault: str = ""
+    warnings: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+
+def carry_out(task: Task, folder: Path) -> Outcome:
+    """Work on a task, with one thread, and keep its result.
+
+    Parameters
+    ----------
+    task : Task
+    folder : Path
+        Of the store.
+    """
+    start, store, fault, texts = time.perf_counter(), TaskStore(folder), "", []
+    with warnings.catch_warnings(record=True) as caught, threadpool_limits(limits=1):
+        warnings.simplefilter("always")
+        try:
+            result = task.function(*task.arguments)
+            spoken = [w for w in caught if issubclass(w.category, UserWarning)]
+            texts = list(dict.fromkeys(str(warning.message) for warning in spoken))
+            store.put(task.kind, task.key, (result, tuple(texts)))
+        except (ValueError, OSError, MemoryError) as error:
+            fault = str(error) or type(error).__name__
+    return ended(task, fault, tuple(texts), time.perf_counter() - start)
+
+
+def ended(
+    task: Task, fault: str = "", texts: tuple[str, ...] = (), seconds: float = 0.0
+) -> Outcome:
+    """The Outcome of a task.
+
+    Parameters
+    ----------
+    task : Task
+    fault : str
+    texts : tuple of str
+        Its warnings.
+    seconds : float
+    """
+    named = task.kind, task.key, task.drive, task.name, task.points
+    return Outcome(*named, fault, texts, seconds)
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a task says of files that it wrote.
+
+    Parameters
+    ----------
+    value : WrittenClouds or dict
+    outputs : tuple of (str, FileIdentity)
+        By their names within a folder.
+    """
+
+    value: Any
+    outputs: tuple[tuple[str, FileIdentity], ...]
+
+    def is_whole(self, folder: Path) -> bool:
+        """Whether the files are as they were written.
+
+        Parameters
+        ----------
+        folder : Path
+        """
+        try:
+            return all(FileIdentity.of(folder / name) == known for name, known in self.outputs)
+        except OSError:
+            return False

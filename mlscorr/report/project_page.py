@@ -1,0 +1,75 @@
+"""The page of a project: its drives on a map, and a table that leads to each."""
+
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from mlscorr.report.map_frame import frame
+from mlscorr.report.pages import Page, data_uri
+from mlscorr.report.style import label, new_figure, styled, svg
+
+SECTIONS = {"drives": "Drives", "map": "Map"}
+
+
+def write_project(path: str | Path, document: dict, tracks: dict[str, np.ndarray]) -> None:
+    """Write the self-contained page of a project, which leads to those of its drives.
+
+    Parameters
+    ----------
+    path : path
+        The HTML file.
+    document : dict
+        The content of project.json.
+    tracks : dict
+        Easting, northing (m) and expected error (m) along each drive (k, 3), by its name.
+    """
+    figures = {"map": data_uri(svg(project_map(tracks)))} if tracks else {}
+    Page(
+        title=f"{document['name']}: correction of {len(document['drives'])} drives",
+        summary="project-summary.html",
+        sections={name: title for name, title in SECTIONS.items() if name != "map" or tracks},
+        content={
+            "document": document,
+            "figures": figures,
+            "links": {
+                row["name"]: f"{quote(row['name'])}/report.html" for row in document["drives"]
+            },
+        },
+        prefix="project-",
+    ).write(path)
+
+
+@styled
+def project_map(tracks: dict[str, np.ndarray]) -> Figure:
+    """Plan of all drives, coloured by the error to expect.
+
+    Parameters
+    ----------
+    tracks : dict
+        As of write_project.
+    """
+    places = np.vstack([track[np.isfinite(track[:, 0])] for track in tracks.values()])
+    low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
+    margin = 0.06 * max(float((high - low).max()), 1.0)
+    low, high = low - margin, high + margin
+    width, height = high - low
+    figure = new_figure(1.0 + 6.0 * float(np.clip(height / width, 0.3, 1.3)))
+    axes = figure.add_subplot()
+    millimetres = 1000 * places[:, 2]
+    colours = LogNorm(max(millimetres.min(), 0.1), max(millimetres.max(), 0.2))
+    for name, track in tracks.items():
+        ends = np.stack([track[:-1], track[1:]], axis=1)
+        ends = ends[np.isfinite(ends).all(axis=(1, 2))]
+        size = 1000 * ends[:, :, 2].mean(axis=1)
+        lines = LineCollection(ends[:, :, :2], array=size, norm=colours, cmap="viridis", lw=2.2)
+        axes.add_collection(lines)
+        axes.annotate(label(name), tuple(track[0, :2]), xytext=(4, 4), textcoords="offset points")
+    bar = figure.colorbar(lines, ax=axes, shrink=0.7, pad=0.01, format="%g")
+    bar.set_label("Error to expect: 3D sigma of the corrected position (mm)")
+    frame(axes, low, high)
+    axes.set_title("Where the drives went, and how well each place is known")
+    return figure

@@ -1,0 +1,83 @@
+"""project.toml: what is wrong in it or between its drives is said in a sentence."""
+
+import pytest
+
+from mlscorr.io.project_file import is_project, read_project
+
+TRAJECTORY = "gps_time,easting,northing,height,roll,pitch,heading\n" + "".join(
+    f"{357700 + 0.1 * k:.1f},{532000 + k},3374000,42,0,0,90\n" for k in range(50)
+)
+DRIVE = (
+    '[[drive]]\nname = "{0}"\nfiles = ["{0}/*.laz"]\n\n[drive.trajectory]\nfile = "{0}/way.csv"\n'
+)
+SURVEY = '{}[cloud]\nfiles = ["*.laz"]\n\n[trajectory]\nfile = "way.csv"\n'
+
+
+@pytest.fixture
+def city(tmp_path):
+    "A folder of two drives whose clouds nobody opens"
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "way.csv").write_text(TRAJECTORY)
+        (tmp_path / name / f"tile-{name}.laz").write_bytes(b"")
+    return tmp_path
+
+
+def write(folder, *parts):
+    "project.toml of some parts"
+    path = folder / "project.toml"
+    path.write_text("\n".join(parts))
+    return path
+
+
+def test_drives_are_read_by_their_files(city):
+    "Names, files and trajectories of both, relative to project.toml"
+    project = read_project(write(city, DRIVE.format("a"), DRIVE.format("b")))
+    assert [drive.name for drive in project.drives] == ["a", "b"]
+    assert [drive.parts.files.clouds[0].name for drive in project.drives] == [
+        "tile-a.laz",
+        "tile-b.laz",
+    ]
+    assert is_project(city) and is_project(city / "project.toml")
+    assert not is_project(city / "survey.toml")
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ([DRIVE.format("a"), DRIVE.format("a")], "names of their own"),
+        ([DRIVE.format("a"), DRIVE.format("b").replace("b/*", "a/*")], "of two drives"),
+        ([DRIVE.format("a").replace('name = "a"', 'name = "tasks"')], "can't be a folder"),
+        (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "are of no drive"),
+        ([DRIVE.format("a").replace("a/*.laz", "s3://bucket/a.laz")], "are addresses"),
+        (['[[drive]]\nname = "a"\n'], "give a drive its survey"),
+        (["name = 1\n", DRIVE.format("a")], "name = 1 can't be used"),
+        (['nmae = "x"\n', DRIVE.format("a")], "the nearest known one is name"),
+    ],
+)
+def test_what_is_wrong_is_said(city, parts, words):
+    "Drives without names or files of their own, files of no drive, addresses, unknown keys"
+    with pytest.raises(ValueError, match=words):
+        read_project(write(city, *parts))
+
+
+def test_drives_of_two_systems_are_refused(city):
+    "Two CRS, two time systems, two beliefs about the POS, and a second control list"
+    for name, head in (("a", 'crs = "EPSG:32650"\n\n'), ("b", 'crs = "EPSG:32649"\n\n')):
+        (city / name / "survey.toml").write_text(SURVEY.format(head))
+    both = ['[[drive]]\nsurvey = "a"\n', '[[drive]]\nsurvey = "b"\n']
+    with pytest.raises(ValueError, match=r"1 of 2 drives of .* are in another CRS"):
+        read_project(write(city, *both))
+    for name, sigma in (("a", 0.1), ("b", 0.2)):
+        belief = f"\n[pos]\nposition_sigma = {sigma}\n"
+        (city / name / "survey.toml").write_text(SURVEY.format("") + belief)
+    with pytest.raises(ValueError, match="share it: say under"):
+        read_project(write(city, *both))
+    assert read_project(write(city, "[pos]\nposition_sigma = 0.3\n", *both)).drives
+    (city / "b" / "survey.toml").write_text(SURVEY.format("") + '\n[control]\nfile = "c.csv"\n')
+    with pytest.raises(ValueError, match="one list for all drives"):
+        read_project(write(city, *both))
+    (city / "b" / "survey.toml").write_text(SURVEY.format(""))
+    (city / "b" / "way.csv").write_text(TRAJECTORY.replace("\n357", "\n1234357"))
+    with pytest.raises(ValueError, match="one time system"):
+        read_project(write(city, *both))

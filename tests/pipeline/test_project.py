@@ -1,0 +1,182 @@
+"""Several drives as one project: what ties carry over, what is done again, and what is refused."""
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+import warnings
+
+import laspy
+import numpy as np
+import pytest
+
+import mlscorr
+from mlscorr.pipeline.project import Options, correct_project, project_status
+from tests.beds import project_street as bed
+from tests.beds.documents import undocumented
+
+COMMAND = [sys.executable, "-m", "mlscorr"]
+QUICK = Options(page=False)
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    "project.toml of two drives, each of two tiles"
+    return bed.write_project(tmp_path_factory.mktemp("city"), duration=6.0, tiles=2)
+
+
+@pytest.fixture(scope="module")
+def corrected(project):
+    "ProjectResult by this process alone, and the folder of the results"
+    out = project.parent.with_name(f"{project.parent.name} out")
+    return correct_project(project, out, QUICK), out
+
+
+@pytest.fixture
+def copy(corrected, tmp_path):
+    "Folder of the results, which a test may change"
+    return shutil.copytree(corrected[1], tmp_path / "out")
+
+
+def outputs(out):
+    "Bytes of all results but those that say when they were made"
+    names = [p for p in out.rglob("*") if p.is_file() and p.relative_to(out).parts[0] != "tasks"]
+    return {
+        str(path.relative_to(out)): path.read_bytes()
+        for path in names
+        if path.suffix not in (".html", ".txt")
+    }
+
+
+def moved(project, out, drive):
+    "What was added to the points of a drive (n, 3). Units: m"
+    return np.concatenate(
+        [
+            laspy.read(out / drive / path.name).xyz - laspy.read(path).xyz
+            for path in sorted((project.parent / drive).glob("*.laz"))
+        ]
+    )
+
+
+def worked(out):
+    "Names of the tasks of the last run that were carried out, by their kinds"
+    lines = (out / "log.txt").read_text().splitlines()
+    begins = max(i for i, line in enumerate(lines) if " Reading headers: " in line)
+    words = [line.split(maxsplit=4) for line in lines[begins:] if " in " in line]
+    return [(word[2].rstrip(":"), word[3]) for word in words if word[2].endswith("s:")]
+
+
+def test_ties_carry_control_to_a_drive_without_any(project, corrected):
+    "A drive that is 43 cm off, and sees no control, comes to within a fifth of that, by ties alone"
+    result, out = corrected
+    left = np.linalg.norm(moved(project, out, "second") + bed.SHIFT, axis=1)
+    assert np.linalg.norm(bed.SHIFT) / left.max() > 5
+    assert np.linalg.norm(moved(project, out, "first"), axis=1).max() < 0.05
+    states = {row["name"]: row["state"] for row in result.document["drives"]}
+    assert states == {"first": "controlled", "second": "tied"}
+    ties = result.document["drives"][1]["tied_with"]["first"]
+    assert ties["before"] > 5 * ties["after"]
+
+
+def test_each_drive_has_results_of_its_own(project, corrected):
+    "Corrected tiles, trajectory in the drive's own times, targets and report.json of each"
+    result, out = corrected
+    assert not undocumented(result.document)
+    assert json.loads((out / "project.json").read_text()) == result.document
+    for drive in ("first", "second"):
+        recorded = mlscorr.io.trajectory.read_trajectory(project.parent / drive / "trajectory.csv")
+        path = mlscorr.io.trajectory.read_trajectory(out / drive / "trajectory.csv")
+        assert np.array_equal(path.gps_time, recorded.gps_time)
+        report = json.loads((out / drive / "report.json").read_text())
+        assert not undocumented(report)
+        assert {row["name"] for row in report["files"]} == {"tile-1.laz", "tile-2.laz"}
+        assert max((row["pass"] for row in report["targets"] if row["pass"]), default=1) <= 2
+    shown = project_status(out)
+    assert {stage["share"] for stage in shown["all"]} == {1.0}
+    assert not undocumented(shown)
+
+
+def test_workers_change_no_byte(project, corrected, tmp_path):
+    "Two processes write what this one does, and the page leads to that of each drive"
+    _, out = corrected
+    correct_project(project, tmp_path / "out", Options(workers=2))
+    assert outputs(tmp_path / "out").items() >= outputs(out).items()
+    page = (tmp_path / "out" / "project.html").read_text()
+    for drive in ("first", "second"):
+        assert f'href="{drive}/report.html"' in page
+        assert (tmp_path / "out" / drive / "report.html").is_file()
+
+
+def test_a_project_of_one_drive_is_its_survey(project, tmp_path):
+    "The same clouds and trajectory, to the byte, as of the survey by itself"
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    survey = (folder / "first" / "survey.toml").read_text()
+    control = '\n[control]\nfile = "../control.csv"\n'
+    (folder / "first" / "survey.toml").write_text(survey + control)
+    text = '[control]\nfile = "control.csv"\n\n[[drive]]\nsurvey = "first"\n'
+    (folder / "one.project.toml").write_text(text)
+    correct_project(folder / "one.project.toml", tmp_path / "out", QUICK)
+    with warnings.catch_warnings(action="ignore"):
+        mlscorr.correct(mlscorr.read_survey(folder / "first")).write(tmp_path / "alone", page=False)
+    for name in ("tile-1.laz", "tile-2.laz", "trajectory.csv", "targets.csv"):
+        alone = (tmp_path / "alone" / name).read_bytes()
+        assert (tmp_path / "out" / "first" / name).read_bytes() == alone
+
+
+def test_resume_does_what_is_missing_or_damaged(project, copy):
+    "A cloud that is gone, and a result of which a bit fell over, are made again; nothing else"
+    out, before = copy, outputs(copy)
+    (out / "first" / "tile-2.laz").unlink()
+    damaged = next((out / "tasks" / "tiles").glob("*.result"))
+    content = bytearray(damaged.read_bytes())
+    content[-1] ^= 1
+    damaged.write_bytes(content)
+    correct_project(project, out, Options(page=False, resume=True))
+    assert outputs(out) == before
+    kinds = [kind for kind, _ in worked(out)]
+    assert sorted(kinds) == ["clouds", "tiles"]
+
+
+def test_an_edited_control_list_reads_no_cloud_again(project, copy, tmp_path):
+    "A check point that becomes control changes the estimate and all that follows, nothing before"
+    folder, out = shutil.copytree(project.parent, tmp_path / "city"), copy
+    control = folder / "control.csv"
+    control.write_text(control.read_text().replace(",check", ",control"))
+    result = correct_project(folder, out, Options(page=False, resume=True))
+    assert result.document["drives"][0]["control"]["n_scored"] == 5
+    kinds = {kind for kind, _ in worked(out)}
+    assert kinds == {"tiles", "clouds", "reports"}  # whose paths are new, or their correction
+
+
+def test_a_killed_run_is_resumed_to_the_same_bytes(project, corrected, tmp_path):
+    "SIGKILL in the middle, then --resume: the same results as without"
+    command = [*COMMAND, "correct", project, "-o", tmp_path / "out", "--no-report"]
+    process = subprocess.Popen(list(map(str, command)), stderr=subprocess.DEVNULL)
+    log, due = tmp_path / "out" / "log.txt", time.monotonic() + 120
+    while time.monotonic() < due and process.poll() is None:
+        if log.exists() and "findings:" in log.read_text():
+            break
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    assert not (tmp_path / "out" / "project.json").exists()
+    correct_project(project, tmp_path / "out", Options(page=False, resume=True))
+    assert outputs(tmp_path / "out") == outputs(corrected[1])
+    assert not [*(tmp_path / "out" / "tasks").glob("part.*")]
+
+
+def test_one_corrupt_file_is_named_and_the_rest_done(project, tmp_path):
+    "Exit code 4, the file by its name in the log and in project.json, all others corrected"
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    tile = folder / "second" / "tile-2.laz"
+    tile.write_bytes(tile.read_bytes()[:-2000])
+    out = tmp_path / "out"
+    command = [*COMMAND, "correct", folder, "-o", out, "--no-report", "--json"]
+    run = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert run.returncode == 4, run.stderr
+    (fault,) = json.loads(run.stdout)["faults"]
+    assert fault["name"] == "second/tile-2.laz" and "cut off" in fault["fault"]
+    assert sorted(path.name for path in (out / "second").glob("*.laz")) == ["tile-1.laz"]
+    assert len([*(out / "first").glob("*.laz")]) == 2
+    assert "Failed: second/tile-2.laz" in run.stderr
