@@ -10,6 +10,7 @@ from mlscorr.simulate import Scenario, simulate
 
 SHIFT = np.array([0.31, -0.24, 0.18])  # m, of the second drive's record
 SIGMA = 0.3  # m, that it states
+PLACE = 532_000.0, 3_374_000.0  # m, where the street begins
 PROJECT = """name = "city"
 crs = "EPSG:32650"
 

@@ -152,7 +152,7 @@ def _cut(correction, trajectory, shift):
 
 def _equations(equations, rows, trajectory, shift):
     """The Equations of a drive's own control points, in its own times."""
-    own = equations.select(rows)
+    own = equations.select(rows) if len(rows) else equations
     own = replace(own, gps_time=own.gps_time - shift, trajectory=trajectory, ties=None)
     kept = np.arange(len(own.names))
     if len(kept) == len(own.gps_time):

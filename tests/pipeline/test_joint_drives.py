@@ -1,0 +1,123 @@
+"""Drives estimated together: at other times, at the same time, and with nothing in common."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.io.project_file import read_project
+from mlscorr.io.time_systems import WEEK
+from mlscorr.pipeline.file_finding import find_in_file
+from mlscorr.pipeline.project.corrected import corrected_drives, found_drive
+from mlscorr.pipeline.project.joint import distinct_times, estimate_drives
+from tests.beds import project_street as bed
+
+ORIGIN = np.array([*bed.PLACE, 0.0])
+AWAY = np.array([5000.0, 0.0, 0.0])  # m
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory):
+    "FoundDrives of the first drive, with control, and of the second, off and without it"
+    project = read_project(bed.write_project(tmp_path_factory.mktemp("city"), duration=5.0))
+    found = []
+    for drive in project.drives:
+        read = [drive.parts.cloud_file(path) for path in drive.parts.files.clouds]
+        survey = replace(drive.parts.survey(read), control=project.control, check=project.check)
+        found.append(found_drive(survey, [find_in_file(survey, ORIGIN)]))
+    return found
+
+
+def results(drives):
+    "CorrectedSurvey and DriveState of each drive by its name"
+    parts = estimate_drives(drives, 1, ORIGIN, True)
+    return {
+        state.name: (corrected, state) for p in parts for corrected, state in corrected_drives(p)
+    }
+
+
+@pytest.fixture(scope="module")
+def together(drives):
+    "Results of both drives as they are"
+    return results(drives)
+
+
+def elsewhere(drive, seconds=0.0, way=bed.SHIFT * 0):
+    "A FoundDrive without control, at another time and place"
+    trajectory, features = drive.survey.trajectory, drive.contents.features
+    survey = replace(
+        drive.survey,
+        trajectory=replace(
+            trajectory,
+            gps_time=trajectory.gps_time + seconds,
+            position=trajectory.position + way,
+        ),
+    )
+    moved = replace(features, gps_time=features.gps_time + seconds, centre=features.centre + way)
+    return replace(drive, survey=survey, contents=replace(drive.contents, features=moved))
+
+
+def added(corrected):
+    "What the correction adds to the position (n, 3). Units: m"
+    return corrected.trajectory.position - corrected.survey.trajectory.position
+
+
+def test_a_drive_without_control_comes_to_that_with_it(together):
+    "43 cm off, it is within 3 cm of the truth, and its sigma says so"
+    corrected, state = together["second"]
+    assert state.state == "tied" and list(state.tied_with) == ["first"]
+    left = np.linalg.norm(added(corrected) + bed.SHIFT, axis=1)
+    assert left.max() < 0.03
+    assert left.max() < 3.5 * np.linalg.norm(corrected.trajectory.position_sigma, axis=1).max()
+    assert "nothing" not in corrected.estimate.untied
+    assert corrected.tie_section["n"] == 0 and "with first" in corrected.tie_section["reason"]
+
+
+def test_times_of_a_drive_stay_its_own(together, drives):
+    "Trajectory, targets, support and ties of each drive lie within its own times"
+    for drive in drives:
+        corrected, _ = together[drive.survey.name]
+        first, last = drive.survey.trajectory.gps_time[[0, -1]]
+        times = [row.gps_time for row in corrected.targets if row.gps_time is not None]
+        times += [
+            t for stretch in corrected.estimate.support.weak for t in (stretch.start, stretch.end)
+        ]
+        times += [*corrected.estimate.span, *(place.gps_time for place in corrected.next_control)]
+        assert all(first <= time <= last for time in times)
+        assert corrected.estimate.guards.gap[1] <= last
+        assert all(stretch.chainage >= 0 for stretch in corrected.estimate.support.weak)
+
+
+def test_two_vehicles_may_drive_at_the_same_time(drives, together):
+    "Times that both share are told apart inside, and the correction is that of distinct times"
+    first, second = drives
+    begin = [drive.survey.trajectory.gps_time[0] for drive in drives]
+    at_once = results([first, elsewhere(second, begin[0] - begin[1])])
+    for name in ("first", "second"):
+        apart = added(at_once[name][0]) - added(together[name][0])
+        assert np.abs(apart).max() < 0.002
+    spans = [drive.survey.trajectory for drive in (first, elsewhere(second, begin[0] - begin[1]))]
+    assert distinct_times(spans).tolist() == [0.0, WEEK]
+    assert distinct_times([drive.survey.trajectory for drive in drives]).tolist() == [0.0, 0.0]
+
+
+def test_nothing_corrects_a_drive_elsewhere(drives):
+    "Without control and overlap a drive stays as it is, and that is said; the other is by itself"
+    first, second = drives
+    apart = results([first, elsewhere(second, way=AWAY)])
+    corrected, state = apart["second"]
+    assert state.state == "uncorrected" and not state.tied_with
+    assert np.abs(added(corrected)).max() < 1e-9
+    alone = results([first])["first"][0]
+    assert np.array_equal(added(apart["first"][0]), added(alone))
+    assert apart["first"][1].state == "controlled"
+
+
+def test_passes_without_any_control_fit_to_one_another_only(drives):
+    "Two drives that see each other, and no control: relative, and their misfit is gone"
+    first, second = drives
+    none = replace(first, control=first.control[[]], check=first.check[[]])
+    _, state = results([none, second])["second"]
+    assert state.state == "relative"
+    ties = state.tied_with["first"]
+    assert ties["after"] < ties["before"] / 5

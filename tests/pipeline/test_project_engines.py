@@ -1,0 +1,100 @@
+"""Who works on tasks: workers that end in the middle, and a cluster of other processes."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mlscorr.io.task_store import TaskStore
+from mlscorr.pipeline.project import check_engine
+from mlscorr.pipeline.project.engine import engine
+from mlscorr.pipeline.project.running import Run
+from mlscorr.pipeline.project.tasks import Task
+from tests.beds.places import ROOT
+
+CLUSTER = """
+from distributed import LocalCluster
+from tests.pipeline.test_project_engines import squares
+if __name__ == "__main__":
+    with LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
+        squares({folder!r}, scheduler=cluster.scheduler_address)
+"""
+
+
+def square(number):
+    "A result of a task"
+    if number < 0:
+        raise ValueError(f"{number} has no square here.")
+    return number * number
+
+
+def end_at_first(path, number):
+    "Ends its process as the system does where memory lacks, but for the second time"
+    if not os.path.exists(path):
+        open(path, "w").close()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return square(number)
+
+
+def end(number):
+    "Ends its process each time"
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def task(number, function=square, *arguments):
+    "A Task by its number"
+    name = f"{function.__name__}-{number}"
+    return Task("clouds", name, "drive", name, 1, function, (*arguments, number))
+
+
+def squares(folder, workers=1, scheduler=None):
+    "Run of tasks, one of which fails, with an engine; asserts the results"
+    with engine(workers, scheduler) as chosen:
+        run = Run(TaskStore(Path(folder)), chosen, lambda outcome: None)
+        tasks = [task(number) for number in (-1, 2, 3, 4, 5)]
+        results = run.results(tasks)
+        assert list(results.values()) == [4, 9, 16, 25]
+        assert [fault.fault for fault in run.faults] == ["-1 has no square here."]
+    return run
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_tasks_that_fail_end_no_run(tmp_path, workers):
+    "The results of all others, in the order of their tasks, and the sentence of the one"
+    squares(tmp_path, workers)
+
+
+def test_a_lost_worker_is_counted_and_its_task_done_again(tmp_path):
+    "A task that ends its worker once has a result; one that ends it each time is given up"
+    ends = []
+    with engine(2) as chosen:
+        run = Run(TaskStore(tmp_path), chosen, ends.append)
+        tasks = [task(n) for n in range(6)]
+        tasks[2:2] = [task(7, end_at_first, tmp_path / "mark"), task(8, end)]
+        results = run.results(tasks)
+        assert results == {f"square-{n}": n * n for n in range(6)} | {"end_at_first-7": 49}
+        assert chosen.lost >= 3
+    (fault,) = run.faults
+    assert fault.name == "end-8" and "its worker was lost 2 times" in fault.fault
+    assert len(ends) == len(tasks)
+
+
+def test_a_cluster_works_on_tasks(tmp_path):
+    "Workers of dask.distributed give the same results and failures"
+    pytest.importorskip("distributed", reason="pip install 'mlscorr[cluster]' tests clusters")
+    script = tmp_path / "cluster.py"
+    script.write_text(CLUSTER.format(folder=str(tmp_path / "tasks")))
+    paths = {"PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+    run = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, env=os.environ | paths
+    )
+    assert run.returncode == 0, run.stderr
+
+
+def test_what_can_not_work_is_said(tmp_path):
+    "Workers of two kinds, and a scheduler that is not there"
+    with pytest.raises(ValueError, match="give one"):
+        check_engine(2, "tcp://127.0.0.1:1")
