@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
 
-.PHONY: demo test docs wheel faults folders bench tables assets pages examples clean
+.PHONY: demo test docs wheel faults folders bench bench-scale tables assets pages examples clean
 
 demo: $(VENV)/ready
 	$(RUN)/mlscorr demo -o demo --overwrite
@@ -45,6 +45,10 @@ bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench_matching.py
 	$(RUN)/python benchmarks/bench_gap.py
 	$(RUN)/python benchmarks/bench_render.py
+
+# Two workers against one, a project against its survey, and runs that are killed and resumed
+bench-scale: $(VENV)/ready
+	$(RUN)/python benchmarks/bench_scale.py $(or $(DRIVES),2) $(or $(KILLS),5)
 
 # TABLES="scenarios results" writes these alone, CHECK=FOLDER is one of mlscorr blind
 tables: $(VENV)/ready

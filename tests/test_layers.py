@@ -51,8 +51,9 @@ MODULES = sorted(
     path for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.stem[0] != "_"
 )
 PROJECT_FLOORS = (  # of the modules within pipeline/project, which stands on top of one survey
-    ("settings", "engine", "tasks", "joint"),
-    ("file_tasks", "running", "progress", "drive_estimate"),
+    ("settings", "engine", "tasks"),
+    ("joint", "file_tasks", "running", "progress"),
+    ("drive_estimate", "joint_estimate"),
     ("stages", "corrected"),
     ("document",),
     ("correction",),

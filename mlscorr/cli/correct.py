@@ -13,7 +13,6 @@ from mlscorr.cli.terminal import (
     Out,
     Overwrite,
     Quiet,
-    SurveyArgument,
     exit_code,
     say,
     say_statements,
@@ -23,7 +22,9 @@ from mlscorr.cli.work import print_json, work
 
 
 def correct(
-    survey: SurveyArgument,
+    survey: Annotated[
+        Path, typer.Argument(help="survey.toml or project.toml, or the folder that holds it.")
+    ],
     out: Out,
     order: Annotated[
         int, typer.Option(min=0, max=9, help="Order of the polynomial trend of the position.")

@@ -19,7 +19,7 @@ from mlscorr.io.survey_sections import (
 from mlscorr.io.toml_file import TomlSection
 
 FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system
-RESERVED = ("tasks",)  # what a project keeps beside the drives
+RESERVED = ("tasks", "log.txt", "project.json", "project.html")  # beside the drives
 
 
 class TilesSection(TomlSection):
@@ -77,7 +77,9 @@ class ProjectFile(TomlSection):
                 f"the {len(names)} [[drive]] need names of their own, as each is a folder of the "
                 f"results, and {len(doubled)} stand twice or more (first: {doubled[0]})"
             )
-        wrong = [n for n, _ in self.drives if not FOLDER_NAME.fullmatch(n) or n in RESERVED]
+        wrong = [
+            n for n, _ in self.drives if not FOLDER_NAME.fullmatch(n) or n.casefold() in RESERVED
+        ]
         if wrong:
             raise ValueError(
                 f"{len(wrong)} of the {len(names)} drives have a name that can't be a folder of "

@@ -7,10 +7,11 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter
 
 from mlscorr.report.map_frame import frame
 from mlscorr.report.pages import Page, data_uri
-from mlscorr.report.style import label, new_figure, styled, svg
+from mlscorr.report.style import label, new_figure, nice, styled, svg
 
 SECTIONS = {"drives": "Drives", "map": "Map"}
 
@@ -68,7 +69,13 @@ def project_map(tracks: dict[str, np.ndarray]) -> Figure:
         lines = LineCollection(ends[:, :, :2], array=size, norm=colours, cmap="viridis", lw=2.2)
         axes.add_collection(lines)
         axes.annotate(label(name), tuple(track[0, :2]), xytext=(4, 4), textcoords="offset points")
-    bar = figure.colorbar(lines, ax=axes, shrink=0.7, pad=0.01, format="%g")
+    ends = nice(colours.vmin), nice(colours.vmax)
+    powers = 10.0 ** np.arange(np.floor(np.log10(ends[0])), np.ceil(np.log10(ends[1])) + 1)
+    bar = figure.colorbar(lines, ax=axes, location="bottom", shrink=0.8, aspect=50)
+    bar.set_ticks([step * power for power in powers for step in (1, 2, 3, 5, 7)], minor=False)
+    bar.ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    bar.ax.minorticks_off()
+    bar.ax.set_xlim(colours.vmin, colours.vmax)
     bar.set_label("Error to expect: 3D sigma of the corrected position (mm)")
     frame(axes, low, high)
     axes.set_title("Where the drives went, and how well each place is known")

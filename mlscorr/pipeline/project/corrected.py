@@ -16,7 +16,8 @@ from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.file_finding import FileFinding, join_findings
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, drive_estimates
 from mlscorr.pipeline.project.file_tasks import DriveMotion
-from mlscorr.pipeline.project.joint import FoundDrive, JointEstimate
+from mlscorr.pipeline.project.joint import FoundDrive
+from mlscorr.pipeline.project.joint_estimate import JointEstimate
 from mlscorr.survey import Matched, Survey
 
 STATES = {
@@ -69,7 +70,7 @@ def corrected_drives(part: JointEstimate) -> list[tuple[CorrectedSurvey, DriveSt
     """
     joint, estimate = part.joint, part.estimate
     states = [_state(part, number) for number in range(len(joint.drives))]
-    if len(joint.drives) == 1:
+    if joint.is_single:
         whole = CorrectedSurvey(**_fields(joint.drives[0], estimate))
         return [(whole, states[0])]
     notes = [_tied_with(state) for state in states]

@@ -19,7 +19,7 @@ from mlscorr.pipeline.project.corrected import corrected_drives, found_drive, mo
 from mlscorr.pipeline.project.document import ProjectResult, drive_result, project_document
 from mlscorr.pipeline.project.engine import engine
 from mlscorr.pipeline.project.file_tasks import ReportInput
-from mlscorr.pipeline.project.joint import estimate_drives
+from mlscorr.pipeline.project.joint_estimate import estimate_drives
 from mlscorr.pipeline.project.progress import Progress
 from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.stages import (
@@ -125,6 +125,11 @@ def _progress(out: Path, tell: Callable[[str], object]) -> Iterator[Progress]:
 def _check_out(project, out, options):
     """Refuse a folder of other results; an old run's go where nothing is resumed."""
     is_ours = (out / STORE).is_dir()
+    if is_ours and not (options.resume or options.overwrite):
+        raise ValueError(
+            f"{out} holds results of a project already. --resume does what is missing or changed "
+            "there, --overwrite does all again; or choose another folder."
+        )
     check_output(out, project.files, options.overwrite or (options.resume and is_ours))
     for drive in project.drives:
         check_output(out / drive.name, drive.parts.files.clouds, overwrite=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -87,9 +88,25 @@ class Processes:
             self._executor = None
 
 
+def _in_single_threads(function, *arguments):
+    """The result of a call in a worker that others started; libraries read this at their start."""
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
+    return function(*arguments)
+
+
 def _start_worker():
     """Leave interruptions to the process that waits for this one, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent():
+    """End this process when the one that waits for it was killed: nobody else would."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 class Cluster:
@@ -139,7 +156,7 @@ class Cluster:
         present = set(self._client.scheduler_info(n_workers=-1)["workers"])
         self.lost += len(self._present - present)
         self._present = present
-        return self._executor.submit(function, *arguments)
+        return self._executor.submit(_in_single_threads, function, *arguments)
 
     def is_lost(self, error: BaseException) -> bool:
         """Whether workers ended without an answer, more often than the scheduler tries again."""
@@ -172,13 +189,16 @@ def engine(workers: int = 1, scheduler: str | None = None) -> Iterator[Engine]:
     if scheduler is None and workers == 1:
         yield Loop()
         return
-    for name in THREADS:  # of the processes that are started from here
-        os.environ[name] = "1"
     chosen = Processes(workers) if scheduler is None else Cluster(scheduler)
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))  # of the processes that are started from here
     try:
         yield chosen
     finally:
         chosen.close()
+        for name, value in before.items():
+            os.environ.pop(name)
+            os.environ.update({name: value} if value is not None else {})
 
 
 def check_engine(workers: int, scheduler: str | None) -> None:

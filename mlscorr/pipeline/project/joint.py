@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from mlscorr.estimate import Estimate
 from mlscorr.io.task_store import digest
 from mlscorr.io.time_systems import WEEK
 from mlscorr.io.trajectory_sessions import join_sessions, with_sigmas
 from mlscorr.pipeline.file_finding import DriveFinding
-from mlscorr.pipeline.tying import estimate_together
+from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.survey import (
     ControlPoints,
     Matched,
@@ -24,7 +21,8 @@ from mlscorr.survey import (
     TieFeatures,
     Trajectory,
 )
-from mlscorr.ties import SETTINGS, join_features
+from mlscorr.ties import SETTINGS as TIES
+from mlscorr.ties import join_features
 
 
 @dataclass(frozen=True)
@@ -67,6 +65,11 @@ class JointDrives:
     drives: tuple[FoundDrive, ...]
     shifts: np.ndarray
     survey: Survey
+
+    @property
+    def is_single(self) -> bool:
+        """Whether it is one drive as it stands."""
+        return self.survey is self.drives[0].survey
 
     @property
     def bases(self) -> np.ndarray:
@@ -123,14 +126,17 @@ class JointDrives:
         return join_features(parts, origin)
 
 
-def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
+def join_drives(drives: Sequence[FoundDrive], limit: int = SETTINGS.epochs) -> JointDrives:
     """Drives as one survey.
 
     Parameters
     ----------
     drives : sequence of FoundDrive
+    limit : int
+        Of the epochs of all drives: of more, as few are left out as must be.
     """
-    if len(drives) == 1:
+    step = -(-sum(len(drive.survey.trajectory) for drive in drives) // limit)
+    if len(drives) == 1 and step == 1:
         return JointDrives(tuple(drives), np.zeros(1), drives[0].survey)
     shifts = distinct_times([drive.survey.trajectory for drive in drives])
     starts = np.array([drive.survey.trajectory.gps_time[0] for drive in drives])
@@ -139,7 +145,7 @@ def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
     surveys = [drive.survey for drive in drives]
     names = [survey.name for survey in surveys]
     parts = [
-        replace(survey.trajectory, gps_time=survey.trajectory.gps_time + shift)
+        _shifted(survey.trajectory, shift, step)
         for survey, shift in zip(surveys, shifts, strict=True)
     ]
     parts, notes = with_sigmas(names, parts, surveys[0].pos)
@@ -157,6 +163,23 @@ def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
         scanners=scanners,
     )
     return JointDrives(tuple(drives), shifts, joint)
+
+
+def _shifted(trajectory, shift, step):
+    """Each step-th epoch of a trajectory, and both ends of its passes, at other times."""
+    times = trajectory.gps_time
+    if step == 1:
+        return replace(trajectory, gps_time=times + shift)
+    edges = np.searchsorted(times, trajectory.passes.ravel())
+    rows = np.unique(np.append(np.arange(0, len(times), step), edges))
+    sigmas = trajectory.position_sigma, trajectory.attitude_sigma
+    return Trajectory(
+        times[rows] + shift,
+        trajectory.position[rows],
+        trajectory.attitude[rows],
+        *(None if sigma is None else sigma[rows] for sigma in sigmas),
+        session=trajectory.segment(times[rows]),
+    )
 
 
 def _scanners(surveys):
@@ -179,101 +202,9 @@ def distinct_times(trajectories: Sequence[Trajectory]) -> np.ndarray:
     spans = np.array([trajectory.gps_time[[0, -1]] for trajectory in trajectories])
     shifts, placed = np.zeros(len(spans)), np.empty((0, 2))
     for number in np.argsort(spans[:, 0], kind="stable"):
-        span = spans[number] + [-SETTINGS.pause, SETTINGS.pause]
+        span = spans[number] + [-TIES.pause, TIES.pause]
         while ((span[0] < placed[:, 1]) & (span[1] > placed[:, 0])).any():
             shifts[number] += WEEK
             span = span + WEEK
         placed = np.vstack([placed, spans[number] + shifts[number]])
     return shifts
-
-
-@dataclass(frozen=True)
-class JointEstimate:
-    """Drives that ties hold together, and the estimate of all of them.
-
-    Parameters
-    ----------
-    joint : JointDrives
-    estimate : Estimate
-    """
-
-    joint: JointDrives
-    estimate: Estimate
-
-    @property
-    def is_controlled(self) -> bool:
-        """Whether a control point takes part."""
-        return bool(self.estimate.used.any())
-
-    @property
-    def is_tied(self) -> bool:
-        """Whether ties take part."""
-        return self.estimate.ties is not None and bool(self.estimate.ties.used.any())
-
-
-def estimate_drives(
-    drives: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool
-) -> list[JointEstimate]:
-    """The POS errors of drives, of those together that saw the same things.
-
-    Parameters
-    ----------
-    drives : sequence of FoundDrive
-    order : int
-        Of the trend of a drive by itself; drives together have a shift in common.
-    origin : (3,) array
-        Of planes and poles. Units: m.
-    with_ties : bool
-        Else each drive is by itself.
-    """
-    groups = _near(drives) if with_ties else [[drive] for drive in drives]
-    return [part for group in groups for part in _estimated(group, order, origin, with_ties)]
-
-
-def _estimated(group, order, origin, with_ties):
-    """JointEstimates of drives near each other, of those together that ties join."""
-    joint = join_drives(group)
-    features = joint.features(origin) if with_ties else None
-    least = order if len(group) == 1 else min(order, 0)
-    estimate = estimate_together(joint.survey, joint.control(), features, least)
-    parts = _tied(joint, estimate)
-    if len(parts) == 1:
-        return [JointEstimate(joint, estimate)]
-    return [result for part in parts for result in _estimated(part, order, origin, with_ties)]
-
-
-def _tied(joint, estimate):
-    """Lists of the drives that used ties join."""
-    number = len(joint.drives)
-    pairs = np.empty((2, 0), int)
-    if estimate.ties is not None:
-        passes = estimate.ties.ties.pass_number[estimate.ties.used]
-        pairs = joint.drive_numbers(passes).T
-    graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(number, number))
-    return _grouped(joint.drives, connected_components(graph, directed=False)[1])
-
-
-def _near(drives):
-    """Lists of drives whose planes and poles lie within the search radius, or about so."""
-    radius = max(drive.survey.search_radius for drive in drives)
-    rows, cells = [np.empty(0, int)], [np.empty((0, 2), int)]
-    for number, drive in enumerate(drives):
-        own = np.unique(
-            np.floor(drive.contents.features.centre[:, :2] / radius).astype(int), axis=0
-        )
-        wide = np.concatenate([own + np.array([i, j]) for i in (0, 1) for j in (0, 1)])
-        rows.append(np.full(len(wide), number))
-        cells.append(wide)
-    cell = np.unique(np.concatenate(cells), axis=0, return_inverse=True)[1].ravel()
-    size = len(drives) + cell.max(initial=-1) + 1
-    edges = np.concatenate(rows), len(drives) + cell
-    graph = coo_array((np.ones(len(cell), bool), edges), shape=(size, size))
-    return _grouped(drives, connected_components(graph, directed=False)[1][: len(drives)])
-
-
-def _grouped(drives, labels):
-    """Lists of drives of one label each, in the order of their first."""
-    groups: dict[int, list[FoundDrive]] = {}
-    for drive, label in zip(drives, labels.tolist(), strict=True):
-        groups.setdefault(label, []).append(drive)
-    return list(groups.values())

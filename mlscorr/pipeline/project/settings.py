@@ -9,6 +9,7 @@ class Settings:
 
     losses: int = 2  # times that a task may lose its worker alone, before it is to blame itself
     waiting: int = 2  # tasks for each worker that are handed out: the next is there when it ends
+    epochs: int = 2_000_000  # of drives together, at 288 B of covariance each; more are thinned
     interval: float = 10.0  # s between two lines on how far it has come
     cached: int = 2  # drives that a worker holds: that of this task, and of the one before
 

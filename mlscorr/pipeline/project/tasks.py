@@ -88,8 +88,10 @@ def carry_out(task: Task, folder: Path) -> Outcome:
             spoken = [w for w in caught if issubclass(w.category, UserWarning)]
             texts = list(dict.fromkeys(str(warning.message) for warning in spoken))
             store.put(task.kind, task.key, (result, tuple(texts)))
-        except (ValueError, OSError, MemoryError) as error:
+        except (ValueError, OSError) as error:
             fault = str(error) or type(error).__name__
+        except Exception as error:  # a night's work doesn't end by what nobody thought of
+            fault = f"{type(error).__name__}: {error}. Please report this."
     return ended(task, fault, tuple(texts), time.perf_counter() - start)
 
 

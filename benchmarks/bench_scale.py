@@ -1,0 +1,163 @@
+"""What workers gain and what tasks cost: a project of tiles against a survey of the same files.
+
+    python benchmarks/bench_scale.py [DRIVES] [KILLS]
+
+A simulated street is driven DRIVES times (2 by default). In the same run are timed: the single
+survey of one drive, a project of that drive, the project of all drives with one worker and with
+two, and a resumed run with nothing to do. Then the client is killed at KILLS random moments (2 by
+default), and each time resumed: the bytes must be the same. Times alone mean nothing on a busy
+machine; ratios of one run do, where nothing else is at work.
+"""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter, process_time, sleep
+
+import laspy
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mlscorr.pipeline.project import correct_project
+from mlscorr.pipeline.project.progress import Progress
+from mlscorr.simulate import Scenario, simulate
+
+TILES = 4  # of a drive
+SCANNER = {"lines_per_second": 150, "points_per_line": 2000}
+COMMAND = [sys.executable, "-m", "mlscorr", "correct"]
+
+
+def write_drive(folder, number, seconds=12.0):
+    """A survey in tiles: the same street each time, another POS."""
+    scenario = Scenario(
+        drive={"duration": seconds},
+        targets={"control": 6, "check": 2, "hidden": 0.0},
+        scanner=[SCANNER],
+        start_time=357_700.0 + 3600 * number,
+    )
+    simulate(scenario, np.random.default_rng(7)).write(folder)
+    cloud = laspy.read(folder / "pass-1.laz")
+    for tile, rows in enumerate(np.array_split(np.arange(len(cloud.points)), TILES), start=1):
+        part = laspy.LasData(cloud.header)
+        part.points = cloud.points[rows]
+        part.write(folder / f"tile-{tile}.laz")
+    (folder / "pass-1.laz").unlink()
+    text = (folder / "survey.toml").read_text().replace('"pass-1.laz"', '"tile-*.laz"')
+    (folder / "survey.toml").write_text(text)
+    return len(cloud.points)
+
+
+def write_project(folder, numbers, name):
+    """A project.toml of some drives."""
+    drives = "".join(f'\n[[drive]]\nsurvey = "drive-{number}"\n' for number in numbers)
+    path = folder / f"{name}.project.toml"
+    path.write_text(f'[control]\nfile = "drive-0/control.csv"\n{drives}')
+    return path
+
+
+def timed(*arguments):
+    """Seconds of a run of correct without pages, by the clock and of all processors (2,)."""
+    start, worked = perf_counter(), processor_seconds()
+    command = [*COMMAND, *map(str, arguments), "--no-report", "--quiet"]
+    subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+    return np.array([perf_counter() - start, processor_seconds() - worked])
+
+
+def processor_seconds():
+    """Of all processes that were started here and have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def outputs(out):
+    """Bytes of the clouds and documents of a project's results."""
+    found = [*out.glob("*/*.laz"), *out.glob("*/*.csv"), *out.glob("**/report.json")]
+    return {path.relative_to(out): path.read_bytes() for path in found}
+
+
+def killed(project, out, seconds, workers):
+    """Kill a run after some seconds, and resume it."""
+    command = [*COMMAND, str(project), "-o", str(out), "--no-report", "--workers", str(workers)]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
+    sleep(seconds)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    again = ["--resume"] if (out / "tasks").is_dir() else []
+    return timed(project, "-o", out, "--workers", workers, *again)
+
+
+def stage_costs(project, out, points):
+    """Processor seconds of each stage of a project for 1e9 points, all in this process."""
+    costs, begun = {}, {"stage": "headers", "at": process_time()}
+
+    def count(stage):
+        now = process_time()
+        costs[begun["stage"]] = costs.get(begun["stage"], 0.0) + now - begun["at"]
+        begun.update(stage=stage, at=now)
+
+    begin = Progress.begin
+
+    def watched(self, kind, tasks):
+        names = {"findings": "targets and ties", "clouds": "copies", "reports": "reports"}
+        count(names.get(kind, "headers"))
+        begin(self, kind, tasks)
+
+    Progress.begin = watched
+    try:
+        correct_project(
+            project, out, tell=lambda text: text.startswith("Estim") and count("estimate")
+        )
+    finally:
+        Progress.begin = begin
+    count("")
+    return {stage: seconds * 1e9 / points for stage, seconds in costs.items()}
+
+
+def main(drives=2, kills=2):
+    rng, table = np.random.default_rng(0), Table("run", "s", "processor s", "against")
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        points = sum(write_drive(folder / f"drive-{n}", n) for n in range(drives))
+        single = write_project(folder, [0], "single")
+        whole = write_project(folder, range(drives), "whole")
+        timed(folder / "drive-0", "-o", folder / "warm")  # compiles what is compiled once
+        alone = timed(folder / "drive-0", "-o", folder / "alone")
+        as_project = timed(single, "-o", folder / "single")
+        first = timed(whole, "-o", folder / "first")
+        second = timed(whole, "-o", folder / "second", "--workers", 2)
+        nothing = timed(whole, "-o", folder / "second", "--workers", 2, "--resume")
+        rows = {
+            "survey": (alone, None, ""),
+            "project of it": (as_project, alone, "the survey"),
+            f"{drives} drives, 1 worker": (first, None, ""),
+            "2 workers": (second, first, "one worker"),
+            "resumed, nothing to do": (nothing, second, "two workers"),
+        }
+        for name, (seconds, other, words) in rows.items():
+            ratio = "" if other is None else "{:.2f}, {:.2f} x {}".format(*seconds / other, words)
+            table.add_row(name, *(f"{value:.1f}" for value in seconds), ratio)
+        expected = outputs(folder / "first")
+        same = outputs(folder / "second") == expected
+        for number in range(kills):
+            out, moment = folder / f"kill-{number}", rng.uniform(2.0, second[0])
+            seconds = killed(whole, out, moment, 2)
+            same &= outputs(out) == expected
+            words = f"killed after {moment:.1f} s, resumed"
+            table.add_row(words, *(f"{value:.1f}" for value in seconds), "")
+        costs = stage_costs(whole, folder / "costs", points)
+    console = Console()
+    console.print(table)
+    console.print("Processor time for 1e9 points, one core, by the stages of these few points:")
+    for stage, seconds in costs.items():
+        console.print(f"  {stage}: {seconds / 60:.0f} min")
+    console.print(f"{points} points in {drives * TILES} tiles; bytes the same: {same}")
+    return 0 if same else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(*map(int, sys.argv[1:])))

@@ -1,0 +1,106 @@
+"""Which drives are estimated together: those that ties join."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from mlscorr.estimate import Estimate
+from mlscorr.pipeline.project.joint import FoundDrive, JointDrives, join_drives
+from mlscorr.pipeline.tying import estimate_together
+
+
+@dataclass(frozen=True)
+class JointEstimate:
+    """Drives that ties hold together, and the estimate of all of them.
+
+    Parameters
+    ----------
+    joint : JointDrives
+    estimate : Estimate
+    """
+
+    joint: JointDrives
+    estimate: Estimate
+
+    @property
+    def is_controlled(self) -> bool:
+        """Whether a control point takes part."""
+        return bool(self.estimate.used.any())
+
+    @property
+    def is_tied(self) -> bool:
+        """Whether ties take part."""
+        return self.estimate.ties is not None and bool(self.estimate.ties.used.any())
+
+
+def estimate_drives(
+    drives: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool
+) -> list[JointEstimate]:
+    """The POS errors of drives, of those together that saw the same things.
+
+    Parameters
+    ----------
+    drives : sequence of FoundDrive
+    order : int
+        Of the trend of a drive by itself; drives together have a shift in common.
+    origin : (3,) array
+        Of planes and poles. Units: m.
+    with_ties : bool
+        Else each drive is by itself.
+    """
+    groups = _near(drives) if with_ties else [[drive] for drive in drives]
+    return [part for group in groups for part in _estimated(group, order, origin, with_ties)]
+
+
+def _estimated(group, order, origin, with_ties):
+    """JointEstimates of drives near each other, of those together that ties join."""
+    joint = join_drives(group)
+    features = joint.features(origin) if with_ties else None
+    least = order if len(group) == 1 else min(order, 0)
+    estimate = estimate_together(joint.survey, joint.control(), features, least)
+    parts = _tied(joint, estimate)
+    if len(parts) == 1:
+        return [JointEstimate(joint, estimate)]
+    return [result for part in parts for result in _estimated(part, order, origin, with_ties)]
+
+
+def _tied(joint, estimate):
+    """Lists of the drives that used ties join."""
+    number = len(joint.drives)
+    pairs = np.empty((2, 0), int)
+    if estimate.ties is not None:
+        passes = estimate.ties.ties.pass_number[estimate.ties.used]
+        pairs = joint.drive_numbers(passes).T
+    graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(number, number))
+    return _grouped(joint.drives, connected_components(graph, directed=False)[1])
+
+
+def _near(drives):
+    """Lists of drives whose planes and poles lie within the search radius, or about so."""
+    radius = max(drive.survey.search_radius for drive in drives)
+    rows, cells = [np.empty(0, int)], [np.empty((0, 2), int)]
+    for number, drive in enumerate(drives):
+        own = np.unique(
+            np.floor(drive.contents.features.centre[:, :2] / radius).astype(int), axis=0
+        )
+        wide = np.concatenate([own + np.array([i, j]) for i in (0, 1) for j in (0, 1)])
+        rows.append(np.full(len(wide), number))
+        cells.append(wide)
+    cell = np.unique(np.concatenate(cells), axis=0, return_inverse=True)[1].ravel()
+    size = len(drives) + cell.max(initial=-1) + 1
+    edges = np.concatenate(rows), len(drives) + cell
+    graph = coo_array((np.ones(len(cell), bool), edges), shape=(size, size))
+    return _grouped(drives, connected_components(graph, directed=False)[1][: len(drives)])
+
+
+def _grouped(drives, labels):
+    """Lists of drives of one label each, in the order of their first."""
+    groups: dict[int, list[FoundDrive]] = {}
+    for drive, label in zip(drives, labels.tolist(), strict=True):
+        groups.setdefault(label, []).append(drive)
+    return list(groups.values())
