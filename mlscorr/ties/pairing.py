@@ -94,7 +94,9 @@ def _beyond_chance(features, correction, sigma, radius, angle, pairs):
     for group in (_passes, _passes_and_direction):
         own, number = group(features, pairs), group(features, here)
         for chance in displaced:
-            is_chance |= 2 * _count(own, group(features, chance)) > _count(own, number)
+            likely = _count(own, group(features, chance))
+            # less what a count scatters by: three of four tell nothing
+            is_chance |= 2 * (likely - np.sqrt(likely)) > _count(own, number)
     return ~is_chance
 
 
