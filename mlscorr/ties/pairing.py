@@ -94,9 +94,9 @@ def _beyond_chance(features, correction, sigma, radius, angle, pairs):
     for group in (_passes, _passes_and_direction):
         own, number = group(features, pairs), group(features, here)
         for chance in displaced:
-            likely = _count(own, group(features, chance))
+            scattered = _count(own, group(features, chance))
             # less what a count scatters by: three of four tell nothing
-            is_chance |= 2 * (likely - np.sqrt(likely)) > _count(own, number)
+            is_chance |= 2 * (scattered - np.sqrt(scattered)) > _count(own, number)
     return ~is_chance
 
 
