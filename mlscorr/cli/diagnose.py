@@ -30,18 +30,42 @@ def diagnose(
             help="simulator.toml: what is believed already, as an earlier run wrote it.",
         ),
     ] = None,
+    simulated: Annotated[
+        list[Path],
+        typer.Option(
+            help="Clouds that a simulator of your own made of this survey: a survey folder, a "
+            "folder of LAS or LAZ files, or a file. Given twice, the second is its next run, and "
+            "tells how far the gap shrinks.",
+        ),
+    ] = (),
+    effects: Annotated[
+        Path | None,
+        typer.Option(help="Python file that registers effects of your own; it is run."),
+    ] = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Find where reality and simulation differ, why, and how far the gap can be closed."""
     with exit_code(Exit.USAGE):
+        from mlscorr.effects import register_file
         from mlscorr.simulate.simulator_file import read_simulator
 
+        if effects:
+            register_file(effects)
         believed = read_simulator(simulator) if simulator else None
-    with work(out, overwrite, survey, [simulator] if simulator else []) as progress:
+        if len(simulated) > 2:
+            raise ValueError(
+                f"--simulated is given {len(simulated)} times: give the clouds of one run, and "
+                "those of the next."
+            )
+        inputs = [path for path in (simulator, effects, *simulated) if path is not None]
+    with work(out, overwrite, survey, [path for path in inputs if path.is_file()]) as progress:
         recorded = mlscorr.read_survey(survey)
-        content = mlscorr.diagnose(recorded, believed, progress=progress).write(out, overwrite)
+        diagnosed = mlscorr.diagnose(
+            recorded, believed, progress=progress, simulated=tuple(simulated)
+        )
+        content = diagnosed.write(out, overwrite)
     print_json(content, as_json)
     _tell(content)
     say(f"Page:      {out / 'gap.html'}")

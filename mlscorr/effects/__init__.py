@@ -35,6 +35,7 @@ from mlscorr.effects.catalogue import (
     register,
 )
 from mlscorr.effects.effect import Effect
+from mlscorr.effects.own import register_file
 from mlscorr.effects.quantity import quantity
 from mlscorr.effects.stages import STAGES, Reference, Returns
 from mlscorr.effects.wording import SizeEstimate
@@ -54,4 +55,5 @@ __all__ = [
     "make_effect",
     "quantity",
     "register",
+    "register_file",
 ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,37 +12,27 @@ import numpy as np
 from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import (
     Absence,
-    Beams,
-    BeamSimulator,
     Closure,
     Inference,
     NextData,
-    PatchCollector,
     Rows,
-    Surroundings,
     agreements,
     as_believed,
     background,
-    build_rows,
     cause_for_simulator,
     close_gap,
-    collect_beams,
-    find_absence,
     gap_document,
     infer_causes,
     next_data,
     with_cause,
-    without_effects,
 )
-from mlscorr.gap.observe import Pairing
 from mlscorr.gap.signatures import select, signatures
-from mlscorr.io.las import read_chunks
 from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.pipeline.finding import find_or_compare_surfaces, silent
-from mlscorr.pipeline.planning import too_little
+from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
+from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate.simulator_file import Simulator, beliefs_of, write_simulator
-from mlscorr.survey import Survey, TargetObservations
+from mlscorr.survey import Survey
 from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
 
@@ -51,7 +41,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STEPS = 5  # of the progress beside reading: the inference, closure, plan
-LEAST_VIEWS = 6  # with a residual in m: fewer than the pose has parameters say nothing
 
 
 def diagnose(
@@ -60,6 +49,7 @@ def diagnose(
     library: Iterable[type[Effect]] | None = None,
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
+    simulated: Sequence[Path] = (),
 ) -> DiagnosedSurvey:
     """Find where a survey differs from its simulation, why, and how far the gap can be closed.
 
@@ -75,6 +65,11 @@ def diagnose(
         For replicas and the simulator's noise; the same seed each time by default.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number just done.
+    simulated : sequence of Path
+        Clouds that a simulator of your own made of this survey: a survey folder, a folder of LAS
+        or LAZ files, or a file. The survey is compared with them instead of with what is believed;
+        effects of the simulator are in them already. Those of its next run, with the effect in it,
+        tell how far the gap shrinks.
 
     Raises
     ------
@@ -102,11 +97,13 @@ def diagnose(
     progress = progress or silent
     simulator = beliefs_of(survey) if simulator is None else simulator
     believed, effects = as_believed(survey, simulator)
-    pairing, rows, beams, absence = _observed(survey, believed, library, progress)
-    simulator_of_beams = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
+    if simulated:
+        compared = compare_with_clouds(survey, believed, simulated, library, progress)
+    else:
+        seed = int(rng.integers(2**63))
+        compared = compare_with_belief(survey, believed, effects, library, seed, progress)
+    observed, used, absence = compared.rows, compared.used, compared.absence
     step = progress("Weighing the causes", STEPS)
-    observed = without_effects(rows, believed, effects)
-    used = np.arange(len(rows)) < len(pairing.rows)
     signs, left_out = signatures(observed, believed, library, rng)
     part, signs_of_part = observed.select(used), select(signs, used)
     inference = infer_causes(
@@ -120,7 +117,7 @@ def diagnose(
         signs,
         inference.evidence,
         cause_for_simulator(part, signs_of_part, inference),
-        simulator_of_beams.added,
+        compared.simulated,
         rng,
         progress=step,
     )
@@ -129,7 +126,16 @@ def diagnose(
     plan = (*_looks_again(absence), *plan)
     step(2)
     return DiagnosedSurvey(
-        survey, simulator, effects, part, inference, closure, plan, left_out, pairing.notes, absence
+        survey,
+        simulator,
+        effects,
+        part,
+        inference,
+        closure,
+        plan,
+        left_out,
+        compared.notes,
+        absence,
     )
 
 
@@ -143,48 +149,6 @@ def _looks_again(absence):
         )
         for run in absence.runs
     ]
-
-
-def _with_moved(finding, survey):
-    """The Finding with observations of control points that stand elsewhere than was surveyed.
-
-    Their misclosures are what target_outlier is known by. Check points stay as they were matched.
-    """
-    moved = finding.matches.moved
-    if moved is None:
-        return finding
-    moved = moved[np.isin(np.array(moved.name, dtype=str), survey.control.name)]
-    matched = TargetObservations.concatenate([finding.matches.matched, moved])
-    matches = replace(finding.matches, matched=matched)
-    return replace(finding, matches=matches)
-
-
-def _observed(survey, believed, library, progress) -> tuple[Pairing, Rows, Beams, Absence]:
-    """The Pairing, all its rows, check points last, the Beams on which they stand, the Absence.
-
-    The clouds are read once: targets, patches and what lies about targets are taken from each
-    chunk as it comes.
-    """
-    collector, surroundings = PatchCollector(believed), Surroundings(believed)
-
-    def read(file):
-        for chunk in read_chunks(file):
-            collector.add(file, chunk)
-            surroundings.add(chunk)
-            yield chunk
-
-    finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
-    patches = collector.patches()
-    absence = find_absence(believed, finding.matches)
-    finding = _with_moved(finding, believed)
-    pairing = build_rows(believed, finding.matches.matched, finding.candidates, patches)
-    views = len(np.unique(pairing.rows.item[pairing.rows.metric]))
-    if views < LEAST_VIEWS:
-        raise ValueError(too_little(survey, pairing.rows, views, library, notes))
-    pairing = replace(pairing, notes=(*notes, *pairing.notes))
-    rows = Rows.concatenate([pairing.rows, pairing.check])
-    beams = collect_beams(believed, rows, finding, patches, surroundings)
-    return pairing, rows, beams, absence
 
 
 @dataclass(frozen=True, repr=False)

@@ -119,15 +119,16 @@ def close_gap(
         Of the used rows.
     cause : Cause
         From them.
-    simulated : function of a tuple of Effect
-        What the simulator, run again with these too, adds to the rows' residuals: (m,).
+    simulated : function of a tuple of Effect, or (m,) array
+        What the simulator, run again with these too, adds to the rows' residuals: (m,); or what its
+        next run added, whatever was changed in it.
     rng : numpy.random.Generator
     progress : function of a number of steps, one in all, optional
     """
     kind = gap_kind(cause.effect, evidence.noisy, rows)
     unit = UNITS[kind]
     case = FoundCause(rows, used, survey, signatures, evidence, cause)
-    ruler = _Ruler.of(kind, case)
+    ruler = _Ruler.of(kind, case, cause.probability if callable(simulated) else 0.0)
     folds = make_folds(case, ruler.observations, ruler.model, simulated, rng, progress)
     held = ruler.compare(folds, rng)
     whole = replace(folds, fold=np.where(used, 0, -1), predicted=(folds.whole,))
@@ -178,7 +179,7 @@ class _Ruler:
     probability: float
 
     @classmethod
-    def of(cls, kind, case):
+    def of(cls, kind, case, probability):
         rows, noise = case.rows, case.cause.model
         observations = Observations.of(rows, background(rows, case.survey))
         unknown = unknown_blocks(rows, case.survey)
@@ -188,7 +189,6 @@ class _Ruler:
         model = case.evidence.likely_model(case.cause.effect)
         scale = model.scale if noise.scale == 1.0 else noise.scale
         model = replace(model, scale=scale, fixes=noise.fixes, windows=noise.windows)
-        probability = case.cause.probability
         return cls(kind, rows, case.used, observations, table, model, probability)
 
     def compare(self, folds, rng, among=None):

@@ -26,7 +26,7 @@ from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import Signature, select, signature
 from mlscorr.survey import Survey
 
-Simulated = Callable[[tuple[Effect, ...]], np.ndarray]
+Simulated = Callable[[tuple[Effect, ...]], np.ndarray] | np.ndarray
 
 
 @dataclass(frozen=True)
@@ -121,6 +121,8 @@ def make_folds(
         As in ``close_gap``.
     """
     rows, used, cause = case.rows, case.used, case.cause
+    if not callable(simulated):
+        return _of_next_run(case, simulated)
     block, whole = _blocks(rows, cause), _predict(rows, case.survey, cause, simulated)
     nothing, columns = np.zeros(len(rows), dtype=int), case.columns()
     if cause.effect == "none":
@@ -147,6 +149,20 @@ def make_folds(
     if not used.all():
         held_out += f" {len(np.unique(rows.item[~used]))} looks at check points were never used."
     return Folds(block, fold, predicted, held_out, whole, columns)
+
+
+def _of_next_run(case, change):
+    """Folds that all rows judge, of what the simulator's next run changed (m,)."""
+    rows, residual = case.rows, case.rows.residual
+    rough = rows.channel == "roughness"
+    growth = np.where(rough, np.exp(residual) - np.exp(residual - change), 0.0)
+    whole = Predicted(change, growth, np.zeros(len(rows)), case.cause.model)
+    held_out = (
+        "The simulator's next run was compared with the same survey; the effect had been looked "
+        "for in it, what the simulator then changed had not been fitted to it."
+    )
+    nothing = np.zeros(len(rows), dtype=int)
+    return Folds(_blocks(rows, case.cause), nothing, (whole,), held_out, whole, case.columns())
 
 
 def _with_sizes(case, observations, model, fold, whole, columns):

@@ -40,6 +40,7 @@ class Settings:
     surface_sigma: float = 0.002  # m: walls and roads are no planes, nor facets of static scans
     facet_share: float = 0.75  # of a patch's beams that must meet one plane of the reference
     overlap: float = 0.01  # of the patches on the reference; fewer are chance: it lies elsewhere
+    same_time: float = 1e-6  # s: of one pulse in two files; a scanner of 1 MHz fires as often
     # channels
     least_loss: float = 0.002  # share that any scanner loses: no loss in 100 pulses proves nothing
     largest_ripple: float = 1.5  # of Patches: 19 of 20 flat ones have less, by chance

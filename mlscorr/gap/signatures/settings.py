@@ -12,6 +12,7 @@ class Settings:
     step: float = 0.1  # of the usual size: small enough to be linear, far above rounding
     loss: float = 0.5  # share lost at which a count of few pulses is most exact (binomial)
     widths: tuple[float, ...] = (2.0, 5.0, 15.0, 45.0)  # s: a lost fix to a street of high houses
+    largest_shift: float = 100.0  # m everywhere at the usual size: a unit that is wrong
     events: int = 80  # of one width at most
 
     @property

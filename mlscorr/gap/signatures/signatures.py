@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mlscorr.effects import Effect, known_effects
+from mlscorr.effects import EFFECTS, Effect, known_effects
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.settings import SETTINGS
@@ -121,12 +121,37 @@ def signatures(
         if kind.needs_mounting() and survey.mounting is None:
             left_out[kind.name] = f"It acts on the {kind.stage}, {NO_MOUNTING}."
             continue
-        bank = [signature(bench, kind, fixed, rng) for fixed in _bank(kind, rows, survey)]
+        bank = _tried(bench, kind, _bank(kind, rows, survey), rng)
+        if isinstance(bank, str):
+            left_out[kind.name] = bank
+            continue
         bank = [sign for sign in bank if sign.jacobian.any() or sign.is_noise]
         signs += bank
         if not bank:
             left_out[kind.name] = "No row of this survey depends on it."
     return tuple(signs), left_out
+
+
+def _tried(bench, kind, bank, rng):
+    """Signatures of an effect; a sentence where one of a user's own can't be tried."""
+    if kind in EFFECTS:
+        return [signature(bench, kind, fixed, rng) for fixed in bank]
+    try:
+        signs = [signature(bench, kind, fixed, rng) for fixed in bank]
+    except Exception as error:  # of a user's code: it is left out, not the diagnosis
+        return f"It can't be applied to this survey: {type(error).__name__}: {error}"
+    metric, largest = bench.rows.metric, SETTINGS.largest_shift
+    for sign in signs:
+        moved = np.abs(sign.jacobian[metric] * sign.typical)
+        if not all(np.isfinite(v).all() for v in (moved, sign.variance, sign.growth)):
+            return "It makes values that are no numbers."
+        if moved.size and np.median(moved.max(axis=1)) > largest:
+            return (
+                f"At its usual size, {sign.typical[0]:g} {sign.units[0]}, it moves points by "
+                f"{np.median(moved.max(axis=1)):.3g} m in the median: more than {largest:g} m no "
+                "survey is off everywhere. Is its unit right?"
+            )
+    return signs
 
 
 def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Generator) -> Signature:

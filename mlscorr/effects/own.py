@@ -1,0 +1,47 @@
+"""Effects of one's own, from a Python file that registers them."""
+
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+from mlscorr.effects.catalogue import known_effects
+from mlscorr.effects.effect import Effect
+
+
+def register_file(path: Path | str) -> tuple[type[Effect], ...]:
+    """Run a file that registers effects; they are known from then on.
+
+    Parameters
+    ----------
+    path : path
+        Of Python code, which runs as it is: take none that you wouldn't start yourself.
+
+    Returns
+    -------
+    tuple of Effect classes
+        Those that it registered.
+
+    Raises
+    ------
+    ValueError
+        For a file that can't be run, or registers nothing.
+    FileNotFoundError
+        Where there is none.
+    """
+    path, before = Path(path), set(known_effects())
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist; give a file that registers effects.")
+    spec = spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{path} is no Python file: its name must end in .py.")
+    try:
+        spec.loader.exec_module(module_from_spec(spec))
+    except Exception as error:  # whatever a user's code raises is said, not shown as ours
+        line = f" (line {error.lineno})" if isinstance(error, SyntaxError) else ""
+        raise ValueError(f"{path} can't be run{line}: {type(error).__name__}: {error}") from error
+    effects = tuple(kind for kind in known_effects() if kind not in before)
+    if not effects:
+        raise ValueError(
+            f"{path} registers no effect: call mlscorr.effects.register with a class of yours, as "
+            "docs/own-simulator.md shows."
+        )
+    return effects

@@ -1,0 +1,266 @@
+"""A survey against the clouds that a simulator made of it: by beams, targets and patches.
+
+Beams are paired by their times; a patch whose times the simulated cloud doesn't have, or has for
+beams that went elsewhere, as under another clock, is compared with the simulated patch at its
+place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlscorr.gap.observe.channels import return_rate, roughness
+from mlscorr.gap.observe.pairing import patch_rows, target_rows
+from mlscorr.gap.observe.patches import Patches
+from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.observe.selection import consistent, gate, spread
+from mlscorr.gap.observe.settings import SETTINGS
+from mlscorr.gap.observe.surfaces import OnReference
+from mlscorr.survey import PointCloud, Survey, TargetObservations
+from mlscorr.targets import Candidates
+
+
+class SimulatedBeams:
+    """The simulated points of the pulses behind a survey's patches, of chunks that it is given.
+
+    Parameters
+    ----------
+    patches : Patches
+        Of the survey.
+    """
+
+    def __init__(self, patches: Patches):
+        clouds = list(patches.cloud)
+        time = np.concatenate([np.zeros(0), *(cloud.gps_time for cloud in clouds)])
+        order = np.argsort(time, kind="stable")
+        self._time = time[order]
+        self._place = order
+        self._observed = np.vstack([np.zeros((0, 3)), *(cloud.xyz for cloud in clouds)])
+        self.patch = np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds])
+        self.xyz = np.full((len(time), 3), np.nan)
+
+    def add(self, chunk: PointCloud) -> None:
+        """Take the points of the same pulses: of several of one time the nearest."""
+        if len(self._time) == 0 or len(chunk) == 0:
+            return
+        after = np.searchsorted(self._time, chunk.gps_time)
+        near = np.clip(np.stack([after - 1, after]), 0, len(self._time) - 1)
+        apart = np.abs(self._time[near] - chunk.gps_time)
+        row = near[apart.argmin(axis=0), np.arange(len(chunk))]
+        same = np.flatnonzero(apart.min(axis=0) <= SETTINGS.same_time)
+        place, xyz = self._place[row[same]], chunk.xyz[same]
+        distance = np.linalg.norm(xyz - self._observed[place], axis=1)
+        known = np.linalg.norm(self.xyz[place] - self._observed[place], axis=1)
+        closer = np.flatnonzero((distance <= SETTINGS.cell) & ~(distance >= known))
+        closer = closer[np.argsort(-distance[closer], kind="stable")]  # the nearest comes last
+        self.xyz[place[closer]] = xyz[closer]
+
+    @property
+    def apart(self) -> np.ndarray:
+        """How far simulated points lie from the observed ones (n, 3); NaN without one. m."""
+        return self._observed - self.xyz
+
+
+@dataclass(frozen=True)
+class SimulatedClouds:
+    """What one reading of simulated clouds gives.
+
+    Parameters
+    ----------
+    name : str
+        Of their folder.
+    matched : TargetObservations
+        Matched with the surveyed points.
+    patches : Patches or None
+    beams : SimulatedBeams or None
+        None where the survey has no patches.
+    """
+
+    name: str
+    matched: TargetObservations
+    patches: Patches | None
+    beams: SimulatedBeams | None
+
+
+def rows_against(
+    survey: Survey,
+    matched: TargetObservations,
+    candidates: Candidates,
+    patches: Patches | None,
+    simulated: SimulatedClouds,
+) -> tuple[Rows, str]:
+    """Rows of observed minus simulated, NaN where nothing is paired, and a sentence on the pairs.
+
+    Parameters
+    ----------
+    survey : Survey
+    matched : TargetObservations
+        Of the survey.
+    candidates : Candidates
+        The points near its targets.
+    patches : Patches or None
+        Of the survey, for which the SimulatedBeams were collected.
+    simulated : SimulatedClouds
+
+    Raises
+    ------
+    ValueError
+        For clouds of another survey, place or CRS.
+    """
+    parts = [_against_targets(survey, matched, candidates, simulated)]
+    targets = int(np.isfinite(parts[0].residual).sum()) // 3
+    by_beams = by_place = 0
+    if patches is not None:
+        direction, residual, noise = _by_beams(survey, patches, simulated.beams)
+        known = np.isfinite(residual)
+        by_beams, other = int(known.sum()), None
+        if simulated.patches is not None:
+            other = _nearest(patches, simulated.patches)
+            also = _by_place(survey, patches, simulated.patches, other)
+            direction[~known], residual[~known], noise[~known] = (v[~known] for v in also)
+            by_place = int(np.isfinite(residual).sum()) - by_beams
+        surface = OnReference(np.arange(len(patches)), direction, residual, noise)
+        part = patch_rows(survey, patches, surface)
+        parts.append(_against_channels(part, survey, simulated.patches, other))
+    rows = Rows.concatenate(parts)
+    if not np.isfinite(rows.residual[rows.metric]).any():
+        raise ValueError(_elsewhere(survey, patches, simulated))
+    number = 0 if patches is None else len(patches)
+    return rows, (
+        f"Of {simulated.name}, {targets} of {len(matched)} observed targets were paired, and "
+        f"{by_beams + by_place} of {number} patches ({by_beams} by pulses of the same times, "
+        f"{by_place} by place); the rest is not compared."
+    )
+
+
+def spread_patches(patches: Patches) -> Patches:
+    """As many patches as are compared, spread over time and directions.
+
+    Parameters
+    ----------
+    patches : Patches
+    """
+    columns, rng = [patches.gps_time, *patches.normal.T], np.random.default_rng(0)
+    return patches[spread(columns, SETTINGS.patches, rng)]
+
+
+def without_unpaired(several: Sequence[Rows]) -> list[Rows]:
+    """Rows against several simulated clouds, of what all of them have.
+
+    Parameters
+    ----------
+    several : sequence of Rows
+        Of the same things, as rows_against gives them.
+    """
+    keep = np.all([np.isfinite(rows.residual) for rows in several], axis=0)
+    return [rows.select(keep) for rows in several]
+
+
+def _against_targets(survey, matched, candidates, simulated):
+    """Target rows, of the same name at about the same time."""
+    rows, other = target_rows(survey, matched, candidates), simulated.matched
+    residual, noise = np.full(len(rows), np.nan), rows.noise.copy()
+    for i in range(len(matched)):
+        same = np.flatnonzero(np.array(other.name, dtype=object) == matched.name[i])
+        apart = np.abs(other.gps_time[same] - matched.gps_time[i])
+        if len(same) == 0 or apart.min() > SETTINGS.pair_pause:
+            continue
+        j, on = same[np.argmin(apart)], np.flatnonzero(rows.item == i)
+        axes = rows.direction[on]
+        residual[on] = axes @ (matched.position[i] - other.position[j])
+        noise[on] += np.einsum("ai,ij,aj->a", axes, other.covariance[j], axes)
+    return replace(rows, residual=residual, noise=noise)
+
+
+def _by_beams(survey, patches, beams):
+    """Direction (p, 3), residual and its variance (p,) by pulses of the same times; else NaN."""
+    normal, p = patches.normal, len(patches)
+    along = np.einsum("ni,ni->n", beams.apart, normal[beams.patch])
+    residual, noise = np.full(p, np.nan), np.ones(p)
+    ends = np.searchsorted(beams.patch, np.arange(p + 1))
+    for i in range(p):
+        values = along[ends[i] : ends[i + 1]]
+        wanted, values = len(values), values[np.isfinite(values)]
+        if len(values) < max(SETTINGS.plane_points, SETTINGS.facet_share * wanted):
+            continue
+        off = np.abs(values - np.median(values))
+        scatter = max(1.4826 * np.median(off), SETTINGS.file_step)
+        values = values[off <= SETTINGS.trims[-1] * scatter]
+        if len(values) >= SETTINGS.facet_share * wanted:
+            residual[i] = values.mean()
+            noise[i] = values.var(ddof=1) / len(values) + SETTINGS.surface_sigma**2
+    return normal.copy(), _credible(survey, patches, normal, residual), noise
+
+
+def _credible(survey, patches, direction, residual):
+    """Residuals (p,) with NaN for those of another surface."""
+    residual = np.where(np.abs(residual) <= gate(survey, patches.gps_time), residual, np.nan)
+    known = np.flatnonzero(np.isfinite(residual))
+    agree = consistent(patches.gps_time[known], direction[known], residual[known])
+    residual[known[~agree]] = np.nan
+    return residual
+
+
+def _nearest(patches, simulated):
+    """The simulated patch (p,) at each patch's place and time, parallel to it; -1 without one."""
+    reach = SETTINGS.pair_distance * SETTINGS.cell
+    near = cKDTree(simulated.centre).query_ball_point(patches.centre, reach)
+    other = np.full(len(patches), -1)
+    for i, rows in enumerate(near):
+        j = np.array(rows, dtype=int)
+        cosine = simulated.normal[j] @ patches.normal[i]
+        later = np.abs(simulated.gps_time[j] - patches.gps_time[i])
+        j = j[(cosine >= np.cos(SETTINGS.parallel / 2)) & (later <= SETTINGS.pair_pause)]
+        if len(j):
+            apart = np.linalg.norm(simulated.centre[j] - patches.centre[i], axis=1)
+            other[i] = j[np.argmin(apart)]
+    return other
+
+
+def _by_place(survey, patches, simulated, other):
+    """As _by_beams, by patches of the same places."""
+    pair = simulated[np.maximum(other, 0)]
+    normal = patches.normal + pair.normal
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    between = patches.centre - pair.centre
+    residual = np.where(other >= 0, np.einsum("ni,ni->n", normal, between), np.nan)
+    mean = [each.variance / each.points for each in (patches, pair)]
+    tilt = [m / each.spread**2 for m, each in zip(mean, (patches, pair), strict=True)]
+    noise = mean[0] + mean[1] + (between**2).sum(axis=1) * (tilt[0] + tilt[1]) / 4
+    residual = _credible(survey, patches, normal, residual)
+    return normal, residual, noise + SETTINGS.surface_sigma**2
+
+
+def _against_channels(rows, survey, simulated, other):
+    """Roughness and return rates less those of the simulated patches; NaN without one."""
+    residual, noise = rows.residual.copy(), rows.noise.copy()
+    channels = np.isin(rows.channel, ("roughness", "return_rate"))
+    if simulated is None:
+        return replace(rows, residual=np.where(channels, np.nan, residual))
+    ratio, ratio_noise, _, flat = roughness(survey, simulated)
+    share, share_noise, counted = return_rate(simulated)
+    for channel, value, variance, known in (
+        ("roughness", ratio, ratio_noise, flat), ("return_rate", share, share_noise, counted),
+    ):  # fmt: skip
+        on = np.flatnonzero(rows.channel == channel)
+        pair = other[rows.item[on]]
+        has = (pair >= 0) & known[pair]
+        residual[on] = np.where(has, residual[on] - value[pair], np.nan)
+        noise[on] += np.where(has, variance[pair], 0.0)
+    return replace(rows, residual=residual, noise=noise)
+
+
+def _elsewhere(survey, patches, simulated):
+    """The sentence for clouds that have nothing of the survey."""
+    where = "holds neither a flat patch nor a matched target"
+    if patches is not None and simulated.patches is not None:
+        away, _ = cKDTree(simulated.patches.centre).query(patches.centre)
+        where = f"has its surfaces {np.median(away):.1f} m away in the median"
+    return (
+        f"Nothing of {simulated.name} can be paired with {survey.path}: it {where}. It is of "
+        "another survey or place, or in another CRS; simulate this survey's trajectory."
+    )

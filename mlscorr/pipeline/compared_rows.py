@@ -1,0 +1,228 @@
+"""What a survey observed, against what is believed or what a simulator made of it, as rows."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.effects import Effect
+from mlscorr.gap import (
+    Absence,
+    Beams,
+    BeamSimulator,
+    PatchCollector,
+    Rows,
+    Surroundings,
+    build_rows,
+    collect_beams,
+    find_absence,
+    without_effects,
+)
+from mlscorr.gap.observe import Pairing
+from mlscorr.gap.observe.patches import Patches
+from mlscorr.gap.observe.simulated import (
+    SimulatedBeams,
+    SimulatedClouds,
+    rows_against,
+    spread_patches,
+    without_unpaired,
+)
+from mlscorr.gap.signatures.expectation import expected
+from mlscorr.io.las import read_chunks
+from mlscorr.io.simulated_clouds import simulated_survey
+from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces
+from mlscorr.pipeline.planning import too_little
+from mlscorr.survey import Survey, TargetObservations
+
+LEAST_VIEWS = 6  # with a residual in m: fewer than the pose has parameters say nothing
+LINEAR = (
+    "How far the gap would shrink is told to the first order: run your simulator with the effect, "
+    "and give its clouds as a second --simulated."
+)
+
+
+@dataclass(frozen=True)
+class ComparedRows:
+    """Rows of a survey, check points among them.
+
+    Parameters
+    ----------
+    rows : Rows
+        Less what the simulator has in it.
+    used : (m,) bool array
+        False for those of check points.
+    simulated : function of a tuple of Effect, or (m,) array
+        What they add to the rows in the simulator; or what its next run changed.
+    absence : Absence
+    notes : tuple of str
+    """
+
+    rows: Rows
+    used: np.ndarray
+    simulated: Callable | np.ndarray
+    absence: Absence
+    notes: tuple[str, ...]
+
+
+def compare_with_belief(
+    survey: Survey,
+    believed: Survey,
+    effects: tuple[Effect, ...],
+    library: Iterable[type[Effect]],
+    seed: int,
+    progress: Callable,
+) -> ComparedRows:
+    """ComparedRows against what is believed; the simulator runs again on the survey's own pulses.
+
+    Parameters
+    ----------
+    survey : Survey
+    believed : Survey
+        With what the simulator believes.
+    effects : tuple of Effect
+        That the simulator has.
+    library : iterable of Effect classes
+    seed : int
+        Of the simulator's noise.
+    progress : function
+        As of ``diagnose``.
+
+    Raises
+    ------
+    ValueError
+        When there is too little to say anything.
+    """
+    pairing, rows, beams, absence = _observed(survey, believed, library, progress)
+    simulator = BeamSimulator(rows, believed, beams, effects, seed)
+    used = np.arange(len(rows)) < len(pairing.rows)
+    observed = without_effects(rows, believed, effects)
+    return ComparedRows(observed, used, simulator.added, absence, pairing.notes)
+
+
+def compare_with_clouds(
+    survey: Survey,
+    believed: Survey,
+    folders: Sequence[Path],
+    library: Iterable[type[Effect]],
+    progress: Callable,
+) -> ComparedRows:
+    """ComparedRows against simulated clouds: those of the first folder.
+
+    What a second folder's differ by is what the simulator's next run changed.
+
+    Parameters
+    ----------
+    survey, believed, library, progress
+        As of compare_with_belief.
+    folders : sequence of one or two Path
+        Survey folders, folders of LAS or LAZ files, or such files.
+
+    Raises
+    ------
+    ValueError
+        For clouds that can't be read or paired, or too little to say anything.
+    """
+    opened = [simulated_survey(folder, believed) for folder in folders]
+    finding, patches, _, notes = _read(believed, progress)
+    absence = find_absence(believed, finding.matches)
+    matched = _with_moved(finding, believed).matches.matched
+    patches = None if patches is None else spread_patches(patches)
+    several = []
+    for simulated in opened:
+        clouds = _simulated_clouds(simulated, patches, progress)
+        rows, sentence = rows_against(believed, matched, finding.candidates, patches, clouds)
+        several.append(rows)
+        notes = (*notes, sentence)
+    first, *following = without_unpaired(several)
+    views = len(np.unique(first.item[first.metric]))
+    if views < LEAST_VIEWS:
+        raise ValueError(too_little(survey, first, views, library, notes))
+    if not first.residual.any():
+        raise ValueError(
+            f"The clouds of {folders[0]} are the survey's own: none of {len(first)} differences is "
+            "other than zero. Give those that your simulator made."
+        )
+    is_check = np.isin(first.targets.name, survey.check.name)
+    used = (first.survey_item < 0) | ~is_check[first.survey_item]
+    if following:
+        return ComparedRows(first, used, first.residual - following[0].residual, absence, notes)
+
+    def to_first_order(effects):
+        return expected(first, believed, effects).shift
+
+    return ComparedRows(first, used, to_first_order, absence, (*notes, LINEAR))
+
+
+def _simulated_clouds(simulated, patches, progress):
+    """SimulatedClouds of a simulated survey, read once."""
+    collector, beams = PatchCollector(simulated), None
+    if patches is not None:
+        beams = SimulatedBeams(patches)
+
+    def read(file):
+        for chunk in read_chunks(file):
+            collector.add(file, chunk)
+            if beams is not None:
+                beams.add(chunk)
+            yield chunk
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of beams, which refuse the clouds
+        finding, _ = find_or_compare_surfaces(simulated, read, None, progress)
+    if finding.warnings:
+        raise ValueError(
+            f"{simulated.path} was simulated with other beams than the survey's. "
+            f"{finding.warnings[0]}"
+        )
+    return SimulatedClouds(simulated.name, finding.matches.matched, collector.patches(), beams)
+
+
+def _with_moved(finding: Finding, survey: Survey) -> Finding:
+    """The Finding with observations of control points that stand elsewhere than was surveyed.
+
+    Their misclosures are what target_outlier is known by. Check points stay as they were matched.
+    """
+    moved = finding.matches.moved
+    if moved is None:
+        return finding
+    moved = moved[np.isin(np.array(moved.name, dtype=str), survey.control.name)]
+    matched = TargetObservations.concatenate([finding.matches.matched, moved])
+    matches = replace(finding.matches, matched=matched)
+    return replace(finding, matches=matches)
+
+
+def _read(believed, progress) -> tuple[Finding, Patches | None, Surroundings, tuple[str, ...]]:
+    """The Finding, Patches, Surroundings and notes.
+
+    The clouds are read once: targets, patches and what lies about targets are taken from each
+    chunk as it comes.
+    """
+    collector, surroundings = PatchCollector(believed), Surroundings(believed)
+
+    def read(file):
+        for chunk in read_chunks(file):
+            collector.add(file, chunk)
+            surroundings.add(chunk)
+            yield chunk
+
+    finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
+    return finding, collector.patches(), surroundings, notes
+
+
+def _observed(survey, believed, library, progress) -> tuple[Pairing, Rows, Beams, Absence]:
+    """The Pairing, all its rows, check points last, the Beams on which they stand, the Absence."""
+    finding, patches, surroundings, notes = _read(believed, progress)
+    absence = find_absence(believed, finding.matches)
+    finding = _with_moved(finding, believed)
+    pairing = build_rows(believed, finding.matches.matched, finding.candidates, patches)
+    views = len(np.unique(pairing.rows.item[pairing.rows.metric]))
+    if views < LEAST_VIEWS:
+        raise ValueError(too_little(survey, pairing.rows, views, library, notes))
+    pairing = replace(pairing, notes=(*notes, *pairing.notes))
+    rows = Rows.concatenate([pairing.rows, pairing.check])
+    beams = collect_beams(believed, rows, finding, patches, surroundings)
+    return pairing, rows, beams, absence

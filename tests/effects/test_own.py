@@ -1,0 +1,83 @@
+"""Effects of one's own from a file."""
+
+import numpy as np
+import pytest
+
+from mlscorr.effects import catalogue, effect_class, register_file
+from mlscorr.gap.signatures.signatures import signatures
+
+CLASS = """
+from dataclasses import dataclass
+from typing import ClassVar
+import numpy as np
+from mlscorr.effects import Effect, quantity, register
+
+@register
+@dataclass(frozen=True)
+class Own(Effect):
+    name: ClassVar = "{name}"
+    stage: ClassVar = "pos"
+    title: ClassVar = "Own"
+    meaning: ClassVar = "The height is off."
+    sentence: ClassVar = "The height is off by {{size}}."
+    remedy: ClassVar = "Mend it."
+    magnitude: float = quantity("m", 1e6, "nothing is as far", typical=0.1, source="a test")
+
+    def _error(self, value, reference, rng):
+        return self.magnitude * {body}
+"""
+
+
+@pytest.fixture(autouse=True)
+def forgotten(monkeypatch):
+    "What a test registers is forgotten after it"
+    monkeypatch.setattr(catalogue, "_registered", {})
+
+
+def written(path, name, body):
+    file = path / f"{name}.py"
+    file.write_text(CLASS.format(name=name, body=body))
+    return file
+
+
+def test_a_file_registers_its_effects(tmp_path):
+    "The class is known by its name from then on"
+    (kind,) = register_file(written(tmp_path, "lift", "[0.0, 0.0, 1.0]"))
+    assert effect_class("lift") is kind
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("x = (", "line 1"), ("1 / 0", "ZeroDivisionError: division by zero"),
+    ("x = 1", "registers no effect"),
+])  # fmt: skip
+def test_a_file_that_cannot_be_used_is_refused(tmp_path, text, said):
+    "With the line or the error that it raises, and no traceback"
+    file = tmp_path / "bad.py"
+    file.write_text(text)
+    with pytest.raises(ValueError, match=said):
+        register_file(file)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    "The path stands in the sentence"
+    with pytest.raises(FileNotFoundError, match=r"none\.py does not exist"):
+        register_file(tmp_path / "none.py")
+
+
+@pytest.mark.parametrize(("name", "body", "said"), [
+    ("nothing", "np.zeros(3)", "No row of this survey depends on it"),
+    ("everything", "np.array([0.0, 0.0, 1e5])", "Is its unit right"),
+    ("nan", "np.array([0.0, 0.0, np.nan])", "no numbers"),
+    ("raises", "value.speed", "AttributeError"),
+])  # fmt: skip
+def test_an_effect_that_cannot_be_applied_is_left_out(tmp_path, name, body, said):
+    "It changes nothing, everything, into no numbers, or raises: the reason is said"
+    import gap_features
+
+    file = written(tmp_path, name, body)
+    kinds = register_file(file)
+    g = gap_features.geometry(3, targets=6, patches=10)
+    with np.errstate(invalid="ignore"):
+        signs, left_out = signatures(g.rows, g.survey, kinds)
+    assert signs == ()
+    assert said in left_out[name]

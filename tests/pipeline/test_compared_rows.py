@@ -1,0 +1,103 @@
+"""A survey against the clouds of a simulator of one's own."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import mlscorr
+from mlscorr.cli import app
+from mlscorr.io.simulated_clouds import simulated_survey
+from mlscorr.simulate import Scenario, simulate
+
+OFFSET = 0.02  # s
+
+
+def made(folder, offset=0.0, seed=3, **scanner):
+    "A survey of one scene; its clock is off"
+    scanner = {"lines_per_second": 75, "points_per_line": 200} | scanner
+    effects = [{"name": "time_offset", "magnitude": offset}] if offset else []
+    scenario = Scenario(
+        drive={"duration": 20.0}, targets={"control": 10, "check": 2}, scanner=[scanner],
+        effects=effects,
+    )  # fmt: skip
+    simulate(scenario, np.random.default_rng(seed)).write(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    "What was recorded with a late clock, its simulation, and that of 18 of 20 ms"
+    path = tmp_path_factory.mktemp("own")
+    real, first = made(path / "real", OFFSET), made(path / "first")
+    return real, first, made(path / "next", 0.9 * OFFSET)
+
+
+@pytest.fixture(scope="module")
+def compared(folders, tmp_path_factory):
+    "The document of the command with both runs"
+    out = tmp_path_factory.mktemp("compared") / "out"
+    real, first, following = map(str, folders)
+    command = ["diagnose", real, "--simulated", first, "--simulated", following, "-o", str(out)]
+    done = CliRunner().invoke(app, [*command, "-q"])
+    assert done.exit_code == 0, done.output
+    return json.loads((out / "gap.json").read_text())
+
+
+def test_the_effect_that_their_simulator_lacks_is_named(compared):
+    "A clock 20 ms off, to half a millisecond, by targets and by patches"
+    assert compared["verdict"]["label"] == "time_offset"
+    (offset,) = compared["causes"][0]["parameters"]
+    assert offset["estimate"] == pytest.approx(OFFSET, abs=5e-4)
+    assert {"target", "surface"} <= set(compared["channels"])
+
+
+def test_their_next_run_tells_how_far_the_gap_shrinks(compared):
+    "18 of 20 ms take 99 % of the square, to 1 %"
+    assert compared["closure"]["shrink"] == pytest.approx(0.99, abs=0.01)
+    assert "next run" in compared["closure"]["held_out"]
+    said = " ".join(compared["warnings"])
+    assert "10 of 10" in said or "observed targets were paired" in said
+
+
+def test_a_survey_is_no_simulation_of_itself(folders):
+    "Against its own clouds each patch is paired by its pulses and nothing differs: it is refused"
+    real = mlscorr.read_survey(folders[1])
+    with pytest.raises(ValueError, match="are the survey's own"):
+        mlscorr.diagnose(real, simulated=[folders[1] / "pass-1.laz"])
+
+
+def test_clouds_of_another_drive_are_refused(folders, tmp_path):
+    "Other times, another place, or nothing at all: with what differs, in s and m"
+    real = mlscorr.read_survey(folders[0])
+    away = replace(real, trajectory=replace(real.trajectory, position=real.trajectory.position + 9))
+    with pytest.raises(ValueError, match=r"lies 15\.\d m from that of"):
+        simulated_survey(folders[1], away)
+    late = replace(
+        real, trajectory=replace(real.trajectory, gps_time=real.trajectory.gps_time + 99)
+    )
+    with pytest.raises(ValueError, match="simulates another survey: its trajectory runs from"):
+        simulated_survey(folders[1], late)
+    with pytest.raises(FileNotFoundError, match="holds no LAS or LAZ file"):
+        simulated_survey(tmp_path, real)
+    with pytest.raises(ValueError, match="EPSG:32651"):
+        simulated_survey(folders[1], replace(real, crs="EPSG:32651"))
+
+
+def test_clouds_elsewhere_are_refused(folders, tmp_path):
+    "Clouds of other beams have no plane where the survey has one, or lie off the scan plane"
+    turned = made(tmp_path / "turned", boresight=[90.0, 0.0, -35.0])
+    with pytest.raises(ValueError, match="other beams"):
+        mlscorr.diagnose(mlscorr.read_survey(folders[0]), simulated=[turned])
+
+
+def test_three_runs_are_one_too_many(folders, tmp_path):
+    "The sentence says how many there are, and which are wanted"
+    runs = [part for _ in range(3) for part in ("--simulated", str(folders[1]))]
+    done = CliRunner().invoke(app, ["diagnose", str(folders[0]), *runs, "-o", str(tmp_path / "o")])
+    assert done.exit_code == 2
+    assert "given 3 times" in done.output
+    shutil.rmtree(tmp_path / "o", ignore_errors=True)
