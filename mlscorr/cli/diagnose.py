@@ -42,6 +42,13 @@ def diagnose(
         Path | None,
         typer.Option(help="Python file that registers effects of your own; it is run."),
     ] = None,
+    until_none: Annotated[
+        bool,
+        typer.Option(
+            "--until-none",
+            help="Put what is found into the simulator and look again, until nothing is found.",
+        ),
+    ] = False,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -59,12 +66,21 @@ def diagnose(
                 f"--simulated is given {len(simulated)} times: give the clouds of one run, and "
                 "those of the next."
             )
+        if simulated and until_none:
+            raise ValueError(
+                "--until-none runs our simulator again, and --simulated compares with yours: give "
+                "one of them."
+            )
         inputs = [path for path in (simulator, effects, *simulated) if path is not None]
     with work(out, overwrite, survey, [path for path in inputs if path.is_file()]) as progress:
         recorded = mlscorr.read_survey(survey)
-        diagnosed = mlscorr.diagnose(
-            recorded, believed, progress=progress, simulated=tuple(simulated)
-        )
+        if until_none:
+            from mlscorr.pipeline.rounds import diagnose_until_none
+
+            diagnosed = diagnose_until_none(recorded, believed, progress=progress)
+        else:
+            runs = tuple(simulated)
+            diagnosed = mlscorr.diagnose(recorded, believed, progress=progress, simulated=runs)
         content = diagnosed.write(out, overwrite)
     print_json(content, as_json)
     _tell(content)
@@ -76,5 +92,19 @@ def diagnose(
 def _tell(content):
     """What stands first, and what to do."""
     say_statements(content["statements"])
+    if "ablation" in content:
+        _tell_rounds(content["ablation"])
+        return
     for number, sentence in enumerate(content["advice"], start=1):
         say(f"{number}. {sentence}")
+
+
+def _tell_rounds(ablation):
+    """The gap with each effect by itself, and after each round."""
+    say(f"{'In the simulator':34s}{'gap before':>12s}{'after':>10s}")
+    for row in ablation["alone"]:
+        say(f"{row['effect'] + ' alone':34s}{row['before']:9.1f} mm{row['after']:7.1f} mm")
+    for row in ablation["rounds"]:
+        words, unit = f"round {row['round']}: {row['label']}", row["unit"]
+        say(f"{words:34s}{row['before']:9.1f} {unit:2s}{row['after']:7.1f} {unit:2s}")
+    say(ablation["ended"])

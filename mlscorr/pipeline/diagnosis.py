@@ -27,6 +27,7 @@ from mlscorr.gap import (
     with_cause,
 )
 from mlscorr.gap.signatures import select, signatures
+from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent
@@ -136,6 +137,7 @@ def diagnose(
         left_out,
         compared.notes,
         absence,
+        signs_of_part,
     )
 
 
@@ -165,6 +167,7 @@ class DiagnosedSurvey(Summary):
     left_out: dict[str, str]
     warnings: tuple[str, ...]
     absence: Absence = field(default_factory=Absence)
+    signatures: tuple[Signature, ...] = ()
 
     @property
     def document(self) -> dict:

@@ -8,6 +8,7 @@ class Settings:
     """Limits and choices, each with its unit and reason."""
 
     seed: int = 0  # of random samples: the same survey gives the same result
+    rounds: int = 5  # of a diagnosis until none: a survey with more causes wants a look by hand
     orders: tuple[int, ...] = (2, 3, 4, 5)  # of polynomials that are compared: the paper's Table 1
     check_points: int = 5  # points; with fewer, all points are cross-validated as well
     single_points: int = 10  # points; up to here each is left out by itself, else in groups

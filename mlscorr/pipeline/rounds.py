@@ -1,0 +1,135 @@
+"""``diagnose --until-none``: effect after effect into the simulator, until nothing is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.effects import Effect
+from mlscorr.gap.close.ablation import LoneEffect, lone_effects
+from mlscorr.io.output import output_folder, write_json
+from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.simulate.simulator_file import Simulator, write_simulator
+from mlscorr.survey import Survey
+
+
+@dataclass(frozen=True)
+class DiagnosedRounds:
+    """Diagnoses of one survey, each with what those before it found in the simulator.
+
+    Parameters
+    ----------
+    rounds : tuple of DiagnosedSurvey
+        At least one.
+    alone : tuple of LoneEffect
+        Each effect by itself, in the first round.
+    """
+
+    rounds: tuple[DiagnosedSurvey, ...]
+    alone: tuple[LoneEffect, ...]
+
+    @property
+    def ended(self) -> str:
+        """Why it ended, in a sentence."""
+        label, number = self.rounds[-1].inference.verdict.label, len(self.rounds)
+        named = [each.inference.verdict.label for each in self.rounds[:-1]]
+        if label == "none":
+            whole = f"with {', '.join(named)} in the simulator " if named else ""
+            return f"Round {number}: {whole}nothing is left to find."
+        if label == "unknown":
+            return f"Round {number}: what is left no known effect explains."
+        if number < SETTINGS.rounds:
+            return f"Round {number}: {label} can't be put into the simulator once more."
+        return f"After {number} rounds {label} is still found: the simulator has what was named."
+
+    @property
+    def document(self) -> dict:
+        """That of gap.json of the first round, with ``ablation``."""
+        rounds = []
+        for number, each in enumerate(self.rounds, start=1):
+            verdict, closure = each.inference.verdict, each.closure
+            rounds.append(
+                {
+                    "round": number,
+                    "label": verdict.label,
+                    "probability": float(verdict.probability),
+                    "before": closure.before,
+                    "after": closure.after,
+                    "unit": closure.unit,
+                    "shrink": closure.shrink,
+                    "kind": closure.kind,
+                }
+            )
+        alone = [vars(effect) | {"unit": "mm"} for effect in self.alone]
+        ablation = {"rounds": rounds, "alone": alone, "ended": self.ended}
+        return self.rounds[0].document | {"ablation": ablation}
+
+    def write(self, out: Path, overwrite: bool = False) -> dict:
+        """Write gap.json and gap.html of the first round, and the last simulator.toml.
+
+        Parameters
+        ----------
+        out : Path
+        overwrite : bool
+            An older folder.
+
+        Returns
+        -------
+        document : dict
+            That of gap.json.
+
+        Raises
+        ------
+        Exception
+            As ``CorrectedSurvey.write`` does.
+        """
+        from mlscorr.report.gap import diagnosis_page
+
+        content, survey = self.document, self.rounds[0].survey
+        page = diagnosis_page(content, survey.name)
+        with output_folder(out, survey.inputs, overwrite) as folder:
+            write_json(folder / "gap.json", content)
+            page.write(folder / "gap.html")
+            write_simulator(self.rounds[-1].improved, folder / "simulator.toml")
+        return content
+
+
+def diagnose_until_none(
+    survey: Survey,
+    simulator: Simulator | None = None,
+    library: Iterable[type[Effect]] | None = None,
+    progress: Callable | None = None,
+) -> DiagnosedRounds:
+    """Diagnose, put what was named into the simulator, and again, until nothing is left.
+
+    Parameters
+    ----------
+    survey, simulator, library, progress
+        As of ``diagnose``.
+
+    Raises
+    ------
+    ValueError
+        As ``diagnose`` does.
+    """
+    library = library if library is None else tuple(library)
+    rounds = [diagnose(survey, simulator, library, progress=progress)]
+    while len(rounds) < SETTINGS.rounds:
+        last = rounds[-1]
+        if last.inference.verdict.label in ("none", "unknown"):
+            break
+        try:
+            improved = last.improved
+        except ValueError:  # larger than any survey can have
+            break
+        rounds.append(diagnose(survey, improved, library, progress=progress))
+    first = rounds[0]
+    alone = lone_effects(
+        first.rows, first.signatures, first.inference, np.random.default_rng(SETTINGS.seed)
+    )
+    rounds[1:] = [replace(each, signatures=()) for each in rounds[1:]]
+    return DiagnosedRounds(tuple(rounds), alone)

@@ -1,0 +1,51 @@
+"""Effect after effect into the simulator, until nothing is left."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from mlscorr.cli import app
+from mlscorr.simulate import Scenario, simulate
+from mlscorr.simulate.simulator_file import read_simulator
+from tests.beds.documents import undocumented
+
+
+@pytest.fixture(scope="module")
+def survey(tmp_path_factory):
+    "A survey whose scanner clock is 20 ms off"
+    scenario = Scenario(
+        drive={"duration": 30.0},
+        targets={"control": 12, "check": 3},
+        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+        effects=[{"name": "time_offset", "magnitude": 0.02}],
+    )
+    folder = tmp_path_factory.mktemp("rounds") / "survey"
+    simulate(scenario, np.random.default_rng(3)).write(folder)
+    return folder
+
+
+def test_one_command_finds_the_cause_and_then_none(survey, tmp_path):
+    "Two rounds: the clock, then nothing; the simulator has 20 ms to 1 ms, the table both"
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, ["diagnose", str(survey), "-o", str(out), "--until-none"])
+    assert done.exit_code == 0, done.output
+    told = json.loads((out / "gap.json").read_text())
+    assert not undocumented(told)
+    rounds = told["ablation"]["rounds"]
+    assert [each["label"] for each in rounds] == ["time_offset", "none"]
+    assert rounds[0]["after"] < 0.1 * rounds[0]["before"]
+    assert told["ablation"]["alone"][0]["effect"] == "time_offset"
+    assert "nothing is left to find" in told["ablation"]["ended"]
+    assert "time_offset alone" in done.output and "round 2: none" in done.output
+    (effect,) = read_simulator(out / "simulator.toml").effects
+    assert effect.magnitude == pytest.approx(0.02, abs=1e-3)
+
+
+def test_another_simulator_cannot_run_here(survey, tmp_path):
+    "Rounds with clouds of one's own simulator are refused: it would have to run"
+    command = ["diagnose", str(survey), "--until-none", "--simulated", str(survey)]
+    done = CliRunner().invoke(app, [*command, "-o", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "give one of them" in " ".join(done.output.split())
