@@ -22,16 +22,16 @@ from mlscorr.gap import (
     find_absence,
     without_effects,
 )
-from mlscorr.gap.observe import Pairing
-from mlscorr.gap.observe.patches import Patches
-from mlscorr.gap.observe.simulated import (
+from mlscorr.gap.observe import (
+    Pairing,
+    Patches,
     SimulatedBeams,
     SimulatedClouds,
     rows_against,
     spread_patches,
     without_unpaired,
 )
-from mlscorr.gap.signatures.expectation import expected
+from mlscorr.gap.signatures import expected
 from mlscorr.io.las import read_chunks
 from mlscorr.io.simulated_clouds import simulated_survey
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces
@@ -131,13 +131,13 @@ def compare_with_clouds(
     absence = find_absence(believed, finding.matches)
     matched = _with_moved(finding, believed).matches.matched
     patches = None if patches is None else spread_patches(patches)
-    several = []
+    compared = []
     for simulated in opened:
         clouds = _simulated_clouds(simulated, patches, progress)
         rows, sentence = rows_against(believed, matched, finding.candidates, patches, clouds)
-        several.append(rows)
+        compared.append(rows)
         notes = (*notes, sentence)
-    first, *following = without_unpaired(several)
+    first, *following = without_unpaired(compared)
     views = len(np.unique(first.item[first.metric]))
     if views < LEAST_VIEWS:
         raise ValueError(too_little(survey, first, views, library, notes))

@@ -26,8 +26,7 @@ from mlscorr.gap import (
     next_data,
     with_cause,
 )
-from mlscorr.gap.signatures import select, signatures
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.signatures import Signature, select, signatures
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent
@@ -111,34 +110,18 @@ def diagnose(
         part, background(part, believed), believed, signs_of_part, rng, absence=absence
     )
     step(2)
+    cause, change = cause_for_simulator(part, signs_of_part, inference), compared.simulated
     closure = close_gap(
-        observed,
-        used,
-        believed,
-        signs,
-        inference.evidence,
-        cause_for_simulator(part, signs_of_part, inference),
-        compared.simulated,
-        rng,
-        progress=step,
+        observed, used, believed, signs, inference.evidence, cause, change, rng, step
     )
     labels = [n for n in (*inference.verdict.set, *inference.same) if n != "unknown"]
     plan = next_data(part, believed, library, tuple(dict.fromkeys(labels)), inference.separability)
     plan = (*_looks_again(absence), *plan)
     step(2)
     return DiagnosedSurvey(
-        survey,
-        simulator,
-        effects,
-        part,
-        inference,
-        closure,
-        plan,
-        left_out,
-        compared.notes,
-        absence,
-        signs_of_part,
-    )
+        survey, simulator, effects, part, inference, closure, plan, left_out, compared.notes,
+        absence, signs_of_part,
+    )  # fmt: skip
 
 
 def _looks_again(absence):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.effects import Effect
-from mlscorr.gap.close.ablation import LoneEffect, lone_effects
+from mlscorr.gap.close import LoneEffect, lone_effects
 from mlscorr.io.output import output_folder, write_json
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose
 from mlscorr.pipeline.settings import SETTINGS
@@ -25,12 +25,12 @@ class DiagnosedRounds:
     ----------
     rounds : tuple of DiagnosedSurvey
         At least one.
-    alone : tuple of LoneEffect
+    lone : tuple of LoneEffect
         Each effect by itself, in the first round.
     """
 
     rounds: tuple[DiagnosedSurvey, ...]
-    alone: tuple[LoneEffect, ...]
+    lone: tuple[LoneEffect, ...]
 
     @property
     def ended(self) -> str:
@@ -64,8 +64,8 @@ class DiagnosedRounds:
                     "kind": closure.kind,
                 }
             )
-        alone = [vars(effect) | {"unit": "mm"} for effect in self.alone]
-        ablation = {"rounds": rounds, "alone": alone, "ended": self.ended}
+        lone = [vars(effect) | {"unit": "mm"} for effect in self.lone]
+        ablation = {"rounds": rounds, "alone": lone, "ended": self.ended}
         return self.rounds[0].document | {"ablation": ablation}
 
     def write(self, out: Path, overwrite: bool = False) -> dict:
@@ -128,8 +128,8 @@ def diagnose_until_none(
             break
         rounds.append(diagnose(survey, improved, library, progress=progress))
     first = rounds[0]
-    alone = lone_effects(
+    lone = lone_effects(
         first.rows, first.signatures, first.inference, np.random.default_rng(SETTINGS.seed)
     )
     rounds[1:] = [replace(each, signatures=()) for each in rounds[1:]]
-    return DiagnosedRounds(tuple(rounds), alone)
+    return DiagnosedRounds(tuple(rounds), lone)

@@ -67,7 +67,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 @pytest.mark.parametrize(("name", "body", "said"), [
     ("nothing", "np.zeros(3)", "No row of this survey depends on it"),
     ("everything", "np.array([0.0, 0.0, 1e5])", "Is its unit right"),
-    ("nan", "np.array([0.0, 0.0, np.nan])", "no numbers"),
+    ("nan", "np.array([0.0, 0.0, np.nan])", "not a number"),
     ("raises", "value.speed", "AttributeError"),
 ])  # fmt: skip
 def test_an_effect_that_cannot_be_applied_is_left_out(tmp_path, name, body, said):

@@ -113,7 +113,7 @@ def test_the_cloud_is_read_once(late, diagnosed, monkeypatch):
             decoded.append(len(chunk))
             yield chunk
 
-    monkeypatch.setattr("mlscorr.pipeline.diagnosis.read_chunks", counted)
+    monkeypatch.setattr("mlscorr.pipeline.compared_rows.read_chunks", counted)
     monkeypatch.setattr("mlscorr.pipeline.finding.read_chunks", None)
     found = mlscorr.diagnose(survey).document
     assert sum(decoded) == sum(file.points for file in survey.clouds)

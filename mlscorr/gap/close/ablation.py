@@ -61,8 +61,8 @@ def lone_effects(
     usual = explanations.largest(rng.standard_normal((len(o), SETTINGS.replicas)))[0].mean()
     square = unit_square(o, model) * (explanations.largest(rest)[0] - usual)
     before, *after = signed_root(square).tolist()
-    alone = [
+    effects = [
         LoneEffect(name, float(cause.probability), before, left)
         for name, cause, left in zip(names, causes, after, strict=True)
     ]
-    return tuple(sorted(alone, key=lambda each: each.after))
+    return tuple(sorted(effects, key=lambda each: each.after))

@@ -168,7 +168,7 @@ def locate(
     mean = terms.mean(axis=0)
     low, high = (float(v) for v in np.percentile(signed_root(mean[2:]), SETTINGS.band))
     band = low, high
-    splits = tuple(_split(rows, row, by, terms, explained, is_moved) for by in SPLITS)
+    splits = [_split(rows, row, by, terms, explained, is_moved) for by in SPLITS]
     splits = tuple(split for split in splits if split is not None)
     if acts is not None:
         splits = _timed(splits, rows, row, square, acts)

@@ -2,4 +2,12 @@
 
 from mlscorr.gap.observe.pairing import Pairing, build_rows
 from mlscorr.gap.observe.patch_search import PatchCollector
+from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.rows import Rows, background
+from mlscorr.gap.observe.simulated import (
+    SimulatedBeams,
+    SimulatedClouds,
+    rows_against,
+    spread_patches,
+    without_unpaired,
+)

@@ -148,16 +148,16 @@ def spread_patches(patches: Patches) -> Patches:
     return patches[spread(columns, SETTINGS.patches, rng)]
 
 
-def without_unpaired(several: Sequence[Rows]) -> list[Rows]:
+def without_unpaired(compared: Sequence[Rows]) -> list[Rows]:
     """Rows against several simulated clouds, of what all of them have.
 
     Parameters
     ----------
-    several : sequence of Rows
+    compared : sequence of Rows
         Of the same things, as rows_against gives them.
     """
-    keep = np.all([np.isfinite(rows.residual) for rows in several], axis=0)
-    return [rows.select(keep) for rows in several]
+    keep = np.all([np.isfinite(rows.residual) for rows in compared], axis=0)
+    return [rows.select(keep) for rows in compared]
 
 
 def _against_targets(survey, matched, candidates, simulated):
@@ -184,13 +184,13 @@ def _by_beams(survey, patches, beams):
     ends = np.searchsorted(beams.patch, np.arange(p + 1))
     for i in range(p):
         values = along[ends[i] : ends[i + 1]]
-        wanted, values = len(values), values[np.isfinite(values)]
-        if len(values) < max(SETTINGS.plane_points, SETTINGS.facet_share * wanted):
+        count, values = len(values), values[np.isfinite(values)]
+        if len(values) < max(SETTINGS.plane_points, SETTINGS.facet_share * count):
             continue
         off = np.abs(values - np.median(values))
         scatter = max(1.4826 * np.median(off), SETTINGS.file_step)
         values = values[off <= SETTINGS.trims[-1] * scatter]
-        if len(values) >= SETTINGS.facet_share * wanted:
+        if len(values) >= SETTINGS.facet_share * count:
             residual[i] = values.mean()
             noise[i] = values.var(ddof=1) / len(values) + SETTINGS.surface_sigma**2
     return normal.copy(), _credible(survey, patches, normal, residual), noise
@@ -207,8 +207,8 @@ def _credible(survey, patches, direction, residual):
 
 def _nearest(patches, simulated):
     """The simulated patch (p,) at each patch's place and time, parallel to it; -1 without one."""
-    reach = SETTINGS.pair_distance * SETTINGS.cell
-    near = cKDTree(simulated.centre).query_ball_point(patches.centre, reach)
+    radius = SETTINGS.pair_distance * SETTINGS.cell
+    near = cKDTree(simulated.centre).query_ball_point(patches.centre, radius)
     other = np.full(len(patches), -1)
     for i, rows in enumerate(near):
         j = np.array(rows, dtype=int)
