@@ -175,7 +175,7 @@ def locate(
     before, after = (float(v) for v in signed_root(mean[:2]))
     return Where(
         before, after, band, splits, row, observed.errors.gps_time[keep], u[keep, :2], sigma[keep],
-        _headline(before, band, splits, len(row), is_moved),
+        _headline(before, band, _of_headline(splits, acts), len(row), is_moved),
     )  # fmt: skip
 
 
@@ -240,6 +240,11 @@ def _bins(rows, row, by):
         tuple(f"{a:.4g} to {b:.4g}" for a, b in pairwise(edges)),
         number,
     )
+
+
+def _of_headline(splits, acts):
+    """The splits of which the headline may speak: of an event that of time alone."""
+    return splits if acts is None else tuple(split for split in splits if split.by == "time")
 
 
 def _headline(before, band, splits, number, is_moved):
