@@ -1,7 +1,6 @@
 """Each effect alone in the simulator."""
 
 import numpy as np
-import pytest
 
 from mlscorr.gap.close.ablation import lone_effects
 from mlscorr.gap.infer.causes import infer_causes
@@ -16,5 +15,5 @@ def test_the_effect_that_acts_leaves_least(late):
     assert alone[0].effect == "time_offset"
     assert alone[0].after < 0.25 * alone[0].before
     assert min(each.after for each in alone[1:]) > 0.3 * alone[0].before
-    assert {each.before for each in alone} == {pytest.approx(alone[0].before)}
+    assert len({each.before for each in alone}) == 1
     assert [each.effect for each in alone].count("position_noise") == 0
