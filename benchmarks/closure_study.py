@@ -2,7 +2,7 @@
 
     OMP_NUM_THREADS=1 python benchmarks/closure_study.py [--cases 36] [--seed 8000]
 
-Made-up surveys of features (gap_features.py): two opposite passes, 40 targets, of which 6 are check
+Made-up surveys of features: two opposite passes, 40 targets, of which 6 are check
 points, and 200 patches, with one effect of 3 to 8 minimal detectable biases. The truth is without
 noise: of the effect's own shift of all rows, in the metric of the drift that was made, the share
 of the square that a prediction takes away. It is compared with the share that is stated.
@@ -12,7 +12,6 @@ import argparse
 from dataclasses import replace
 
 import numpy as np
-from gap_features import errors
 from gap_mechanisms import STUDIED, sized
 from gap_study import Bed
 
@@ -23,6 +22,7 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import select
+from mlscorr.gap.train.errors import errors
 
 SIZES = (3.0, 5.0, 8.0)  # MDB
 CHECKED = 6  # targets that are check points

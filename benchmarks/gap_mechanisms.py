@@ -99,7 +99,9 @@ STUDIED = (  # deterministic effects, named where the geometry shows them at all
 NOISES = {"range_noise": 0.004, "angle_noise": 0.02, "time_jitter": 1e-3, "position_noise": 0.04}
 
 
-ACTUAL = ErrorModel(1.0, "matern32", 0.3, 2.0)  # nearest to the drift that is made here
+ACTUAL = ErrorModel(
+    1.0, "matern32", 0.3, (1.0, "matern32", 0.3)
+)  # nearest to the drift that is made here
 
 
 def metric(g):

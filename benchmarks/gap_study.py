@@ -2,9 +2,9 @@
 
     OMP_NUM_THREADS=1 python benchmarks/gap_study.py [--cases 24] [--seed 1000]
 
-Two opposite passes, 40 targets and 200 patches seen by a line scanner (gap_features.py), with
-effects at finite size, noise, or mechanisms of no library (gap_mechanisms.py). MDB is the minimal
-detectable bias of each effect there.
+Two opposite passes, 40 targets and 200 patches seen by a line scanner, with effects at finite size,
+noise, or mechanisms of no library (gap_mechanisms.py). MDB is the minimal detectable bias of each
+effect there.
 """
 
 import argparse
@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from gap_features import Geometry, errors, geometry
 from gap_mechanisms import ACTUAL, NOISES, STUDIED, Outside, metric, noisy, sized
 
 from mlscorr.gap.infer.causes import cause_of
@@ -22,6 +21,8 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.separability import compare_signatures
 from mlscorr.gap.infer.verdict import decide, weigh_pairs
 from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.train.errors import errors
+from mlscorr.gap.train.features import Geometry, geometry
 
 
 @dataclass(frozen=True)

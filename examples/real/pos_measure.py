@@ -42,7 +42,7 @@ def terms(rows, survey, rng=None, replicas=REPLICAS):
     u, sigma = whitener.innovations(columns)
     square = sigma[:, None] ** 2 * (u**2 - 1)
     errors = observed.errors
-    signal = (errors.drift**2 + errors.jitter**2 + errors.attitude**2).sum(axis=1)
+    signal = (errors.position**2 + errors.attitude**2).sum(axis=1)
     plain = residual[:, 0] ** 2 - signal - errors.own
     likelihood = float(whitener.log_likelihood(residual)[0])
     return errors.gps_time, square[:, 0], plain, likelihood, square[:, 1:].mean(axis=0)

@@ -22,6 +22,7 @@ from mlscorr.gap.close import (
 )
 from mlscorr.gap.document import gap_document, map_document, separability_document
 from mlscorr.gap.infer import (
+    Costs,
     Inference,
     Observations,
     Separability,

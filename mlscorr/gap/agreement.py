@@ -40,7 +40,7 @@ def agreements(rows: Rows, background: Background) -> list[Agreement]:
         Of these rows.
     """
     variance = rows.noise + rows.survey
-    legs = background.drift**2 + background.jitter**2 + background.attitude**2
+    legs = background.position**2 + background.attitude**2
     np.add.at(variance, background.row, legs.sum(axis=1))
     parts = []
     for channel in dict.fromkeys(rows.channel[rows.metric].tolist()):

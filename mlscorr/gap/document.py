@@ -201,22 +201,16 @@ def _closure(closure):
 
 
 def _evidence(inference):
-    """The ladder; of labels that were weighed last, the ratio follows from the probability."""
-    score = {name: float(values[0]) for name, values in inference.evidence.score.items()}
-    chance, none = inference.probability, score["none"]
-    known = max(score, key=lambda name: chance.get(name, 0.0))
-
-    def ratio(name):
-        if name in score:
-            return score[name] - none
-        if chance[name] == 0.0:  # it underflows
-            return float("nan")
-        return score[known] - none + float(np.log(chance[name] / chance[known]))
-
+    """The ladder."""
+    chance, score = inference.probability, inference.joint.score
     return [
-        {"label": name, "log_evidence_ratio": ratio(name), "probability": chance[name]}
+        {
+            "label": name,
+            "log_evidence_ratio": score[name] - score["none"],
+            "probability": chance[name],
+        }
         for name in chance
-        if name in score or chance[name] > LISTED
+        if name in inference.joint.single or chance[name] > LISTED
     ]
 
 

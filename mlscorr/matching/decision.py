@@ -34,7 +34,10 @@ class Decision:
     marginals: Marginals
 
     def moved(self, pairs: CandidatePairs) -> np.ndarray:
-        """Surveyed point (n,) that each unnamed observation shows to be wrong, -1 for none.
+        """Surveyed point (n,) that each unnamed observation shows elsewhere, -1 for none.
+
+        Where it is too probable that the point is wrong to use it, it counts: what is refused for
+        that is told here.
 
         Parameters
         ----------
@@ -43,7 +46,7 @@ class Decision:
         """
         column = np.full(len(self.column), -1)
         probable = pairs.same & (self.marginals.sound + self.marginals.moved >= 0.5)
-        probable &= self.wrong[pairs.control] > 0.5
+        probable &= self.wrong[pairs.control] > 1.0 - SETTINGS.smallest_sound
         row = np.repeat(np.arange(len(column)), np.diff(pairs.first))
         column[row[probable]] = pairs.control[probable]
         return np.where(self.column < 0, column, -1)

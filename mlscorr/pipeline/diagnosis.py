@@ -13,6 +13,7 @@ from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import (
     Absence,
     Closure,
+    Costs,
     Inference,
     NextData,
     Rows,
@@ -50,6 +51,7 @@ def diagnose(
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
     simulated: Sequence[Path] = (),
+    costs: Costs | None = None,
 ) -> DiagnosedSurvey:
     """Find where a survey differs from its simulation, why, and how far the gap can be closed.
 
@@ -70,6 +72,8 @@ def diagnose(
         or LAZ files, or a file. The survey is compared with them instead of with what is believed;
         effects of the simulator are in them already. Those of its next run, with the effect in it,
         tell how far the gap shrinks.
+    costs : Costs, optional
+        Of a false alarm, a miss and of unknown, beside a wrong name: they choose the label.
 
     Raises
     ------
@@ -107,7 +111,7 @@ def diagnose(
     signs, left_out = signatures(observed, believed, library, rng)
     part, signs_of_part = observed.select(used), select(signs, used)
     inference = infer_causes(
-        part, background(part, believed), believed, signs_of_part, rng, absence=absence
+        part, background(part, believed), believed, signs_of_part, rng, absence=absence, costs=costs
     )
     step(2)
     cause, change = cause_for_simulator(part, signs_of_part, inference), compared.simulated

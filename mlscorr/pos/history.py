@@ -58,6 +58,23 @@ class DriftHistory:
         """
         return np.searchsorted(self.restarts, gps_time, side="right")
 
+    def raised(self, gps_time: np.ndarray) -> np.ndarray:
+        """Number of the stretch in which sigma(t) is raised, from 0; -1 where it isn't: (n,).
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        """
+        epochs, sigma = self.trajectory.gps_time, self.trajectory.position_sigma
+        if sigma is None or not self.is_stated:
+            return np.full(len(gps_time), -1)
+        size = np.linalg.norm(sigma, axis=1)
+        is_raised = size > SETTINGS.steady_ratio * np.linalg.norm(self.held)
+        number = np.cumsum(np.diff(is_raised, prepend=False) & is_raised) - 1
+        number[~is_raised] = -1
+        return number[np.clip(np.searchsorted(epochs, gps_time), 0, len(epochs) - 1)]
+
 
 _KNOWN: WeakValueDictionary[int, DriftHistory] = WeakValueDictionary()
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import cached_property
 
-import gap_features
 import numpy as np
 from gap_mechanisms import ACTUAL
 
@@ -15,6 +14,7 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.train import features
 from tests.beds.gap_inference import surveyed
 
 
@@ -33,7 +33,7 @@ class Bed:
     "Two passes, 24 targets and 80 patches with an effect; every seventh row is a check point's"
 
     def __init__(self, *effects):
-        g = gap_features.geometry(3, targets=24, patches=80)
+        g = features.geometry(3, targets=24, patches=80)
         fixed = [effect for effect in effects if not effect.random]
         self.rows, self.survey, self.effects = surveyed(g, 31, *fixed), g.survey, effects
         for effect in effects[len(fixed) :]:

@@ -38,10 +38,12 @@ def dense(g, model):
     lag = np.subtract.outer(bg.gps_time, bg.gps_time)
     smooth = Covariance(model.family, tau)
     anew = smooth(np.subtract.outer(bg.clock, bg.clock))
-    legs = model.scale**2 * anew * (bg.drift @ bg.drift.T)
-    legs += model.scale**2 * smooth(lag) * (bg.attitude @ bg.attitude.T)
-    short = Covariance("exponential", model.jitter_time)(lag)
-    legs += model.scale**2 * short * (bg.jitter @ bg.jitter.T)
+    growth = np.array([*model.raised, 1.0])[bg.raised] if model.raised else 1.0
+    position = np.reshape(growth, (-1, 1)) * bg.position
+    legs = model.scale**2 * anew * (position @ position.T)
+    scale, family, time = model.attitude
+    turned = Covariance(family, time * g.background.correlation_time)(lag)
+    legs += scale**2 * turned * (bg.attitude @ bg.attitude.T)
     first = np.arange(len(bg.row)) < rows.metric.sum()
     place = np.where(first[:, None], rows.partials[bg.row, :3], rows.partials_2[bg.row, :3])
     legs += model.fixes**2 * Covariance("exponential", SETTINGS.fix_time)(lag) * (place @ place.T)

@@ -2,18 +2,18 @@
 
 from dataclasses import replace
 
-import gap_features
 import numpy as np
 import pytest
 
 from mlscorr.gap import agreements
+from mlscorr.gap.train import features
 
 
 def test_errors_of_the_stated_size_agree_with_it():
     "Residuals drawn row by row with the stated variances have their RMS, to 10 %, in each channel"
-    g = gap_features.geometry(3, targets=30, patches=300, rough=False)
+    g = features.geometry(3, targets=30, patches=300, rough=False)
     variance = g.rows.noise + g.rows.survey
-    legs = g.background.drift**2 + g.background.jitter**2 + g.background.attitude**2
+    legs = g.background.position**2 + g.background.attitude**2
     np.add.at(variance, g.background.row, legs.sum(axis=1))
     noise = np.random.default_rng(4).standard_normal(len(variance))
     drawn = replace(g.rows, residual=np.sqrt(variance) * noise)

@@ -2,13 +2,13 @@
 
 import json
 
-import gap_features
 import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
 from mlscorr.gap.document import map_document, separability_document
 from mlscorr.gap.infer.separability import Separability
+from mlscorr.gap.train import features
 
 
 def test_separability_is_told_in_plain_numbers():
@@ -25,7 +25,7 @@ def test_separability_is_told_in_plain_numbers():
 
 def test_the_map_holds_the_way_and_all_targets():
     "At most twice 1500 epochs, and each target with its role"
-    survey = gap_features.geometry(3, targets=6, patches=0, rough=False).survey
+    survey = features.geometry(3, targets=6, patches=0, rough=False).survey
     content = map_document(survey)
     assert len(content["trajectory"]) <= 3000
     assert np.allclose(content["trajectory"][0], survey.trajectory.position[0, :2], atol=0.01)

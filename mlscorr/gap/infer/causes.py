@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.effects import Effect
 from mlscorr.effects.vehicle import PositionNoise
+from mlscorr.gap.infer.decision import Costs, JointScore, learned
 from mlscorr.gap.infer.error_models import STATED, ErrorModel, error_models
 from mlscorr.gap.infer.labels import LabelEvidence, weigh_labels
 from mlscorr.gap.infer.observations import model_likelihood
@@ -21,7 +22,7 @@ from mlscorr.gap.infer.parameters import (
 )
 from mlscorr.gap.infer.separability import Separability, compare_signatures
 from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.infer.verdict import GapVerdict, best_member, decide, weigh_pairs, with_absence
+from mlscorr.gap.infer.verdict import GapVerdict, best_member, decide, joint_score, with_absence
 from mlscorr.gap.infer.where import Where, locate
 from mlscorr.gap.infer.windows import WindowEvidence
 from mlscorr.gap.observe.absence import Absence
@@ -92,7 +93,7 @@ class Inference:
     ----------
     verdict : GapVerdict
     causes : tuple of Cause
-        Best first.
+        That of the verdict, then the others, best first.
     same : tuple of str
         Effects that this survey can't tell apart from the label at the size that it has.
     where : Where
@@ -101,6 +102,8 @@ class Inference:
         Of every label that was weighed, most probable first.
     evidence : LabelEvidence
         What was compared.
+    joint : JointScore
+        Of the labels.
     """
 
     verdict: GapVerdict
@@ -110,6 +113,7 @@ class Inference:
     separability: Separability
     probability: dict[str, float]
     evidence: LabelEvidence
+    joint: JointScore
 
     @property
     def cause(self) -> Cause:
@@ -126,6 +130,7 @@ def infer_causes(
     rng: np.random.Generator,
     replicas: int = SETTINGS.replicas,
     absence: Absence | None = None,
+    costs: Costs | None = None,
 ) -> Inference:
     """Which effect explains the rows, with what parameters, and where it shows.
 
@@ -141,16 +146,18 @@ def infer_causes(
         More of them make the p-value and the null bands finer.
     absence : Absence, optional
         Of targets that have no row.
+    costs : Costs, optional
+        Of wrong answers.
 
     Raises
     ------
     ValueError
         When no row has a residual in m, or a sigma is zero.
     """
-    moved = () if absence is None else absence.moved
-    evidence = weigh_labels(rows, background, survey, signatures, rng, replicas, moved)
-    probability = weigh_pairs(rows, signatures, evidence)
-    verdict = decide(evidence, probability, absence)
+    evidence = weigh_labels(rows, background, survey, signatures, rng, replicas)
+    joint = joint_score(rows, signatures, evidence)
+    probability = learned().probabilities(joint)
+    verdict = decide(evidence, probability, absence, costs)
     probability = probability if absence is None else with_absence(probability, absence)
     names = [n for n in probability if n not in ("none", "unknown")]
     names = [
@@ -158,13 +165,13 @@ def infer_causes(
         for i, name in enumerate(names)
         if i < SETTINGS.listed_causes or probability[name] > SETTINGS.listed
     ]
-    if verdict.label in ("none", "unknown"):
-        names.insert(0, verdict.label)
+    names = list(dict.fromkeys((verdict.label, *names)))
     causes = [cause_of(rows, signatures, evidence, name, probability[name]) for name in names]
     if verdict.is_hidden:  # the rows show nothing of it
         causes[0] = Cause("unknown", probability["unknown"], (), (), np.zeros(len(rows)))
-    causes = tuple(sorted(causes, key=lambda cause: -cause.probability))
-    best = next(cause for cause in causes if cause.effect == verdict.label)
+    first, *others = causes
+    causes = (first, *sorted(others, key=lambda cause: -cause.probability))
+    best = first
     left = rows.residual - best.shift
     models = _likely_models(evidence, left, rng, max(replicas, 20), best.model.windows)
     acts = best.stretches(survey.trajectory) if len(best.parts) < 2 else ()
@@ -172,7 +179,7 @@ def infer_causes(
     where = locate(rows, background, best.shift, rng, models, best.model, best.extra, acts)
     compared = compare_signatures(evidence.observations, signatures, evidence.blocks.models[0])
     same = _same(best, compared)
-    return Inference(verdict, causes, same, where, compared, probability, evidence)
+    return Inference(verdict, causes, same, where, compared, probability, evidence, joint)
 
 
 def _likely_models(evidence, residual, rng, number, windows):
@@ -241,7 +248,8 @@ def _with_noise(cause, rows, signatures, evidence, name):
     size, sigma = most_probable_size(best.size, best.by_size[:, 0])
     if best.member < 0:
         more = CauseParameter(PositionNoise.FACTOR, "ratio", size, sigma)
-        model = replace(cause.model, scale=size)
+        attitude = (size, *cause.model.attitude[1:])
+        model = replace(cause.model, scale=size, attitude=attitude)
         return replace(cause, parameters=(*cause.parameters, more), model=model)
     kind = signatures[best.member]
     detectable = detectable_size(rows, evidence.observations, kind)

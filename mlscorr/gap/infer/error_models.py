@@ -1,12 +1,14 @@
 """What the simulator expects the residuals to be when nothing is wrong: models of their covariance.
 
-V = drift, jitter and attitude of the POS + survey errors + noise of each row. Residuals of one
-drive are not white: without V every clean survey is "explained" by some effect, and with one fixed
-V nearly half of those whose drift merely has another shape. So V is a family of ErrorModels with
-prior weights, to be averaged over.
+V = position and attitude of the POS + survey errors + noise of each row. Residuals of one drive
+are not white: without V every clean survey is "explained" by some effect, and with one fixed V
+nearly half of those whose drift merely has another shape. The position errs by one process of the
+stated sigma(t), the attitude by one of its own; scale, shape, and how far the POS errs beyond its
+sigma in each stretch in which that is raised, are open. So V is a family of ErrorModels with prior
+weights, to be averaged over.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -22,13 +24,16 @@ class ErrorModel:
     Parameters
     ----------
     scale : float
-        On the sigmas of drift, jitter and attitude.
+        On the sigmas of the position.
     family : str
-        Of drift and attitude.
+        Of the position's error.
     time : float
-        On their correlation time.
-    jitter_time : float
-        Units: s.
+        On its correlation time.
+    attitude : tuple of (scale, family, time)
+        The same of the attitude.
+    raised : tuple of float
+        Further factor on the position's sigma in each stretch in which that is raised; one in
+        stretches that it doesn't name.
     noise : float
         On the sigma of each row's own noise.
     fixes : float
@@ -43,7 +48,8 @@ class ErrorModel:
     scale: float = 1.0
     family: str = "matern32"
     time: float = 1.0
-    jitter_time: float = 5.0
+    attitude: tuple[float, str, float] = (1.0, "matern32", 1.0)
+    raised: tuple[float, ...] = ()
     noise: float = 1.0
     fixes: float = 0.0
     weight: float = 1.0
@@ -78,16 +84,20 @@ def window_growth(
 
 
 def error_models() -> tuple[ErrorModel, ...]:
-    """Those within the belief, with prior weights that sum to one."""
+    """Those within the belief whose attitude errs as the position does; weights sum to one."""
+    return tuple(
+        ErrorModel(scale, family, time, (scale, family, time), weight=share)
+        for (scale, family, time), share in _processes()
+    )
+
+
+def _processes():
+    """Pairs of (scale, family, time) and prior weight."""
     scales = np.asarray(SETTINGS.pos_scales)
     share = np.exp(-0.5 * (np.log(scales) / SETTINGS.scale_spread) ** 2)
-    share /= share.sum()
-    return tuple(
-        ErrorModel(float(scale), family, time, jitter, noise, 0.0, float(s * weight * w))
-        for family, time, jitter, weight in SETTINGS.shapes
-        for scale, s in zip(scales, share, strict=True)
-        for noise, w in SETTINGS.noise_scales
-    )
+    for family, time, weight in SETTINGS.shapes:
+        for scale, part in zip(scales, share / share.sum(), strict=True):
+            yield (float(scale), family, time), float(part * weight)
 
 
 def shaped_models(scale: float = 1.0, fixes: float = 0.0) -> list[ErrorModel]:
@@ -100,7 +110,45 @@ def shaped_models(scale: float = 1.0, fixes: float = 0.0) -> list[ErrorModel]:
     fixes : float
         Sigma of noise of GNSS fixes. Units: m.
     """
-    return [ErrorModel(scale, *shape[:3], 1.0, fixes, shape[3]) for shape in SETTINGS.shapes]
+    return [
+        ErrorModel(scale, family, time, (scale, family, time), fixes=fixes, weight=weight)
+        for family, time, weight in SETTINGS.shapes
+    ]
+
+
+def varied_models(stretches: int) -> Iterator[Callable]:
+    """Functions that vary a model: its attitude, its noise, each stretch of raised sigma, and last
+    what lies between the steps of scales and shapes, wider than data may leave.
+
+    Each takes the best model so far and returns models to be tried.
+
+    Parameters
+    ----------
+    stretches : int
+        Number of those in which sigma is raised.
+    """
+    yield lambda best: [
+        replace(best, attitude=process, weight=best.weight * share)
+        for process, share in _processes()
+    ]
+    yield lambda best: [
+        replace(best, noise=noise, weight=best.weight * share)
+        for noise, share in SETTINGS.noise_scales
+    ]
+    for number in range(stretches):
+        yield lambda best, number=number: [
+            replace(
+                best,
+                raised=(
+                    *(*best.raised, *[1.0] * number)[:number],
+                    factor,
+                    *best.raised[number + 1 :],
+                ),
+                weight=best.weight * share,
+            )
+            for factor, share in SETTINGS.raised
+        ]
+    yield nearby_models
 
 
 def nearby_models(model: ErrorModel) -> tuple[ErrorModel, ...]:

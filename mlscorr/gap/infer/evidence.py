@@ -13,10 +13,10 @@ looked often.
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import compress
-from typing import Self
 
 import numpy as np
 
@@ -42,8 +42,6 @@ class ColumnBlock:
         In the ColumnTable.
     weight : float
         Prior weight within the label.
-    trust : float
-        Factor on log evidence in favour.
     least : float
         Least amplitude (m). An error of the position in time that is no larger than the POS's own
         sigma is drift, not an event.
@@ -53,14 +51,11 @@ class ColumnBlock:
     member: int
     columns: np.ndarray
     weight: float
-    trust: float
     least: float = 0.0
 
     @property
     def amplitudes(self) -> tuple[float, ...]:
-        """Those of its prior; the largest is for events beyond a large sigma of the POS."""
-        if self.least == 0.0:
-            return SETTINGS.amplitudes[:-1]
+        """Those of its prior."""
         allowed = tuple(s for s in SETTINGS.amplitudes if s >= self.least)
         return allowed or SETTINGS.amplitudes[-1:]
 
@@ -72,7 +67,7 @@ class ColumnTable:
     columns: np.ndarray
     blocks: tuple[ColumnBlock, ...]
 
-    @property
+    @cached_property
     def labels(self) -> tuple[str, ...]:
         """Labels of the blocks, each once."""
         return tuple(dict.fromkeys(block.label for block in self.blocks))
@@ -82,7 +77,7 @@ class ColumnTable:
         """Labels but unknown."""
         return tuple(label for label in self.labels if label != "unknown")
 
-    @property
+    @cached_property
     def steady(self) -> set[str]:
         """Effects that are no events: those with a single member."""
         members = {(block.label, block.member) for block in self.blocks}
@@ -94,28 +89,8 @@ class ColumnTable:
         return np.array([block.label == label for block in self.blocks], dtype=bool)
 
     def weighed(self, gain: np.ndarray) -> np.ndarray:
-        """Log of weight times evidence (h, k), which counts by the trust in each block."""
-        trust = np.array([block.trust for block in self.blocks])[:, None]
-        weight = np.log([block.weight for block in self.blocks])[:, None]
-        return weight + np.where(gain > 0, trust, 1.0) * gain
-
-    def trusting(self, names: Collection[str], signatures: Sequence[Signature]) -> Self:
-        """The table in which the outliers of some targets count whole: no tail makes them.
-
-        Parameters
-        ----------
-        names : collection of str
-            Targets that their neighbours and all passes contradict.
-        signatures : sequence of Signature
-            Of the blocks' members.
-        """
-        blocks = [
-            replace(block, trust=1.0)
-            if block.label != "unknown" and signatures[block.member].fixed.get("target") in names
-            else block
-            for block in self.blocks
-        ]
-        return replace(self, blocks=tuple(blocks))
+        """Log of weight times evidence (h, k)."""
+        return np.log([block.weight for block in self.blocks])[:, None] + gain
 
     def best(self, label: str, gain: np.ndarray) -> int:
         """Number of the block of a label that explains a column best, by gains (h,)."""
@@ -139,7 +114,7 @@ def column_table(
     sigma : (m,) array
         Stated one of each row by the POS's position. Units: m.
     """
-    metric, trust = rows.metric, dict(SETTINGS.trust)
+    metric = rows.metric
     parts, blocks = [np.zeros((len(rows), 0))], []
     members = Counter(signature.name for signature in signatures)
 
@@ -155,14 +130,14 @@ def column_table(
             continue
         scale = np.array([_rms(column[metric]) for column in signature.jacobian.T])
         used = np.flatnonzero(scale > 0)
-        least, kind = 0.0, "shift"
+        least = 0.0
         if signature.kind.moment():
-            least, kind = _rms_of(sigma, signature.jacobian), "drift"
+            least = _rms_of(sigma, signature.jacobian)
         elif signature.kind.is_on_target():
             survey = _rms_of(np.sqrt(rows.survey + rows.noise), signature.jacobian)
-            least, kind = SETTINGS.outlier * survey, "outlier"
+            least = SETTINGS.outlier * survey
         p, share = len(used), 1 / members[signature.name]
-        every = ColumnBlock(signature.name, number, np.arange(p), share, trust[kind], least)
+        every = ColumnBlock(signature.name, number, np.arange(p), share, least)
         is_vector = p > 1 and not signature.kind.is_wave()
         add(signature.jacobian[:, used] / scale[used], replace(
             every, weight=share / 2 if is_vector else share))  # fmt: skip
@@ -171,9 +146,9 @@ def column_table(
     events = any(signature.kind.moment() for signature in signatures)
     for number, (block, share) in enumerate(_with_shares(unknown, events)):
         least = _rms_of(sigma, block.columns) if block.is_drift else 0.0
-        kind, index = "drift" if block.is_drift else "shift", np.arange(block.columns.shape[1])
+        index = np.arange(block.columns.shape[1])
         columns = block.columns / _rms(np.sqrt((block.columns[metric] ** 2).sum(axis=1)))
-        add(columns, ColumnBlock("unknown", number, index, share, trust[kind], least))
+        add(columns, ColumnBlock("unknown", number, index, share, least))
     return ColumnTable(np.hstack(parts), tuple(blocks))
 
 

@@ -1,6 +1,6 @@
 """All labels weighed: none, each effect, noise and unknown, in a survey and in replicas of it."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +90,6 @@ def weigh_labels(
     signatures: Sequence[Signature],
     rng: np.random.Generator,
     replicas: int = SETTINGS.replicas,
-    moved: Collection[str] = (),
 ) -> LabelEvidence:
     """Evidence of all labels for the residuals of a survey and for replicas of it.
 
@@ -103,8 +102,6 @@ def weigh_labels(
     rng : numpy.random.Generator
     replicas : int
         Surveys of the same geometry in which nothing acts.
-    moved : collection of str
-        Targets that the matching has found elsewhere than they were surveyed.
 
     Raises
     ------
@@ -114,7 +111,6 @@ def weigh_labels(
     observations = Observations.of(rows, background)
     unknown = unknown_blocks(rows, survey)
     table = column_table(rows, signatures, unknown, observations.sigma)
-    table = table.trusting(moved, signatures)
     table = without_known(observations, table)
     steady, slow = nuisance_columns(observations, table)
     observations, tail = without_tails(observations, rows, steady)
@@ -138,11 +134,9 @@ def weigh_labels(
 
 def _replicas(observations, models, residual, rng, number):
     """Residuals (n, number) in which nothing acts, under models as probable as they are, with
-    tails as these have. Their evidence counts by its trust here too: the drift has another
-    shape.
+    tails as these have.
     """
     score = np.array([model_likelihood(observations, model, residual)[0] for model in models])
-    score *= dict(SETTINGS.trust)["shift"]
     share = np.exp(score - np.logaddexp.reduce(score))
     count = rng.multinomial(number, share / share.sum())
     best = observations.whitener(models[int(np.argmax(score))])

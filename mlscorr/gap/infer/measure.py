@@ -113,8 +113,8 @@ class Explanations:
     columns : (n, c) array
         Innovations of its columns.
     modes : tuple
-        Of blocks alike, their numbers (h,), columns (h, p), trust (h, 1) and, of each block's
-        normal matrix, values (h, p) and vectors (h, p, p).
+        Of blocks alike, their numbers (h,), columns (h, p) and, of each block's normal matrix,
+        values (h, p) and vectors (h, p, p).
     """
 
     table: ColumnTable
@@ -127,15 +127,13 @@ class Explanations:
         normal, modes = columns.T @ columns, []
         for index, numbers, _ in block_groups(table):
             value, vector = np.linalg.eigh(normal[index[:, :, None], index[:, None, :]])
-            trust = np.array([[table.blocks[i].trust] for i in numbers])
-            modes.append((numbers, index, trust, np.maximum(value, 0.0), vector))
+            modes.append((numbers, index, np.maximum(value, 0.0), vector))
         return cls(table, columns, tuple(modes))
 
     def largest(self, innovations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The most that any block explains of the squares, and which one does so.
 
-        Each block counts as it does in the evidence: by its trust, less its number of columns,
-        which is what it explains by chance.
+        Each block counts less its number of columns, which is what it explains by chance.
 
         Parameters
         ----------
@@ -148,10 +146,10 @@ class Explanations:
         """
         free, projected, k = SETTINGS.free_sigma, self.columns.T @ innovations, innovations.shape[1]
         scores, numbers = [np.full((1, k), -np.inf)], [np.array([-1])]
-        for number, index, trust, value, vector in self.modes:
+        for number, index, value, vector in self.modes:
             square = (vector.swapaxes(1, 2) @ projected[index]) ** 2
             explained = (square / (value + free**-2)[:, :, None]).sum(axis=1)
-            scores.append(trust * explained - (value * free**2 > 1).sum(axis=1)[:, None])
+            scores.append(explained - (value * free**2 > 1).sum(axis=1)[:, None])
             numbers.append(number)
         score, number = np.vstack(scores), np.concatenate(numbers)
         best = score.argmax(axis=0)
@@ -233,9 +231,10 @@ def simulated_variance(
         That is added to the rows' own noise. Units: m^2.
     """
     e = observations.errors
-    stated = (e.drift**2 + e.jitter**2 + e.attitude**2).sum(axis=1)
+    position = (e.raised_position(model.raised) ** 2).sum(axis=1)
     growth = np.hypot(window_growth(model.windows, e.gps_time), e.growth)[:, 0]
-    variance = model.scale**2 * stated + growth**2 * ((e.drift + e.jitter) ** 2).sum(axis=1)
+    variance = model.scale**2 * position + growth**2 * (e.position**2).sum(axis=1)
+    variance += model.attitude[0] ** 2 * (e.attitude**2).sum(axis=1)
     variance += model.fixes**2 * (e.place**2).sum(axis=1) + model.noise**2 * e.own
     variance += (observations.shared**2).sum(axis=1)
     return variance if extra is None else variance + extra[observations.row] * observations.half

@@ -56,10 +56,8 @@ class NoiseEvidence:
 
     @property
     def gain(self) -> np.ndarray:
-        """Log evidence (k,), averaged over the sizes; that of drift counts as an event's does."""
-        mean = np.logaddexp.reduce(self.by_size, axis=0) - np.log(len(self.size))
-        trust = dict(SETTINGS.trust)["drift"] if self.label == PositionNoise.name else 1.0
-        return np.where(mean > 0, trust * mean, mean)
+        """Log evidence (k,), averaged over the sizes."""
+        return np.logaddexp.reduce(self.by_size, axis=0) - np.log(len(self.size))
 
 
 def weigh_noise(

@@ -10,7 +10,7 @@ import numpy as np
 
 from mlscorr.collocation import Signal, Whitener, factor
 from mlscorr.collocation.covariance import Covariance
-from mlscorr.gap.infer.error_models import STATED, ErrorModel, nearby_models, window_growth
+from mlscorr.gap.infer.error_models import STATED, ErrorModel, varied_models, window_growth
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Background, Rows
 from mlscorr.survey.columns import Columns
@@ -27,31 +27,45 @@ class Errors(Columns):
     gps_time : (n,) array
         Units: s.
     clock : (n,) array
-        Of the drift, which leaps where it starts anew. Units: s.
+        Of the position, which leaps where its error starts anew. Units: s.
     own : (n,) array
         Variance of its noise. Units: m^2.
-    drift, jitter, attitude, place : (n, 3) array
+    position, attitude, place : (n, 3) array
         Mixings; place is the derivative by the position.
     correlation_time : float
         As believed. Units: s.
     growth : (n, 1) array
         Factor of what believed windows add, see ``window_growth``.
+    raised : (n,) int array
+        Stretch in which the stated sigma is raised; -1 where it isn't.
     """
 
     gps_time: np.ndarray
     clock: np.ndarray
     own: np.ndarray
-    drift: np.ndarray
-    jitter: np.ndarray
+    position: np.ndarray
     attitude: np.ndarray
     place: np.ndarray
     correlation_time: float
     growth: np.ndarray
+    raised: np.ndarray
 
     @property
     def position_variance(self) -> np.ndarray:
         """Stated variance by the POS's position: (n,), m^2."""
-        return (self.drift**2 + self.jitter**2).sum(axis=1)
+        return (self.position**2).sum(axis=1)
+
+    def raised_position(self, factors: tuple[float, ...]) -> np.ndarray:
+        """Mixing (n, 3) of the position with a factor on each stretch in which sigma is raised.
+
+        Parameters
+        ----------
+        factors : tuple of float
+            Of the first stretches; one for others.
+        """
+        known = np.ones(max(self.raised.max(initial=-1) + 1, len(factors)) + 1)
+        known[: len(factors)] = factors
+        return self.position * known[self.raised][:, None]  # the last, -1, is where it isn't raised
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,12 +134,12 @@ class Observations(Columns):
             gps_time=time,
             clock=time if background.clock is None else background.clock[leg],
             own=own,
-            drift=background.drift[leg],
-            jitter=background.jitter[leg],
+            position=background.position[leg],
             attitude=background.attitude[leg],
             place=partials[:, :3],
             correlation_time=background.correlation_time,
             growth=window_growth(background.windows, time),
+            raised=np.full(len(leg), -1) if background.raised is None else background.raised[leg],
         )
         survey = survey[:, np.flatnonzero(often)].toarray()
         shared = np.hstack([survey, _plane_heights(row, double, first)])
@@ -196,20 +210,20 @@ def _factored(errors, model):
 
 def _factor(errors, model, extra=0.0):
     """Whitener of V0: of signals and own noise."""
-    time = model.time * errors.correlation_time
     growth = np.hypot(window_growth(model.windows, errors.gps_time), errors.growth)
+    position = errors.raised_position(model.raised)
+    turn_scale, turn_family, turn_time = model.attitude
+    tau = errors.correlation_time
     signals = [
         Signal(scale * mixing[:, None], covariance, clock)
         for scale, mixing, covariance, clock in (
-            (model.scale, errors.drift, Covariance(model.family, time), errors.clock),
-            (model.scale, errors.attitude, Covariance(model.family, time), None),
-            (model.scale, errors.jitter, Covariance("exponential", model.jitter_time), None),
+            (model.scale, position, Covariance(model.family, model.time * tau), errors.clock),
+            (turn_scale, errors.attitude, Covariance(turn_family, turn_time * tau), None),
             (model.fixes, errors.place, Covariance("exponential", SETTINGS.fix_time), None),
-            (1.0, growth * (errors.drift + errors.jitter),
-             Covariance("matern32", SETTINGS.window_time), None),
+            (1.0, growth * errors.position, Covariance("matern32", SETTINGS.window_time), None),
         )
         if scale > 0 and mixing.any()
-    ]  # fmt: skip
+    ]
     return factor(errors.gps_time, signals, model.noise**2 * errors.own + extra)
 
 
@@ -258,9 +272,12 @@ def relevant_models(
         ]
 
     known = {model: scores(model, range(len(cases))) for model in models}
+    stretches = observations.errors.raised.max(initial=-1) + 1
     for number in range(len(cases)):
-        for model in nearby_models(max(known, key=lambda model: known[model][number])):
-            known[model] = np.maximum(scores(model, [number]), known.get(model, -np.inf))
+        for variation in varied_models(int(stretches)):
+            for model in variation(max(known, key=lambda model: known[model][number])):
+                if model not in known or known[model][number] == -np.inf:
+                    known[model] = np.maximum(scores(model, [number]), known.get(model, -np.inf))
     score = np.array(list(known.values()))
     below = (score - score.max(axis=0)).max(axis=1)
     order = np.argsort(-below, kind="stable")[: SETTINGS.shortlist]

@@ -32,7 +32,8 @@ def without_tails(
         Odd rows.
     """
     residual = observations.columns(rows.residual[:, None])
-    flexible = ErrorModel(SETTINGS.scale_limit, *SETTINGS.shapes[1][:2], jitter_time=1.0)
+    process = (SETTINGS.scale_limit, *SETTINGS.shapes[1][:2])
+    flexible = ErrorModel(*process, process)
     whitener = observations.with_shared(nuisance).whitener(flexible)
     weights, precision = whitener.solve(residual)
     score = weights[:, 0] / np.sqrt(precision)

@@ -30,6 +30,7 @@ PLACES = ("east", "north", "height")
 BODY = ("right", "forward", "height")
 TURNS = ("roll", "pitch", "yaw")
 BEAMS = ("beam", "scan", "across")
+ANY = tuple(DIRECTIONS)  # what is smooth in anything may be an error in any direction
 FUNCTIONS = {  # name: words, directions
     "constant": ("that is constant", (*BODY, *BEAMS, *TURNS, "clock")),
     "pass": ("that differs between passes", (*PLACES, *BODY[:2], "beam", "scan", *TURNS, "clock")),
@@ -37,31 +38,36 @@ FUNCTIONS = {  # name: words, directions
     "warming": ("that grows with time and settles", ("beam", "scan", *TURNS)),
     "elapsed in the pass": ("that grows in each pass", (*TURNS, "clock")),
     "time": ("that comes and goes with time", PLACES),
-    "slow time": ("that changes slowly with time", (*PLACES, "beam", *TURNS, "clock")),
+    "slow time": ("that changes slowly with time", ANY),
     "location": ("that depends on the place along the drive", PLACES),
     "map": ("that depends on the place on the map", PLACES),
     "range": ("in proportion to the range", ("height", "beam", "right")),
     "range squared": ("that grows with the range squared", ("height", "beam")),
-    "smooth range": ("that depends on the range", ("beam", "height")),
+    "smooth range": ("that depends on the range", ANY),
     "cyclic range": ("that repeats with the range", ("beam",)),
-    "incidence": ("that depends on the incidence angle", ("beam", "scan")),
+    "incidence": ("that depends on the incidence angle", BEAMS),
     "intensity": ("that grows with the intensity", ("beam",)),
     "smooth intensity": ("that depends on the intensity", ("beam", "scan")),
     "scan angle": ("in proportion to the scan angle", ("scan", "across", "beam")),
-    "once or twice a turn": ("that repeats once or twice a turn of the scanner", BEAMS),
+    "once or twice a turn": ("that repeats once or twice a turn of the scanner", ANY),
     "often a turn": ("that repeats several times a turn of the scanner", BEAMS),
     "speed": ("that grows with speed", (*BODY, "beam", *TURNS)),
     "speed squared": ("that grows with speed squared", (*BODY, "pitch")),
-    "smooth speed": ("that depends on speed", (*BODY, "pitch")),
+    "smooth speed": ("that depends on speed", ANY),
     "turn rate": ("that grows with the turn rate", (*BODY, *TURNS)),
     "turning": ("that grows with the turn rate to either side", ("height", "pitch")),
     "lateral acceleration": ("that grows with speed times turn rate", ("right", "height", "roll")),
     "acceleration": ("that grows with acceleration", ("forward", "height", "pitch")),
     "roll rate": ("that grows with the roll rate", ("roll",)),
     "pitch rate": ("that grows with the pitch rate", ("pitch",)),
-    "heading": ("that depends on the heading", (*BODY, "beam", *TURNS)),
+    "heading": ("that depends on the heading", ANY),
+    "slow place": ("that changes slowly with the place", ANY),
+    "smooth turn rate": ("that depends on the turn rate", ANY),
+    "smooth acceleration": ("that depends on acceleration", ANY),
+    "smooth roll": ("that depends on the roll of the vehicle", ANY),
+    "smooth pitch": ("that depends on the pitch of the vehicle", ANY),
 }
-DRIFT_FUNCTIONS = ("time", "slow time", "location", "pass", "elapsed")
+DRIFT_FUNCTIONS = ("time", "slow time", "location", "slow place", "pass", "elapsed")
 
 
 @dataclass(frozen=True)
@@ -156,6 +162,11 @@ def _functions(views):
         "roll rate": c["roll_rate"][:, None],
         "pitch rate": c["pitch_rate"][:, None],
         "heading": _waves(c["heading"], (1, 2)),
+        "slow place": _splines(c["location"], 5),
+        "smooth turn rate": _splines(turn, 5),
+        "smooth acceleration": _splines(c["acceleration"], 5),
+        "smooth roll": _splines(c["roll"], 5),
+        "smooth pitch": _splines(c["pitch"], 5),
     }
     if len(np.unique(c["pass"])) > 1:
         number = c["pass"][:, None] == np.unique(c["pass"])

@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.effects import effect_class
 from mlscorr.effects.vehicle import PositionNoise
+from mlscorr.gap.infer.decision import Costs, JointScore, cheapest, learned
 from mlscorr.gap.infer.error_models import error_models
 from mlscorr.gap.infer.evidence import ColumnTable, weigh_blocks
 from mlscorr.gap.infer.labels import LabelEvidence, block_scores, noise_scores
@@ -34,7 +35,7 @@ class GapVerdict:
     set : tuple of str
         The smallest set of labels that holds 95 %.
     p_value : float
-        Of none, from replicas of this very survey.
+        Of none, from replicas of this very survey, and by how these lie where nothing acts.
     lead : str
         Where unknown points: "height error that grows with speed squared"; else empty.
     is_hidden : bool
@@ -73,7 +74,10 @@ def with_absence(probability: dict[str, float], absence: Absence) -> dict[str, f
 
 
 def decide(
-    evidence: LabelEvidence, probability: dict[str, float], absence: Absence | None = None
+    evidence: LabelEvidence,
+    probability: dict[str, float],
+    absence: Absence | None = None,
+    costs: Costs | None = None,
 ) -> GapVerdict:
     """Verdict from probabilities.
 
@@ -84,6 +88,8 @@ def decide(
         Of all labels by the rows, most probable first.
     absence : Absence, optional
         Of targets that have none.
+    costs : Costs, optional
+        Of wrong answers.
     """
     by_rows, is_hidden = probability, False
     if absence is not None:
@@ -91,20 +97,21 @@ def decide(
         is_hidden = bool(absence.runs) and by_rows["none"] > by_rows["unknown"]
     held = np.cumsum(list(probability.values()))
     number = int(np.searchsorted(held, SETTINGS.confidence)) + 1
-    label = next(iter(probability))
+    label = cheapest(probability, evidence.noisy, Costs() if costs is None else costs)
+    if is_hidden and label == "none":
+        label = "unknown"
     lead = evidence.lead()[0] if label == "unknown" else ""
     is_hidden &= label == "unknown"
     if is_hidden:
         lead = absence.runs[0].lead
-    labels = tuple(probability)[:number]
-    return GapVerdict(label, probability[label], labels, evidence.p_value, lead, is_hidden)
+    labels = tuple(dict.fromkeys((*tuple(probability)[:number], label)))
+    p_value = learned().calibrated(evidence.p_value)
+    return GapVerdict(label, probability[label], labels, p_value, lead, is_hidden)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def weigh_pairs(
-    rows: Rows, signatures: Sequence[Signature], evidence: LabelEvidence
-) -> dict[str, float]:
-    """Probabilities of all labels, two of them together included, most probable first.
+def joint_score(rows: Rows, signatures: Sequence[Signature], evidence: LabelEvidence) -> JointScore:
+    """Scores of all labels, two of them together included.
 
     Each of the best causes is taken as accepted, its size as free; then noise classes, effects and
     unknown are compared again on what it leaves. What only unknown explains there is unknown: a
@@ -118,26 +125,60 @@ def weigh_pairs(
         Of these.
     """
     score = {name: float(values[0]) for name, values in evidence.score.items()}
-    for first in _accepted(evidence, score):
+    single, best = dict(score), _best_effect(evidence)
+    given = {}
+    for first in _accepted(evidence, score, best):
         regained, beside = _given(rows, signatures, evidence, first)
         base = score[first] = score[first] + regained
-        for name, gain in beside.items():
-            if name != first:
-                label = "unknown" if name == "unknown" else _joined(evidence, first, name)
-                score[label] = np.logaddexp(score.get(label, -np.inf), base + gain)
-    values = np.array(list(score.values()))
-    share, names = np.exp(values - np.logaddexp.reduce(values)), list(score)
-    return {names[i]: float(share[i]) for i in np.argsort(-share, kind="stable")}
+        given[first] = {name: gain for name, gain in beside.items() if name != first}
+        for name, gain in given[first].items():
+            label = "unknown" if name == "unknown" else _joined(evidence, first, name)
+            score[label] = np.logaddexp(score.get(label, -np.inf), base + gain)
+    facts = _facts(rows, evidence, best)
+    return JointScore(score, single, given.get(best, {}), facts, evidence.noisy)
 
 
-def _accepted(evidence, score):
-    """The one or two best causes, probable enough to be tried together with another."""
+def weigh_pairs(
+    rows: Rows, signatures: Sequence[Signature], evidence: LabelEvidence
+) -> dict[str, float]:
+    """Probabilities of all labels, two of them together included, most probable first.
+
+    Parameters
+    ----------
+    rows : Rows
+    signatures : sequence of Signature
+    evidence : LabelEvidence
+        Of these.
+    """
+    return learned().probabilities(joint_score(rows, signatures, evidence))
+
+
+def _best_effect(evidence):
+    """The effect with the largest score, or None without any."""
+    return max(evidence.table.effects, key=lambda name: evidence.score[name][0], default=None)
+
+
+def _accepted(evidence, score, best):
+    """The best effect, and the one or two best causes, if probable enough to be tried with
+    another.
+    """
     # unknown is left out of the sum: its blocks can hold two effects that are a pair
     total = np.logaddexp.reduce([value for name, value in score.items() if name != "unknown"])
     order = [n for n in sorted(score, key=score.get, reverse=True) if n not in ("none", "unknown")]
     causes = [name for name in order if score[name] - total > np.log(1 - SETTINGS.confidence)][:2]
     noisy = evidence.noisy
-    return [name for name in causes if name not in noisy or effect_class(name).is_of_pose()]
+    causes = [name for name in causes if name not in noisy or effect_class(name).is_of_pose()]
+    return causes if best is None or best in causes else [best, *causes]
+
+
+def _facts(rows, evidence, best):
+    """What tells how evidence is to be taken."""
+    return {
+        "rough": float((rows.channel == "roughness").any()),
+        "raised": float(np.mean(evidence.observations.errors.raised >= 0)),
+        "event": float(best is not None and bool(effect_class(best).moment())),
+        "scale": float(np.log(evidence.likely_model("none").scale)),
+    }
 
 
 def _joined(evidence, *names):
@@ -207,4 +248,4 @@ def _regained(evidence, name, models, residual):
         np.logaddexp.reduce(blocks.by_model[part, 0]) - np.logaddexp.reduce(blocks.none[part, 0])
         for part in (slice(None), slice(len(known)))
     )
-    return float(block.trust * (after - before))
+    return float(after - before)

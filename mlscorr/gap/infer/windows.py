@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mlscorr.effects.vehicle import PositionNoise
-from mlscorr.gap.infer.error_models import STATED, ErrorModel, error_models, window_growth
+from mlscorr.gap.infer.error_models import ErrorModel, error_models, window_growth
 from mlscorr.gap.infer.evidence import BlockEvidence
 from mlscorr.gap.infer.noise import NoiseEvidence
 from mlscorr.gap.infer.observations import Observations, model_likelihood
@@ -118,8 +118,7 @@ def _excess(observations, residual, windows, bank):
     """
     errors, row = observations.errors, observations.row
     growth = np.hypot(window_growth(windows, errors.gps_time), errors.growth)
-    position = errors.drift + errors.jitter
-    signal = errors.drift**2 + errors.jitter**2 + errors.attitude**2 + (growth * position) ** 2
+    signal = errors.position**2 * (1 + growth**2) + errors.attitude**2
     variance = np.bincount(row, signal.sum(axis=1) + errors.own, observations.rows)[row]
     over = (residual / observations.half[:, None]) ** 2 / variance[:, None] - 1
     total = np.vstack([np.zeros(over.shape[1]), np.cumsum(over, axis=0)])
@@ -176,8 +175,7 @@ class _Search:
         """Model that explains the column best with windows. Only its own share of the evidence
         counts: what others would add is left out, to the disadvantage of windows.
         """
-        models = [model for model in error_models() if model.noise == STATED.noise]
-        return max(models, key=lambda model: self.score(model, windows))
+        return max(error_models(), key=lambda model: self.score(model, windows))
 
     def _first(self, shapes):
         """Model and window that explain the column best, from the best of each length and shape,

@@ -195,35 +195,38 @@ class Rows:
 class Background:
     """What the POS is believed to err by, in each row: one leg for each time that a row has.
 
-    The error of row i is the sum over its legs of drift . a(t) + jitter . b(t) + attitude . c(t),
-    with a, b, c (3,) processes of unit variance; the factor on each, the correlation times and
-    the family of a, b and c are for the inference to choose. As in the correction, drift and
-    attitude have one correlation time, jitter another, short one; drift starts anew where the POS
-    falls back.
+    The error of row i is the sum over its legs of position . a(t) + attitude . b(t), with a and b
+    (3,) processes of unit variance; the factor on each, the correlation times and the families
+    are for the inference to choose, and where the stated sigma is raised a factor of its own. The
+    position's error starts anew where the POS falls back.
 
     Parameters
     ----------
     row : (l,) int array
     gps_time : (l,) array
         Units: s.
-    drift, jitter, attitude : (l, 3) array
+    position, attitude : (l, 3) array
         Units: m.
     correlation_time : float
         As believed. Units: s.
     windows : tuple of (start, length, factor, shape)
         In which it is believed to be worse, see Pos.
     clock : (l,) array, optional
-        The drift's own time, which leaps where drift starts anew; gps_time by default. Units: s.
+        The position's own time, which leaps where its error starts anew; gps_time by default.
+        Units: s.
+    raised : (l,) int array, optional
+        Number of the stretch in which the stated sigma is raised, from 0; -1, as by default, where
+        it isn't.
     """
 
     row: np.ndarray
     gps_time: np.ndarray
-    drift: np.ndarray
-    jitter: np.ndarray
+    position: np.ndarray
     attitude: np.ndarray
     correlation_time: float
     windows: tuple = ()
     clock: np.ndarray | None = None
+    raised: np.ndarray | None = None
 
 
 def background(rows: Rows, survey: Survey) -> Background:
@@ -243,12 +246,12 @@ def background(rows: Rows, survey: Survey) -> Background:
     return Background(
         row,
         gps_time,
-        partials[:, :3] * sigma.drift,
-        partials[:, :3] * sigma.jitter,
+        partials[:, :3] * sigma.position,
         np.einsum("li,lij->lj", partials[:, 3:], sigma.attitude),
         survey.pos.correlation_time,
         survey.pos.windows,
         sigma.clock,
+        sigma.history.raised(gps_time),
     )
 
 

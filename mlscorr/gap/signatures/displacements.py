@@ -103,7 +103,9 @@ def _turning(before, after):
 
 
 def _motion(trajectory, time):
-    """Further covariates: roll and pitch rate (rad/s), acceleration (m/s^2), time in the pass."""
+    """Further covariates: sines of roll and pitch, their rates (rad/s), acceleration (m/s^2), time
+    in the pass.
+    """
     start, end = trajectory.passes[trajectory.segment(time)].T
     before, after = _about(trajectory, time)
     now = trajectory.at((before.gps_time + after.gps_time) / 2)
@@ -111,7 +113,10 @@ def _motion(trajectory, time):
     span = after.gps_time - before.gps_time
     moved = after.position - 2 * now.position + before.position
     forward = now.attitude.apply([0.0, 1.0, 0.0])
+    right, ahead, _ = np.moveaxis(trajectory.at(time).attitude.as_matrix(), 2, 0)
     return {
+        "roll": right[:, 2],
+        "pitch": ahead[:, 2],
         "roll_rate": turn[:, 1],
         "pitch_rate": turn[:, 0],
         "acceleration": 4 * np.einsum("ki,ki->k", moved, forward) / span**2,

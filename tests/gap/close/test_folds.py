@@ -83,7 +83,7 @@ def inference(late, label, probability, is_hidden=False):
     "What an inference says of the bed, in the parts on which the simulator's cause depends"
     verdict = GapVerdict(label, probability[label], (label,), 0.01, "", is_hidden)
     causes = tuple(late.cause(name) for name in probability if name != "unknown")
-    return Inference(verdict, causes, (), None, None, probability, late.evidence)
+    return Inference(verdict, causes, (), None, None, probability, late.evidence, None)
 
 
 @pytest.mark.parametrize("label, is_hidden, expected", [

@@ -17,7 +17,10 @@ def test_whitens_as_the_covariance_written_out_does(bed, request):
     g, signs = request.getfixturevalue(bed)
     observed = Observations.of(g.rows, g.background)
     columns = np.hstack([one.jacobian for one in signs[:8] if one.jacobian.any()])
-    others = (STATED, ErrorModel(1.5, "exponential", 0.3, 1.0, 1.6, 0.01))
+    others = (
+        STATED,
+        ErrorModel(1.5, "exponential", 0.3, (0.7, "matern32", 2.0), (2.0,), 1.6, 0.01),
+    )
     determinants = []
     for model in others:
         factor = observed.whitener(model)
@@ -65,6 +68,8 @@ def test_a_sigma_of_zero_is_refused(with_surface):
     "V must be positive definite"
     g, _ = with_surface
     exact = replace(g.rows, noise=np.zeros(len(g.rows)), survey_factor=np.zeros((len(g.rows), 3)))
-    none = replace(g.background, drift=0 * g.background.drift, attitude=0 * g.background.attitude)
+    none = replace(
+        g.background, position=0 * g.background.position, attitude=0 * g.background.attitude
+    )
     with pytest.raises(ValueError, match="sigma of zero"):
         Observations.of(exact, none).whitener()

@@ -16,5 +16,5 @@ def test_priors_are_shares():
     "Of kinds of labels, of shapes, of noise and of roughness they sum to one each"
     shares = (dict(SETTINGS.prior).values(), dict(SETTINGS.noise_scales).values(),
               dict(SETTINGS.roughness).values(), dict(SETTINGS.roughness_common).values(),
-              [shape[3] for shape in SETTINGS.shapes])  # fmt: skip
+              dict(SETTINGS.raised).values(), [shape[2] for shape in SETTINGS.shapes])  # fmt: skip
     assert [sum(share) for share in shares] == pytest.approx([1.0] * len(shares))

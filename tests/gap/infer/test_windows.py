@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import gap_features
 import numpy as np
 import pytest
 
@@ -15,6 +14,7 @@ from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.windows import models_with_windows, weigh_windows
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.train import errors, features
 
 WINDOWS = ((413215.0, 25.0), (413360.0, 30.0))  # s: one in each pass
 
@@ -22,8 +22,8 @@ WINDOWS = ((413215.0, 25.0), (413360.0, 30.0))  # s: one in each pass
 @pytest.fixture(scope="module")
 def survey():
     "Two passes with 40 targets, and errors that no covariance of the estimator describes"
-    g = gap_features.geometry(5, targets=40, patches=0, rough=False)
-    return g, gap_features.errors(g, np.random.default_rng(6), "walk")
+    g = features.geometry(5, targets=40, patches=0, rough=False)
+    return g, errors.errors(g, np.random.default_rng(6), "walk")
 
 
 def drifting(g, residual, bursts, rate=0.02):
@@ -86,7 +86,7 @@ def test_a_window_adds_its_covariance(survey):
     model = replace(STATED, windows=((*WINDOWS[0], 12.0, "rise"),))
     errors, n = observed.errors, len(observed)
     apart = errors.gps_time[:, None] - errors.gps_time
-    growth = window_growth(model.windows, errors.gps_time) * (errors.drift + errors.jitter)
+    growth = window_growth(model.windows, errors.gps_time) * errors.position
     added = (growth @ growth.T) * Covariance("matern32", SETTINGS.window_time)(apart)
     plain, wider = (
         np.linalg.inv(observed.whitener(each).solve(np.eye(n))[0]) for each in (STATED, model)

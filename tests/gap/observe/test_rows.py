@@ -39,5 +39,5 @@ def test_the_background_has_a_leg_for_each_time(survey, pairing):
     leg = np.flatnonzero(legs.row == first)
     assert len(leg) == 1
     sigma = survey.trajectory.at(rows.gps_time[[first]]).position_sigma[0]
-    total = np.sum(legs.drift[leg] ** 2 + legs.jitter[leg] ** 2)
+    total = np.sum(legs.position[leg] ** 2)
     assert total == pytest.approx(np.sum((rows.direction[first] * sigma) ** 2))

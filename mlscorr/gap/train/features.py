@@ -1,19 +1,17 @@
-"""Made-up surveys of features: a drive there and back, what a line scanner sees, and its errors.
+"""Made-up surveys of features: a drive there and back, and what a line scanner sees on it."""
 
-The drift is made by sums of sinusoids or by a random walk with bias instability through a crude
-smoother, survey and extraction errors have heavier tails than assumed; nothing is drawn from the
-estimator's model.
-"""
+from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles, to_scanner
 from mlscorr.gap.observe.assemble import assemble, sample_pulses
-from mlscorr.gap.observe.rows import Rows, SamplePulses, background
+from mlscorr.gap.observe.rows import Background, Rows, SamplePulses, background
 from mlscorr.survey import ControlPoints, Mounting, Pos, Scanner, Survey, Trajectory
 
 START, ORIGIN = 413200.0, np.array([523000.0, 3378000.0, 20.0])
@@ -21,8 +19,16 @@ STEP = 0.1  # s between epochs
 RANGE_NOISE, ANGLE_NOISE = 0.005, np.radians(0.002)
 
 
-def drive(rng, passes=2, duration=75.0):
-    """Trajectory of a road driven there and back, with bends, hills and changing speed."""
+def drive(rng: Generator, passes: int = 2, duration: float = 75.0) -> Trajectory:
+    """Trajectory of a road driven there and back, with bends, hills and changing speed.
+
+    Parameters
+    ----------
+    rng : Generator
+    passes : int
+    duration : float
+        Of a pass. Units: s.
+    """
     t = np.arange(0.0, duration, STEP)
     phase = rng.uniform(0, 2 * np.pi, 6)
     speed = 8 + 2.0 * np.sin(2 * np.pi * t / 40 + phase[0]) + np.sin(2 * np.pi * t / 17 + phase[1])
@@ -57,9 +63,9 @@ def drive(rng, passes=2, duration=75.0):
     return Trajectory(time, position, attitude)
 
 
-def seen_at(survey, place):
+def _sightings(survey, place):
     """Times at which the scan plane sweeps over places (k, 3), one a pass: index, time, pass."""
-    trajectory, found = survey.trajectory, []
+    trajectory, sightings = survey.trajectory, []
     for number in range(len(trajectory.gaps) + 1):
         epochs = np.flatnonzero(trajectory.segment(trajectory.gps_time) == number)[::2]
         time = trajectory.gps_time[epochs]
@@ -75,8 +81,8 @@ def seen_at(survey, place):
                 i = hits[np.argmin(near[k, hits])]
                 a, b = z[k, i, 2], z[k, i + 1, 2]
                 share = a / (a - b) if a != b else 0.0
-                found.append((k, time[i] + share * (time[i + 1] - time[i]), number + 1))
-    return (np.array(v) for v in zip(*found, strict=True))
+                sightings.append((k, time[i] + share * (time[i + 1] - time[i]), number + 1))
+    return (np.array(v) for v in zip(*sightings, strict=True))
 
 
 @dataclass(frozen=True)
@@ -85,13 +91,32 @@ class Geometry:
 
     survey: Survey
     rows: Rows
-    background: object
+    background: Background
 
 
-def geometry(seed, targets=40, patches=200, passes=2, rough=True, shared=False):
-    """A survey of features; the residuals are zero."""
+def geometry(
+    seed: int,
+    targets: int = 40,
+    patches: int = 200,
+    passes: int = 2,
+    rough: bool = True,
+    shared: bool = False,
+    duration: float = 75.0,
+) -> Geometry:
+    """A survey of features; the residuals are zero.
+
+    Parameters
+    ----------
+    seed, targets, patches, passes : int
+    rough : bool
+        Whether roughness is observed.
+    shared : bool
+        Whether patches are compared between two passes, instead of with a reference.
+    duration : float
+        Of a pass. Units: s.
+    """
     rng = np.random.default_rng(seed)
-    trajectory = drive(rng, passes)
+    trajectory = drive(rng, passes, duration)
     first = trajectory.segment(trajectory.gps_time) == 0
     path = trajectory.position[first]
     k = targets + patches
@@ -122,7 +147,7 @@ def geometry(seed, targets=40, patches=200, passes=2, rough=True, shared=False):
         Scanner(RANGE_NOISE, ANGLE_NOISE, 100.0),
         Pos(0.02, np.radians([0.004, 0.004, 0.01]), 30.0),
     )  # fmt: skip
-    which, time, pass_number = seen_at(survey, place)
+    which, time, pass_number = _sightings(survey, place)
     counts = 10 ** rng.uniform(3.0, 4.6, k)
     return Geometry(
         survey, *_rows(survey, place, normal, counts, which, time, pass_number, rough, shared)
@@ -164,22 +189,9 @@ def _patch_parts(survey, place, normal, counts, which, time, pass_number, rough,
         survey, np.arange(len(p)), np.ones(len(p)), place[which[p]], time[p], counts[which[p]],
         normal[which[p]],
     )  # fmt: skip
-    variance, parts = 0.002**2 + 0.005**2 / 80, []
-    if shared:
-        pairs = [np.flatnonzero(which[p] == k) for k in np.unique(which[p])]
-        one, two = np.array([pair[np.argsort(time[p][pair])] for pair in pairs if len(pair) == 2]).T
-        item = np.arange(len(one))
-        both = [
-            replace(pulses[some], item=item, weight=np.full(len(one), sign))
-            for some, sign in ((one, 1.0), (two, -1.0))
-        ]
-        parts.append(
-            assemble(
-                survey, "shared", item, time[p][one], place[which[p][one]], normal[which[p][one]],
-                np.zeros(len(one)), np.full(len(one), 2 * variance), np.full(len(one), 80),
-                SamplePulses.concatenate(both), pass_number[p][one], gps_time_2=time[p][two],
-            )
-        )  # fmt: skip
+    variance = 0.002**2 + 0.005**2 / 80
+    parts = [_shared_part(survey, place, normal, which[p], time[p], pass_number[p], pulses,
+                          variance)] if shared else []  # fmt: skip
     common = (np.arange(len(p)), time[p], place[which[p]])
     points = np.full(len(p), 80)
     if not shared:
@@ -202,43 +214,17 @@ def _patch_parts(survey, place, normal, counts, which, time, pass_number, rough,
     return parts
 
 
-def process(rng, time, kind):
-    """A drift (n,) of unit rms that no covariance of the estimator describes."""
-    t = time - time.min()
-    if kind == "sines":
-        periods = np.exp(rng.uniform(np.log(8.0), np.log(250.0), 5))
-        phases, sizes = rng.uniform(0, 2 * np.pi, 5), rng.standard_normal(5)
-        return np.sqrt(2 / 5) * np.sin(2 * np.pi * t[:, None] / periods + phases) @ sizes
-    grid = np.arange(0.0, t.max() + 1.0, 1.0)
-    walk = np.cumsum(rng.standard_normal(len(grid)))  # velocity noise, in
-    flicker = sum(np.repeat(rng.standard_normal(len(grid) // k + 1), k)[: len(grid)]
-                  for k in (4, 16, 64))  # fmt: skip
-    walk = walk / 6 + flicker
-    for fixes in (10, 25):  # a crude smoother: GNSS every so often pulls it back
-        fit = np.interp(grid, grid[::fixes], walk[::fixes])
-        walk = walk - 0.6 * fit
-    walk = np.convolve(walk, np.ones(5) / 5, mode="same")
-    return np.interp(t, grid, walk / np.sqrt(np.mean(walk**2)))
-
-
-def errors(g, rng, kind="sines", noise=True):
-    """Residuals (m,) of a survey in which no effect acts."""
-    rows, m = g.rows, len(g.rows)
-    scale = np.exp(0.2 * rng.standard_normal())
-    time = np.append(rows.gps_time, np.where(rows.two_times, rows.gps_time_2, rows.gps_time))
-    order = np.argsort(time)
-    pose = np.empty((2 * m, 6))
-    for i in range(6):
-        pose[order, i] = process(rng, time[order], kind)
-    sigma = np.append(np.full(3, g.survey.pos.position_sigma), g.survey.pos.attitude_sigma)
-    pose *= scale * sigma
-    residual = np.einsum("mi,mi->m", rows.partials, pose[:m])
-    residual += np.einsum("mi,mi->m", rows.partials_2, pose[m:])
-    k = len(rows.targets)
-    survey = rng.standard_t(5, 3 * k) * np.sqrt(3 / 5)
-    residual += rows.survey_design() @ survey
-    own = rng.standard_t(5, m) * np.sqrt(3 / 5) * np.sqrt(rows.noise)
-    rough = rows.channel == "roughness"
-    own[rough] = np.log(rng.chisquare(77, rough.sum()) / 77) + 1 / 77
-    own[rough] += 0.1 * rng.standard_normal(rough.sum())
-    return residual + own
+def _shared_part(survey, place, normal, which, time, pass_number, pulses, variance):
+    """Rows that compare the patches that both passes saw."""
+    pairs = [np.flatnonzero(which == k) for k in np.unique(which)]
+    first, second = np.array([pair[np.argsort(time[pair])] for pair in pairs if len(pair) == 2]).T
+    item = np.arange(len(first))
+    both = [
+        replace(pulses[rows], item=item, weight=np.full(len(first), sign))
+        for rows, sign in ((first, 1.0), (second, -1.0))
+    ]
+    return assemble(
+        survey, "shared", item, time[first], place[which[first]], normal[which[first]],
+        np.zeros(len(first)), np.full(len(first), 2 * variance), np.full(len(first), 80),
+        SamplePulses.concatenate(both), pass_number[first], gps_time_2=time[second],
+    )  # fmt: skip

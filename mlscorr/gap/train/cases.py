@@ -1,0 +1,222 @@
+"""Cases on which a decision is learned: nothing, noise, effects, or what no library knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.random import Generator
+
+from mlscorr.effects import EFFECTS, effect_class
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.observe.rows import Background, Rows
+from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.train.errors import process
+from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
+from mlscorr.gap.train.worlds import World
+from mlscorr.simulate.mechanisms import load_mechanisms, training_mechanisms
+from mlscorr.survey import Survey
+
+SHARES = {  # of cases: as the blind check's, with more noise, of which there are fewer names
+    **{"clean": 0.22, "noise": 0.12, "single": 0.34, "pair": 0.10, "withheld": 0.10},
+    "outside": 0.12,
+}
+SIZES = {  # MDB, between which sizes are drawn evenly by their logs
+    **{"single": (1.0, 8.0), "pair": (2.0, 6.0), "withheld": (2.0, 8.0), "outside": (2.0, 8.0)},
+    "noise": (1.0, 8.0),
+}
+ATTEMPTS = 12  # effects or mechanisms, where the geometry shows none
+LIKENESS = 0.8  # squared correlation with an effect above which a mechanism is that effect
+DRIFTS = 0.3  # share of cases of position noise in which drift is larger than stated
+SYSTEMATIC = tuple(kind.name for kind in EFFECTS if not kind.is_scatter())
+RANDOM = tuple(kind.name for kind in EFFECTS if kind.random)
+
+
+@dataclass(frozen=True)
+class TrainingCase:
+    """A survey to be diagnosed, and what acts on it.
+
+    Parameters
+    ----------
+    kind : str
+        One of SHARES.
+    names : tuple of str
+        Effects, noise, or the mechanism.
+    mdb : float
+    rows : Rows
+    background : Background
+    survey : Survey
+    signatures : tuple of Signature
+        What the library has.
+    likeness : dict
+        Of one effect or mechanism: squared correlation with each effect of the whole library.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    mdb: float
+    rows: Rows
+    background: Background
+    survey: Survey
+    signatures: tuple[Signature, ...]
+    likeness: dict[str, float]
+
+    @property
+    def truth(self) -> str:
+        """The label that is right."""
+        if self.kind in ("withheld", "outside"):
+            return "unknown"
+        return "+".join(self.names) or "none"
+
+
+def known_mechanisms(path: Path | None = None) -> dict[str, Callable]:
+    """Mechanisms on which a decision may be learned: half of the grammar, and those of a file.
+
+    Parameters
+    ----------
+    path : Path, optional
+        File with MECHANISMS, LEADS and UNITS.
+    """
+    known: dict[str, Callable] = {each.name: each for each in training_mechanisms()}
+    return known if path is None else known | load_mechanisms(path).MECHANISMS
+
+
+def draw_case(
+    world: World,
+    rng: Generator,
+    mechanisms: dict[str, Callable],
+    kind: str | None = None,
+    mdb: float | None = None,
+) -> TrainingCase:
+    """TrainingCase in a world; a clean one where the geometry shows nothing of what was drawn.
+
+    Parameters
+    ----------
+    world : World
+    rng : Generator
+    mechanisms : dict of functions
+        Of RecordedPoints, size and generator, by name.
+    kind : str, optional
+        One of SHARES; drawn by default.
+    mdb : float, optional
+        Size in minimal detectable biases; drawn by default.
+    """
+    drawn = str(rng.choice(list(SHARES), p=list(SHARES.values()))) if kind is None else kind
+    rows, background, survey = world.errors(rng)
+    case = TrainingCase(drawn, (), 0.0, rows, background, survey, world.signatures, {})
+    if drawn == "clean":
+        return case
+    low, high = np.log(SIZES[drawn])
+    size = float(np.exp(rng.uniform(low, high))) if mdb is None else mdb
+    ruler = Ruler.of(rows, survey)
+    acted = {"noise": _noisy, "outside": _moved}.get(drawn, _changed)(
+        case, ruler, rng, size, mechanisms
+    )
+    return replace(case, kind="clean") if acted is None else acted
+
+
+def _changed(case, ruler, rng, size, _):
+    """The case with one effect or two at finite size; without it in the library if withheld."""
+    number, names, shift = 2 if case.kind == "pair" else 1, [], 0.0
+    like: dict = {}
+    for _ in range(ATTEMPTS):
+        name = str(rng.choice(SYSTEMATIC))
+        drawn = None if name in names else draw_effect(ruler, effect_class(name), size, rng)
+        if drawn is None or drawn.mdb < 0.99 * size:
+            continue
+        known = likeness(ruler, drawn.shift, case.signatures)
+        if any(known.get(other, 0.0) > SETTINGS.same for other in names):
+            continue
+        shift = shift + Bench(case.rows, case.survey).change(drawn.effect).shift
+        names, like = [*names, name], known
+        if len(names) == number:
+            break
+    else:
+        return None
+    without = names[0] if case.kind == "withheld" else None
+    return replace(
+        case, names=tuple(names), mdb=size, likeness=like,
+        rows=replace(case.rows, residual=case.rows.residual + shift),
+        signatures=tuple(sign for sign in case.signatures if sign.name != without),
+    )  # fmt: skip
+
+
+def _moved(case, ruler, rng, size, mechanisms):
+    """The case with a mechanism that no library knows, unlike all effects."""
+    for _ in range(ATTEMPTS):
+        name, chance = str(rng.choice(list(mechanisms))), int(rng.integers(2**32))
+
+        def move(points, name=name, chance=chance):
+            return mechanisms[name](points, 1.0, np.random.default_rng(chance))
+
+        shift = shift_by(ruler, move)
+        unit = ruler.size(shift)
+        if unit < 1e-9:
+            continue
+        like = likeness(ruler, shift, case.signatures)
+        if max(like.values(), default=0.0) < LIKENESS:
+            shift *= float(rng.choice([-1, 1])) * size / unit
+            rows = replace(case.rows, residual=case.rows.residual + shift)
+            return replace(case, names=(name,), mdb=size, rows=rows, likeness=like)
+    return None
+
+
+def _noisy(case, ruler, rng, size, _):
+    """The case with noise, which the scatter of points shows too."""
+    shown = RANDOM if (case.rows.channel == "roughness").any() else ("position_noise",)
+    for _ in range(ATTEMPTS):
+        name = str(rng.choice(shown))  # without roughness the stated noise holds all of a row's own
+        if name == "position_noise" and rng.random() < DRIFTS:
+            return _drifting(case, rng, size)
+        drawn = draw_effect(ruler, effect_class(name), size, rng)
+        if drawn is None or drawn.mdb < 0.99 * size:
+            continue
+        rows = case.rows
+        if effect_class(name).is_of_pose():
+            shift, extra = _of_pose(case, drawn.effect, rng), 0.0
+        else:
+            change = Bench(rows, case.survey).change(drawn.effect, rng)
+            own = np.sqrt(change.variance) * rng.standard_normal(len(rows))
+            shift, extra = own + np.log1p(change.growth) + change.shift, change.variance
+        rows = replace(rows, residual=rows.residual + shift, noise=rows.noise + extra)
+        return replace(case, names=(name,), mdb=size, rows=rows)
+    return None
+
+
+def _of_pose(case, effect, rng):
+    """What a noisy position makes of residuals (m,)."""
+    rows, path = case.rows, case.survey.trajectory
+    moved = effect.apply(path, rows.reference, rng).position - path.position
+    return _by_position(rows, lambda time: np.column_stack(
+        [np.interp(time, path.gps_time, column) for column in moved.T]
+    ))  # fmt: skip
+
+
+def _drifting(case, rng, size):
+    """The case with drift that is larger than stated: everywhere, or in a stretch of time."""
+    rows, trajectory = case.rows, case.survey.trajectory
+    time = rows.gps_time[rows.metric]
+    start, length = float(rng.choice(time)), float(rng.uniform(15.0, 50.0))
+    everywhere = rng.random() < 0.5
+    sigma = trajectory.position_sigma.mean() * (2.0 + size) * (1.0 if everywhere else 2.0)
+    grid = np.arange(trajectory.gps_time[0], trajectory.gps_time[-1] + 1.0, 1.0)
+    drift = np.column_stack([process(rng, grid, str(rng.choice(["sines", "walk"])))
+                             for _ in range(3)])  # fmt: skip
+    if not everywhere:  # grows until GNSS is back
+        part = (grid - start) / length
+        drift *= np.where((part >= 0) & (part < 1), 2.0 * part, 0.0)[:, None]
+    shift = sigma * _by_position(rows, lambda at: np.column_stack(
+        [np.interp(at, grid, column) for column in drift.T]
+    ))  # fmt: skip
+    rows = replace(rows, residual=rows.residual + shift)
+    return replace(case, names=("position_noise",), mdb=size, rows=rows)
+
+
+def _by_position(rows, moved):
+    """Shift (m,) of the residuals by an error of the position in time."""
+    shift = np.einsum("mi,mi->m", rows.partials[:, :3], moved(rows.gps_time))
+    second = np.where(rows.two_times, rows.gps_time_2, rows.gps_time)
+    return shift + np.einsum("mi,mi->m", rows.partials_2[:, :3], moved(second))

@@ -1,0 +1,85 @@
+"""Errors of made-up surveys of features, of which none is drawn from the estimator's model.
+
+The drift is made by sums of sinusoids or by a random walk with bias instability through a crude
+smoother; survey and extraction errors often have heavier tails than assumed.
+"""
+
+import numpy as np
+from numpy.random import Generator
+
+from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.train.features import Geometry
+
+
+def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
+    """A drift (n,) of unit rms that no covariance of the estimator describes.
+
+    Parameters
+    ----------
+    rng : Generator
+    time : (n,) array
+        Units: s.
+    kind : str
+        sines or walk.
+    """
+    t = time - time.min()
+    if kind == "sines":
+        periods = np.exp(rng.uniform(np.log(8.0), np.log(250.0), 5))
+        phases, sizes = rng.uniform(0, 2 * np.pi, 5), rng.standard_normal(5)
+        return np.sqrt(2 / 5) * np.sin(2 * np.pi * t[:, None] / periods + phases) @ sizes
+    grid = np.arange(0.0, t.max() + 1.0, 1.0)
+    walk = np.cumsum(rng.standard_normal(len(grid)))  # velocity noise, in
+    flicker = sum(np.repeat(rng.standard_normal(len(grid) // k + 1), k)[: len(grid)]
+                  for k in (4, 16, 64))  # fmt: skip
+    walk = walk / 6 + flicker
+    for fixes in (10, 25):  # a crude smoother: GNSS every so often pulls it back
+        fit = np.interp(grid, grid[::fixes], walk[::fixes])
+        walk = walk - 0.6 * fit
+    walk = np.convolve(walk, np.ones(5) / 5, mode="same")
+    return np.interp(t, grid, walk / np.sqrt(np.mean(walk**2)))
+
+
+def errors(g: Geometry, rng: Generator, kind: str = "sines") -> np.ndarray:
+    """Residuals (m,) of a survey in which no effect acts.
+
+    Parameters
+    ----------
+    g : Geometry
+    rng : Generator
+    kind : str
+        sines or walk.
+    """
+    rows, m = g.rows, len(g.rows)
+    scale = np.exp(0.2 * rng.standard_normal())
+    time = np.append(rows.gps_time, np.where(rows.two_times, rows.gps_time_2, rows.gps_time))
+    order = np.argsort(time)
+    pose = np.empty((2 * m, 6))
+    for i in range(6):
+        pose[order, i] = process(rng, time[order], kind)
+    sigma = np.append(np.full(3, g.survey.pos.position_sigma), g.survey.pos.attitude_sigma)
+    pose *= scale * sigma
+    residual = np.einsum("mi,mi->m", rows.partials, pose[:m])
+    residual += np.einsum("mi,mi->m", rows.partials_2, pose[m:])
+    return residual + scatter(rows, rng)
+
+
+def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:
+    """Errors (m,) of the survey of targets and of each row's own.
+
+    Parameters
+    ----------
+    rows : Rows
+    rng : Generator
+    heavy : bool
+        Whether these have the tails of Student's t with five degrees of freedom.
+    """
+
+    def draw(n):
+        return rng.standard_t(5, n) * np.sqrt(3 / 5) if heavy else rng.standard_normal(n)
+
+    survey = draw(3 * len(rows.targets))
+    own = draw(len(rows)) * np.sqrt(rows.noise)
+    rough = rows.channel == "roughness"
+    own[rough] = np.log(rng.chisquare(77, rough.sum()) / 77) + 1 / 77
+    own[rough] += 0.1 * rng.standard_normal(rough.sum())
+    return rows.survey_design() @ survey + own

@@ -1,0 +1,117 @@
+"""What a diagnosis weighs in many made-up surveys, kept in files: fitting again takes seconds."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.gap.infer.decision import JointScore
+from mlscorr.gap.infer.labels import weigh_labels
+from mlscorr.gap.infer.verdict import joint_score
+from mlscorr.gap.train.cases import draw_case
+from mlscorr.gap.train.worlds import World
+
+
+@dataclass(frozen=True)
+class Record:
+    """One case: what acted, and what the evidence was.
+
+    Parameters
+    ----------
+    world : int
+        Seed.
+    is_open : bool
+        Whether GNSS was never missing.
+    kind : str
+        clean, noise, single, pair, withheld or outside.
+    truth : str
+        The label that is right.
+    mdb : float
+        Size in minimal detectable biases.
+    p_value : float or None
+        Of none, from replicas, where there were any.
+    joint : JointScore
+    """
+
+    world: int
+    is_open: bool
+    kind: str
+    truth: str
+    mdb: float
+    p_value: float | None
+    joint: JointScore
+
+    def is_right(self, label: str) -> bool:
+        """Whether a label is the truth."""
+        return sorted(label.split("+")) == sorted(self.truth.split("+"))
+
+
+def collect(
+    folder: Path,
+    seeds: Iterable[int],
+    cases: int,
+    mechanisms: dict[str, Callable],
+    replicas: int = 0,
+    progress: Callable[[str], None] = print,
+) -> list[Record]:
+    """Records of worlds; those that the folder has already are read.
+
+    Parameters
+    ----------
+    folder : Path
+    seeds : iterable of int
+        One of each world.
+    cases : int
+        In each world.
+    mechanisms : dict of functions
+        That no library knows, by name.
+    replicas : int
+        For p-values of clean surveys; none by default.
+    progress : function
+        Is told of each world that is done.
+    """
+    folder, records = Path(folder), []
+    folder.mkdir(parents=True, exist_ok=True)
+    for seed in seeds:
+        path = folder / f"{seed}.json"
+        if not path.exists():
+            text = json.dumps([vars(r) | {"joint": vars(r.joint)}
+                               for r in _records(seed, cases, mechanisms, replicas)])  # fmt: skip
+            part = folder / f".{seed}.part"
+            part.write_text(text + "\n", encoding="utf-8")
+            os.replace(part, path)
+            progress(f"world {seed}: {cases} cases")
+        records += read_records(path)
+    return records
+
+
+def read_records(path: Path) -> list[Record]:
+    """Records of one world.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    known = json.loads(Path(path).read_text(encoding="utf-8"))
+    return [Record(**{**each, "joint": JointScore(**each["joint"])}) for each in known]
+
+
+def _records(seed, cases, mechanisms, replicas):
+    """Records of a world that is made anew."""
+    world = World.random(seed)
+    for number in range(cases):
+        rng = np.random.default_rng([seed, 1, number])
+        case = draw_case(world, rng, mechanisms)
+        drawn = replicas if case.kind == "clean" else 0
+        evidence = weigh_labels(
+            case.rows, case.background, case.survey, case.signatures, rng, drawn
+        )
+        joint = joint_score(case.rows, case.signatures, evidence)
+        joint = JointScore(**{**vars(joint), "noisy": sorted(joint.noisy)})
+        p = evidence.p_value if drawn else None
+        yield Record(seed, world.is_open, case.kind, case.truth, case.mdb, p, joint)

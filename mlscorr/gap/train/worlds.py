@@ -1,0 +1,134 @@
+"""Made-up surveys of features with errors of all sorts: worlds on which a decision is learned.
+
+A world is a drive with targets and patches, what a scanner sees of them, and a sky. Its errors come
+from simulated sensors, from sums of sinusoids, or from a random walk through a crude smoother,
+where survey and extraction often have heavier tails than assumed: nothing is drawn from the
+estimator's model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+
+from mlscorr.gap.observe.rows import Background, Rows, background
+from mlscorr.gap.signatures.signatures import Signature, signatures
+from mlscorr.gap.train.errors import process, scatter
+from mlscorr.gap.train.features import Geometry, geometry
+from mlscorr.simulate.pos import PosError, pos_error
+from mlscorr.simulate.scenario import PosScenario
+from mlscorr.survey import Survey, Trajectory
+
+KINDS = ("sensors", "sensors", "sines", "walk")  # of errors, drawn evenly
+RECORDINGS = 6  # of a world's sensors: each costs a fifth of a diagnosis
+SCALE = 0.2  # of the log of the ratio of error to stated sigma: good software knows its noise
+RAISED = (0.3, 0.4)  # mean and spread of the same in outages, where it knows less (pos_study.py)
+
+
+@dataclass(frozen=True)
+class World:
+    """A geometry with its signatures and its sky.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    signatures : tuple of Signature
+    recordings : tuple of (Survey, PosError)
+        What sensors made of the drive, and by how much that is wrong.
+    is_open : bool
+        Whether no stretch lacks GNSS.
+    heavy : bool
+        Whether survey and extraction have heavy tails.
+    """
+
+    geometry: Geometry
+    signatures: tuple[Signature, ...]
+    recordings: tuple[tuple[Survey, PosError], ...]
+    is_open: bool
+    heavy: bool
+
+    @classmethod
+    def random(cls, seed: int) -> World:
+        """World of a seed."""
+        rng = np.random.default_rng([seed, 0])
+        shared, targets = bool(rng.random() < 0.4), int(rng.integers(14, 45))
+        passes = 2 if shared or rng.random() < 0.6 else 1
+        patches = int(rng.integers(60, 220)) if shared or rng.random() < 0.7 else 0
+        made = geometry(
+            seed, targets, patches, passes, rough=bool(patches and rng.random() < 0.8),
+            shared=shared, duration=float(rng.uniform(45.0, 80.0)),
+        )  # fmt: skip
+        is_open = bool(rng.random() < 0.5)
+        scenario = _scenario(rng, made.survey.trajectory, is_open)
+        recordings = tuple(_recorded(made.survey, scenario, rng) for _ in range(RECORDINGS))
+        signs, _ = signatures(made.rows, made.survey)
+        return cls(made, signs, recordings, is_open, bool(rng.random() < 0.5))
+
+    def errors(self, rng: Generator) -> tuple[Rows, Background, Survey]:
+        """Rows in which no effect acts, and the survey that states what they err by.
+
+        Parameters
+        ----------
+        rng : Generator
+        """
+        rows, kind = self.geometry.rows, str(rng.choice(KINDS))
+        survey, error = self.recordings[rng.integers(len(self.recordings))]
+        m, known = len(rows), survey.trajectory.gps_time
+        time = np.append(rows.gps_time, np.where(rows.two_times, rows.gps_time_2, rows.gps_time))
+        if kind == "sensors":
+            pose = _interpolated(time, known, np.hstack([error.position, error.attitude]))
+        else:
+            sigmas = np.hstack([error.position_sigma, error.attitude_sigma])
+            pose = _interpolated(time, known, sigmas) * np.exp(SCALE * rng.standard_normal())
+            pose[:, :3] *= self._growth(rng, time, survey)[:, None]
+            order = np.argsort(time)
+            for i in range(6):
+                pose[order, i] *= process(rng, time[order], kind)
+        attitude = survey.trajectory.at(time).attitude
+        pose[:, 3:] = attitude.apply(pose[:, [4, 3, 5]] * [1.0, 1.0, -1.0])  # about body axes
+        residual = np.einsum("mi,mi->m", rows.partials, pose[:m])
+        residual += np.einsum("mi,mi->m", rows.partials_2, pose[m:])
+        rows = replace(rows, residual=residual + scatter(rows, rng, self.heavy))
+        return rows, background(rows, survey), survey
+
+    def _growth(self, rng, time, survey):
+        """Factor (n,) on sigma where it is raised: a POS knows its outages, not its errors."""
+        sigma = np.linalg.norm(survey.trajectory.position_sigma, axis=1)
+        raised = np.interp(time, survey.trajectory.gps_time, sigma) > 2 * np.percentile(sigma, 5)
+        return np.where(raised, np.exp(RAISED[0] + RAISED[1] * rng.standard_normal()), 1.0)
+
+
+def _scenario(rng, trajectory, is_open):
+    """Sensors and sky: under a bad one there is a canyon or an outage in some pass."""
+    length = float(np.diff(trajectory.passes[0])[0])
+    span = float(rng.uniform(6.0, 25.0))
+    spans = ((float(rng.uniform(0.0, max(length - span, 1.0))), span),)
+    outage = bool(rng.random() < 0.4)
+    return PosScenario(
+        grade="mems" if rng.random() < 0.2 else "tactical",
+        processing="filtered" if rng.random() < 0.15 else "smoothed",
+        outages=spans if outage and not is_open else (),
+        canyons=spans if not outage and not is_open else (),
+    )
+
+
+def _recorded(survey, scenario, rng):
+    """The survey as sensors record it, and their error."""
+    true, parts = survey.trajectory, []
+    for start, end in true.passes:
+        inside = (true.gps_time >= start) & (true.gps_time <= end)
+        single = Trajectory(true.gps_time[inside], true.position[inside], true.attitude[inside])
+        parts.append(pos_error(single, scenario, rng))
+    columns = ("position", "attitude", "position_sigma", "attitude_sigma")
+    error = PosError(*(np.concatenate([getattr(p, name) for p in parts]) for name in columns))
+    recorded = replace(
+        true, position=true.position + error.position,
+        position_sigma=error.position_sigma, attitude_sigma=error.attitude_sigma,
+    )  # fmt: skip
+    return replace(survey, trajectory=recorded), error
+
+
+def _interpolated(time, known, columns):
+    return np.column_stack([np.interp(time, known, column) for column in columns.T])

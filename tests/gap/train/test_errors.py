@@ -1,0 +1,40 @@
+"""Errors of made-up surveys."""
+
+import numpy as np
+import pytest
+
+from mlscorr.gap.train.errors import errors, process, scatter
+from mlscorr.gap.train.features import geometry
+
+
+@pytest.fixture(scope="module")
+def small():
+    "Two passes, 14 targets and 30 planes that both saw"
+    return geometry(3, targets=14, patches=30, shared=True, duration=45.0)
+
+
+@pytest.mark.parametrize("kind", ["sines", "walk"])
+def test_drift_has_unit_size_and_is_no_white_noise(kind):
+    "Its rms over many drives is one within a third, and neighbours agree"
+    time = 413200.0 + np.arange(0.0, 150.0, 0.5)
+    drifts = [process(np.random.default_rng(seed), time, kind) for seed in range(40)]
+    assert np.sqrt(np.mean(np.square(drifts))) == pytest.approx(1.0, rel=0.35)
+    steps = np.diff(drifts, axis=1)
+    assert np.std(steps) < 0.5
+
+
+def test_residuals_are_as_large_as_stated(small):
+    "Centimetres on targets: drift of 2 cm, survey and extraction of millimetres"
+    metric = small.rows.metric
+    sizes = [np.std(errors(small, np.random.default_rng(seed))[metric]) for seed in range(8)]
+    assert 0.008 < np.median(sizes) < 0.04
+
+
+def test_scatter_has_its_stated_variance_with_light_and_heavy_tails(small):
+    "Survey and extraction errors, over many draws, within a tenth"
+    target = small.rows.channel == "target"
+    stated = np.sqrt((small.rows.noise + small.rows.survey)[target].mean())
+    for heavy in (False, True):
+        rng = np.random.default_rng(1)
+        drawn = [scatter(small.rows, rng, heavy)[target] for _ in range(200)]
+        assert np.std(drawn) == pytest.approx(stated, rel=0.1)

@@ -1,0 +1,41 @@
+"""Worlds with errors of all sorts."""
+
+import numpy as np
+import pytest
+
+from mlscorr.gap.train.worlds import World
+
+
+@pytest.fixture(scope="module")
+def world():
+    "A world under a bad sky"
+    return World.random(2)
+
+
+def test_errors_are_as_large_as_the_sensors_state(world):
+    "Over ten surveys the residuals of targets lie within a factor of three of what is stated"
+    ratios = []
+    for seed in range(10):
+        rows, background, _ = world.errors(np.random.default_rng(seed))
+        target = rows.channel == "target"
+        variance = rows.noise + rows.survey
+        legs = background.position**2 + background.attitude**2
+        np.add.at(variance, background.row, legs.sum(axis=1))
+        ratios.append(np.sqrt(np.mean(rows.residual[target] ** 2) / np.mean(variance[target])))
+    assert 1 / 3 < np.median(ratios) < 3
+
+
+def test_a_bad_sky_raises_the_stated_sigma(world):
+    "Some looks lie in a stretch where sigma is raised, most don't"
+    _, background, survey = world.errors(np.random.default_rng(1))
+    assert not world.is_open
+    assert 0 < np.mean(background.raised >= 0) < 0.6
+    sigma = np.linalg.norm(survey.trajectory.position_sigma, axis=1)
+    assert sigma.max() > 2 * np.percentile(sigma, 5)
+
+
+def test_the_same_seed_gives_the_same_world(world):
+    "Residuals to the last bit"
+    again = World.random(2)
+    one, two = (each.errors(np.random.default_rng(5))[0].residual for each in (world, again))
+    assert np.array_equal(one, two)
