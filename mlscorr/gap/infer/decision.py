@@ -199,10 +199,10 @@ class LearnedDecision:
         share: dict[str, float] = {}
         for kind, probability in zip(KINDS, self.by_kind(joint), strict=True):
             labels = joint.of_kind(kind)
-            factor, even = self.sharpness.get(kind, (1.0, 0.0))
+            factor, floor = self.sharpness.get(kind, (1.0, 0.0))
             score = factor * np.array(list(labels.values()))
             parts = np.exp(score - np.logaddexp.reduce(score)) if len(score) else score
-            parts = (1.0 - even) * parts + even / max(len(score), 1)
+            parts = (1.0 - floor) * parts + floor / max(len(score), 1)
             share |= dict(zip(labels, probability * parts, strict=True))
         return {name: float(share[name]) for name in sorted(share, key=lambda n: -share[n])}
 

@@ -17,7 +17,7 @@ from mlscorr.gap.train.records import Record
 
 PENALTIES = (0.01, 0.03, 0.1, 0.3, 1.0)  # inverse ones of squared weights, chosen out of fold
 SHARPNESS = np.linspace(0.2, 1.5, 27)  # factors on scores within a kind that are tried
-EVEN = (0.002, 0.01, 0.03, 0.06, 0.1, 0.2)  # shares of what no evidence tells that are tried
+SHARES = (0.002, 0.01, 0.03, 0.06, 0.1, 0.2)  # shares of what no evidence tells that are tried
 FOLDS = 8  # of worlds
 BINS = 5  # of the stated probability, as in the blind check
 
@@ -85,15 +85,15 @@ def _sharpness(records):
             if true:
                 of_kind.append((true[0], np.array(list(scores.values()))))
         if of_kind:
-            best[kind] = max(product(SHARPNESS, EVEN), key=lambda pair: _fit_of(of_kind, *pair))
-    return {kind: (float(factor), float(even)) for kind, (factor, even) in best.items()}
+            best[kind] = max(product(SHARPNESS, SHARES), key=lambda pair: _fit_of(of_kind, *pair))
+    return {kind: (float(factor), float(floor)) for kind, (factor, floor) in best.items()}
 
 
-def _fit_of(of_kind, factor, even):
+def _fit_of(of_kind, factor, floor):
     """Log of the probability of true labels among their kind."""
     shares = [np.exp(factor * true - np.logaddexp.reduce(factor * s)) for true, s in of_kind]
     number = np.array([len(scores) for _, scores in of_kind])
-    return float(np.log((1 - even) * np.array(shares) + even / number).sum())
+    return float(np.log((1 - floor) * np.array(shares) + floor / number).sum())
 
 
 def _out_of_fold(records, penalty):
