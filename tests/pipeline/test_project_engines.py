@@ -17,10 +17,11 @@ from tests.beds.places import ROOT
 
 CLUSTER = """
 from distributed import LocalCluster
-from tests.pipeline.test_project_engines import squares
+from tests.pipeline.test_project_engines import lose_a_worker, squares
 if __name__ == "__main__":
     with LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
         squares({folder!r}, scheduler=cluster.scheduler_address)
+        lose_a_worker({folder!r}, cluster.scheduler_address)
 """
 
 
@@ -61,6 +62,16 @@ def squares(folder, workers=1, scheduler=None):
     return run
 
 
+def lose_a_worker(folder, scheduler):
+    "A cluster does again what a worker was at that ended, and none was lost before"
+    with engine(scheduler=scheduler) as chosen:
+        assert chosen.lost == 0
+        run = Run(TaskStore(Path(folder)), chosen, lambda outcome: None)
+        mark = Path(folder) / "mark"
+        assert run.results([task(7, end_at_first, mark)]) == {"end_at_first-7": 49}
+        assert chosen.lost == 1
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_tasks_that_fail_end_no_run(tmp_path, workers):
     "The results of all others, in the order of their tasks, and the sentence of the one"
@@ -83,7 +94,7 @@ def test_a_lost_worker_is_counted_and_its_task_done_again(tmp_path):
 
 
 def test_a_cluster_works_on_tasks(tmp_path):
-    "Workers of dask.distributed give the same results and failures"
+    "Workers of dask.distributed give the same results and failures; one that is lost is counted"
     pytest.importorskip("distributed", reason="pip install 'mlscorr[cluster]' tests clusters")
     script = tmp_path / "cluster.py"
     script.write_text(CLUSTER.format(folder=str(tmp_path / "tasks")))

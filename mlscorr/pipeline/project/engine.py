@@ -19,7 +19,10 @@ class Engine(Protocol):
     """Works on calls by an Executor, which may lose a worker."""
 
     width: int  # calls at a time
-    lost: int  # workers so far
+
+    @property
+    def lost(self) -> int:
+        """Number of workers so far that ended without an answer."""
 
     def submit(self, function: Callable, *arguments: object) -> Future:
         """The Future of a call."""
@@ -140,22 +143,18 @@ class Cluster:
                 f"No scheduler answers at {scheduler} ({error}). Start one with dask scheduler, "
                 "and give the address that it prints."
             ) from None
-        self.lost, workers = 0, self._client.scheduler_info(n_workers=-1)["workers"]
-        self._present = set(workers)
-        if not workers:
+        self.width = sum(self._client.nthreads().values())
+        if self.width == 0:
             self.close()
             raise ValueError(
                 f"The scheduler at {scheduler} has no worker. Start some, as dask worker "
                 f"{scheduler} --nworkers 8 --nthreads 1, or let its cluster scale."
             )
-        self.width = sum(worker["nthreads"] for worker in workers.values())
+        self._gone = self._removed()
         self._executor = self._client.get_executor(pure=False)
 
     def submit(self, function: Callable, *arguments: object) -> Future:
-        """The Future of a call; workers that have gone since the last one are counted."""
-        present = set(self._client.scheduler_info(n_workers=-1)["workers"])
-        self.lost += len(self._present - present)
-        self._present = present
+        """The Future of a call."""
         return self._executor.submit(_in_single_threads, function, *arguments)
 
     def is_lost(self, error: BaseException) -> bool:
@@ -163,6 +162,16 @@ class Cluster:
         from distributed import KilledWorker
 
         return isinstance(error, KilledWorker)
+
+    @property
+    def lost(self) -> int:
+        """Workers that nobody sent away since this began."""
+        return self._removed() - self._gone
+
+    def _removed(self):
+        events = [event for _, event in self._client.get_events("all")]
+        removed = [event for event in events if event.get("action") == "remove-worker"]
+        return sum(not event.get("expected", False) for event in removed)
 
     def close(self) -> None:
         """Leave the cluster as it is."""
