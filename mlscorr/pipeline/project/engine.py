@@ -64,6 +64,7 @@ class Processes:
     def __init__(self, width: int) -> None:
         self.width, self.lost = width, 0
         self._executor: Executor | None = None
+        self._others = {*multiprocessing.active_children()}
 
     def submit(self, function: Callable, *arguments: object) -> Future:
         """The Future of a call."""
@@ -85,10 +86,13 @@ class Processes:
         return isinstance(error, BrokenProcessPool)
 
     def close(self) -> None:
-        """End the processes, without what they have not begun."""
+        """End the processes, whatever they are at."""
         if self._executor is not None:
-            self._executor.shutdown(wait=True, cancel_futures=True)
+            self._executor.shutdown(wait=False, cancel_futures=True)
             self._executor = None
+            for process in {*multiprocessing.active_children()} - self._others:
+                process.terminate()  # what it is at is whole or not there
+                process.join()
 
 
 def _in_single_threads(function, *arguments):
