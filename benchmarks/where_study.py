@@ -2,7 +2,7 @@
 
     OMP_NUM_THREADS=1 python benchmarks/where_study.py [--seeds 6] [--seed 9000] [--size 4]
 
-Made-up surveys of features (gap_features.py) in which something acts in one stretch of time, way,
+Made-up surveys of features in which something acts in one stretch of time, way,
 range, incidence or scan angle alone: events of the library, a POS that is worse for a while, and
 mechanisms that no library knows. Of each the stretch that is told of that covariate is compared
 with the true one, in which it is half as large as at its largest or larger: intersection over
@@ -13,13 +13,13 @@ import argparse
 from dataclasses import replace
 
 import numpy as np
-from gap_features import errors, process
 from gap_mechanisms import sized
 from gap_study import Bed
 
 from mlscorr.gap.infer.causes import infer_causes
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.displacements import displacements
+from mlscorr.gap.train.errors import errors, process
 
 HALF = np.sqrt(2 * np.log(2))  # of a Gaussian's sigma, at which it is half as large
 BANDS = {  # direction of the error, covariate, share of the rows, times the size, by name

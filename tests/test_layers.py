@@ -3,6 +3,8 @@
 import ast
 import subprocess
 import sys
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -194,3 +196,25 @@ def test_the_simulator_does_not_know_the_estimator():
 def test_open3d_is_loaded_only_to_cast_rays():
     "Importing the simulator or the report does not load Open3D"
     assert "open3d" not in loaded_by("import mlscorr.simulate, mlscorr.report")
+
+
+def test_studies_import_what_there_is():
+    "A benchmark whose library moved under it would be found by nobody until its figure is needed"
+    folder = PACKAGE.parent / "benchmarks"
+    lacking = []
+    for path in sorted(folder.glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.ImportFrom) or node.module is None:
+                continue
+            own = folder / f"{node.module}.py"
+            if node.module.split(".")[0] == "mlscorr":
+                module = import_module(node.module)
+                lacking += [
+                    f"{path.name}: {node.module}.{alias.name}"
+                    for alias in node.names
+                    if not hasattr(module, alias.name)
+                    and find_spec(f"{node.module}.{alias.name}") is None
+                ]
+            elif find_spec(node.module.split(".")[0]) is None and not own.exists():
+                lacking.append(f"{path.name}: {node.module}")
+    assert not lacking

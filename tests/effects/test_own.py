@@ -5,6 +5,7 @@ import pytest
 
 from mlscorr.effects import catalogue, effect_class, register_file
 from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.train.features import geometry
 
 CLASS = """
 from dataclasses import dataclass
@@ -72,11 +73,9 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 ])  # fmt: skip
 def test_an_effect_that_cannot_be_applied_is_left_out(tmp_path, name, body, said):
     "It changes nothing, everything, into no numbers, or raises: the reason is said"
-    import gap_features
-
     file = written(tmp_path, name, body)
     kinds = register_file(file)
-    g = gap_features.geometry(3, targets=6, patches=10)
+    g = geometry(3, targets=6, patches=10)
     with np.errstate(invalid="ignore"):
         signs, left_out = signatures(g.rows, g.survey, kinds)
     assert signs == ()
