@@ -33,8 +33,8 @@ def distorted(site, ranges, scale):
 
 
 def calibrated(seed, ranges=0.0, scale=0.0):
-    "Site, calibrations of 16 targets and 100 ties without and with the scanner's own errors"
-    site = tied_site(seed, targets=16)
+    "Site, calibrations of 16 targets and 30 ties without and with the scanner's own errors"
+    site = tied_site(seed, targets=16, number=30)
     matched, ties = distorted(site, ranges, scale)
     alone = estimate_mounting(site.trajectory, RECORDED, matched)
     tied = calibration_with_ties(alone, matched, ties)
@@ -51,7 +51,7 @@ def test_what_ranges_or_encoder_lack_is_found_and_the_mounting_freed_of_it(range
     assert lacks.sigma[0] < 0.01 and lacks.sigma[1] < 5e-4  # m, ratio
     errors = [np.abs(c.lsc.correction - site.lacks) for c in (tied, freed)]
     assert (errors[1] < 3 * freed.lsc.sigma).all()
-    assert np.degrees(errors[1][3:].max()) < 0.01  # deg
+    assert np.degrees(errors[1][3:].max()) < 0.02  # deg
     assert "The scanner itself is off" in freed.warnings[-1]
 
 
