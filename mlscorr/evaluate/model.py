@@ -3,7 +3,8 @@
 import numpy as np
 
 from mlscorr.estimate import COMPONENTS, Estimate
-from mlscorr.survey import Trajectory
+from mlscorr.pos import stated_sigma
+from mlscorr.survey import Survey, Trajectory
 
 
 def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[str, object]:
@@ -49,19 +50,25 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
     }
 
 
-def largest_sigma(trajectory: Trajectory) -> dict[str, float] | None:
+def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[str, float] | None:
     """3D sigma of a trajectory's position in m: ``median``, ``largest``, and the latter's ``time``.
 
     Parameters
     ----------
     trajectory : Trajectory
         None is told of one without sigmas.
+    survey : Survey, optional
+        As recorded: then ``stated``, the median by its POS, stands beside them.
     """
     if trajectory.position_sigma is None:
         return None
     sigma = np.linalg.norm(trajectory.position_sigma, axis=1)
     time = float(trajectory.gps_time[sigma.argmax()])
-    return {"median": float(np.median(sigma)), "largest": float(sigma.max()), "time": time}
+    result = {"median": float(np.median(sigma)), "largest": float(sigma.max()), "time": time}
+    if survey is not None:
+        stated = stated_sigma(survey.trajectory, survey.pos).position
+        result["stated"] = float(np.median(np.linalg.norm(stated, axis=1)))
+    return result
 
 
 def _observations(estimate):

@@ -296,5 +296,5 @@ class CorrectedSurvey(Summary):
             coverage=Coverage(self.estimate.span, longest),
             support=self.estimate.support,
             ties=self.tie_section,
-            position_sigma=largest_sigma(self.trajectory),
+            position_sigma=largest_sigma(self.trajectory, self.survey),
         )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from mlscorr.evaluate.rows import PointCounts
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.tables import length_in_words, percent, verdict
@@ -201,6 +203,9 @@ def _weakest(report):
     They are no matter where their sigma is below the largest residual that the verdict rests on.
     """
     weak = report.support.weak
+    if not weak and report.points("control").scored == 0:
+        sentence = "Control points of other drives hold the whole drive, through ties."
+        return Statement("Weakest", "amber", sentence)
     if not weak:
         return Statement("Weakest", "green", "Control points hold the whole drive.")
     largest, after = max(stretch.sigma for stretch in weak), report.judgement[1]
@@ -246,7 +251,12 @@ def _sigma(report) -> Iterator[Statement]:
             f"{length_in_words(sigma['median'])} at half of the epochs: one sigma in 3D of the "
             "corrected position."
         )
-        yield Statement("Sigma", "green", sentence)
+        stated = sigma.get("stated", np.inf)
+        if sigma["median"] <= stated:
+            yield Statement("Sigma", "green", sentence)
+        else:
+            sentence += f" The POS states {length_in_words(stated)} of the recorded one."
+            yield Statement("Sigma", "amber", sentence)
 
 
 def warning_statements(warnings: Iterable[str]) -> Iterator[Statement]:

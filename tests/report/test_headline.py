@@ -122,3 +122,23 @@ def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_w
         )  # fmt: skip
         assert row.rating == rating
         assert row.items[0][0] == "50.0 to 61.5 s, 300 to 360 m of the way"
+
+
+def test_a_sigma_beyond_what_the_pos_states_is_amber():
+    "Metres along half of the way where centimetres are stated: the correction is hardly one"
+    report = replace(fabricate(drive())[2], support=Support())
+    for stated, rating in ((6.0, "green"), (0.03, "amber")):
+        sigma = {"median": 5.3, "largest": 13.0, "time": 413_205.0, "stated": stated}
+        rows = statements(replace(report, position_sigma=sigma))
+        (row,) = (row for row in rows if row.what == "Sigma")
+        assert row.rating == rating
+        assert ("The POS states 3.0 cm" in row.sentence) == (rating == "amber")
+
+
+def test_a_drive_without_control_of_its_own_is_not_held_by_it():
+    "What other drives carry to it through ties is said as that"
+    report = fabricate(drive())[2]
+    rows = [row for row in report.targets if row.role == "check"]
+    report = replace(report, targets=rows, support=Support())
+    (row,) = (row for row in statements(report) if row.what == "Weakest")
+    assert row.rating == "amber" and "of other drives" in row.sentence
