@@ -67,6 +67,20 @@ def worked(out):
     return [(word[2].rstrip(":"), word[3]) for word in words if word[2].endswith("s:")]
 
 
+def test_a_project_is_no_better_than_its_drives(corrected):
+    "Its rating is the worst of theirs, and each that isn't green is named with the reason"
+    result, _ = corrected
+    order = ("green", "amber", "red")
+    content = result.document
+    ratings = {row["name"]: row["rating"] for row in content["drives"]}
+    assert content["rating"] == max(ratings.values(), key=order.index) != "green"
+    (doubts,) = (row for row in content["statements"] if row["what"] == "Doubts")
+    assert {item["name"] for item in doubts["items"]} == {
+        name for name, rating in ratings.items() if rating != "green"
+    }
+    assert all(item["text"] for item in doubts["items"])
+
+
 def test_ties_carry_control_to_a_drive_without_any(project, corrected):
     "A drive that is 43 cm off, and sees no control, comes to within a fifth of that, by ties alone"
     result, out = corrected

@@ -176,6 +176,7 @@ def _statements(project, rows, drives, faults):
         "green" if len(used) == len(project.control) else "amber",
         f"{len(used)} of {len(project.control)} surveyed control points are used.",
     )
+    yield from _minded(rows, [report for _, report in drives])
     if faults:
         yield _statement(
             "Failures",
@@ -184,6 +185,27 @@ def _statements(project, rows, drives, faults):
             "--resume does what is missing.",
             [(fault["name"], fault["fault"]) for fault in faults],
         )
+
+
+def _minded(rows, reports):
+    """A statement on drives whose own first screen isn't green: the worst of each, red first."""
+    from mlscorr.report.headline import NAMED
+
+    doubts = []
+    for row, report in zip(rows, reports, strict=True):
+        facts = [fact for fact in report["statements"] if fact["rating"] == row["rating"]]
+        why = facts[0]["sentence"] if facts else row["meaning"]
+        if facts and facts[0]["what"] == "Warnings":  # whose sentence counts them alone
+            why = facts[0]["items"][0]["text"]
+        doubts.append((row["rating"], row["name"], why))
+    doubts = [doubt for doubt in doubts if doubt[0] != "green"]
+    if doubts:
+        doubts.sort(key=lambda doubt: -_worst(doubt[0]))
+        more = len(doubts) - NAMED
+        items = [(name, why) for _, name, why in doubts[:NAMED]]
+        items += [("", f"and {more} more")] if more > 0 else []
+        sentence = f"{len(doubts)} of {len(rows)} drives have something to mind."
+        yield _statement("Doubts", doubts[0][0], sentence, items)
 
 
 def _lost(number):
