@@ -43,9 +43,9 @@ def case(bed, rng, kind, name, m):
         return expected(rows, g.survey, effects).shift
 
     evidence = inference.evidence
-    closure = close_gap(rows, used, g.survey, bed.signs, evidence, cause, simulated, rng)
-    observed = Observations.of(rows, background(rows, g.survey))
     found = FoundCause(rows, used, g.survey, bed.signs, evidence, cause)
+    closure = close_gap(found, simulated, rng)
+    observed = Observations.of(rows, background(rows, g.survey))
     folds = make_folds(found, observed, evidence.likely_model(cause.effect), simulated, rng)
     truth = [_gone(bed, shift, p.shift) for p in (folds.whole, *folds.predicted)]
     return {

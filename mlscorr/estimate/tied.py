@@ -217,12 +217,17 @@ def robust_ties(
         That these chose.
     ties : TieEquations
     """
-    tied = replace(equations, ties=ties)
+    least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)  # of a tie that holds
+    tied = graduated(equations, parameters, ties)
+    held = np.count_nonzero(tied.ties.weight > least)
+    if held == len(ties):
+        return tied, parameters
     prior = Objective((), tied.prior(tied))
     believed = prior.parameters(INTEGRATED, prior.initial)
-    weighed = [(graduated(equations, each, ties), each) for each in (parameters, believed)]
-    least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)  # of a tie that holds
-    return max(weighed, key=lambda pair: np.count_nonzero(pair[0].ties.weight > least))
+    other = graduated(equations, believed, ties)
+    if np.count_nonzero(other.ties.weight > least) > held:
+        return other, believed
+    return tied, parameters
 
 
 def graduated(equations: Equations, parameters: SignalParameters, ties: TieEquations) -> Equations:

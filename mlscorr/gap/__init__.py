@@ -15,6 +15,7 @@ from mlscorr.gap.close import (
     Beams,
     BeamSimulator,
     Closure,
+    FoundCause,
     Surroundings,
     cause_for_simulator,
     close_gap,

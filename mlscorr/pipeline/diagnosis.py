@@ -14,6 +14,7 @@ from mlscorr.gap import (
     Absence,
     Closure,
     Costs,
+    FoundCause,
     Inference,
     NextData,
     Rows,
@@ -115,9 +116,8 @@ def diagnose(
     )
     step(2)
     cause, change = cause_for_simulator(part, signs_of_part, inference), compared.simulated
-    closure = close_gap(
-        observed, used, believed, signs, inference.evidence, cause, change, rng, step
-    )
+    case = FoundCause(observed, used, believed, signs, inference.evidence, cause)
+    closure = close_gap(case, change, rng, step)
     labels = [n for n in (*inference.verdict.set, *inference.same) if n != "unknown"]
     plan = next_data(part, believed, library, tuple(dict.fromkeys(labels)), inference.separability)
     plan = (*_looks_again(absence), *plan)
@@ -235,12 +235,35 @@ class DiagnosedSurvey(Summary):
         Exception
             As ``CorrectedSurvey.write`` does.
         """
-        from mlscorr.report.gap import diagnosis_page
+        return write_diagnosis(out, self.document, self.survey, self.improved, overwrite)
 
-        content = self.document
-        page = diagnosis_page(content, self.survey.name)
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
-            write_json(folder / "gap.json", content)
-            page.write(folder / "gap.html")
-            write_simulator(self.improved, folder / "simulator.toml")
-        return content
+
+def write_diagnosis(
+    out: Path, content: dict, survey: Survey, simulator: Simulator, overwrite: bool
+) -> dict:
+    """Write gap.json, gap.html and simulator.toml, and return the document.
+
+    Parameters
+    ----------
+    out : Path
+    content : dict
+        The document of gap.json.
+    survey : Survey
+    simulator : Simulator
+        With what was found.
+    overwrite : bool
+        An older folder.
+
+    Raises
+    ------
+    Exception
+        As ``CorrectedSurvey.write`` does.
+    """
+    from mlscorr.report.gap import diagnosis_page
+
+    page = diagnosis_page(content, survey.name)
+    with output_folder(out, survey.inputs, overwrite) as folder:
+        write_json(folder / "gap.json", content)
+        page.write(folder / "gap.html")
+        write_simulator(simulator, folder / "simulator.toml")
+    return content

@@ -10,10 +10,9 @@ import numpy as np
 
 from mlscorr.effects import Effect
 from mlscorr.gap.close import LoneEffect, lone_effects
-from mlscorr.io.output import output_folder, write_json
-from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose
+from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.simulate.simulator_file import Simulator, write_simulator
+from mlscorr.simulate.simulator_file import Simulator
 from mlscorr.survey import Survey
 
 
@@ -87,15 +86,9 @@ class DiagnosedRounds:
         Exception
             As ``CorrectedSurvey.write`` does.
         """
-        from mlscorr.report.gap import diagnosis_page
-
-        content, survey = self.document, self.rounds[0].survey
-        page = diagnosis_page(content, survey.name)
-        with output_folder(out, survey.inputs, overwrite) as folder:
-            write_json(folder / "gap.json", content)
-            page.write(folder / "gap.html")
-            write_simulator(self.rounds[-1].improved, folder / "simulator.toml")
-        return content
+        return write_diagnosis(
+            out, self.document, self.rounds[0].survey, self.rounds[-1].improved, overwrite
+        )
 
 
 def diagnose_until_none(

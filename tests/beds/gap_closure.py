@@ -66,10 +66,7 @@ class Bed:
 
     def close(self, label, simulated=None):
         simulated, rng = simulated or self.simulated, np.random.default_rng(2)
-        f = self.found(self.cause(label))
-        return close_gap(
-            f.rows, f.used, f.survey, f.signatures, f.evidence, f.cause, simulated, rng
-        )
+        return close_gap(self.found(self.cause(label)), simulated, rng)
 
     def folds(self, cause, simulated=None, progress=None):
         simulated, rng = simulated or self.simulated, np.random.default_rng(2)

@@ -5,7 +5,7 @@ simulator runs again with it, and the gap is measured where its size was not loo
 points are never looked at but here.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,10 +15,8 @@ from mlscorr.gap.close.folds import FoundCause, Simulated, make_folds
 from mlscorr.gap.close.over_sigma import OverSigma, errors_over_sigma
 from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.gap.close.systematic import SystematicGap, share_gone
-from mlscorr.gap.infer.causes import Cause
 from mlscorr.gap.infer.error_models import ErrorModel
 from mlscorr.gap.infer.evidence import ColumnTable, column_table, nuisance_columns
-from mlscorr.gap.infer.labels import LabelEvidence
 from mlscorr.gap.infer.measure import (
     UNITS,
     Predicted,
@@ -32,8 +30,6 @@ from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.gap.infer.tails import without_tails
 from mlscorr.gap.infer.unknown import unknown_blocks
 from mlscorr.gap.observe.rows import Rows, background
-from mlscorr.gap.signatures.signatures import Signature
-from mlscorr.survey import Survey
 
 
 @dataclass(frozen=True)
@@ -93,12 +89,7 @@ class Closure:
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def close_gap(
-    rows: Rows,
-    used: np.ndarray,
-    survey: Survey,
-    signatures: Sequence[Signature],
-    evidence: LabelEvidence,
-    cause: Cause,
+    case: FoundCause,
     simulated: Simulated,
     rng: np.random.Generator,
     progress: Callable[[int], None] | None = None,
@@ -107,27 +98,16 @@ def close_gap(
 
     Parameters
     ----------
-    rows : Rows
-        All of them, check points too.
-    used : (m,) bool array
-        False for those of check points.
-    survey : Survey
-        With what the simulator believes.
-    signatures : sequence of Signature
-        Of all rows.
-    evidence : LabelEvidence
-        Of the used rows.
-    cause : Cause
-        From them.
+    case : FoundCause
     simulated : function of a tuple of Effect, or (m,) array
         What the simulator, run again with these too, adds to the rows' residuals: (m,); or what its
         next run added, whatever was changed in it.
     rng : numpy.random.Generator
     progress : function of a number of steps, one in all, optional
     """
-    kind = gap_kind(cause.effect, evidence.noisy, rows)
+    rows, used, cause = case.rows, case.used, case.cause
+    kind = gap_kind(cause.effect, case.evidence.noisy, rows)
     unit = UNITS[kind]
-    case = FoundCause(rows, used, survey, signatures, evidence, cause)
     ruler = _Ruler.of(kind, case, cause.probability if callable(simulated) else 0.0)
     folds = make_folds(case, ruler.observations, ruler.model, simulated, rng, progress)
     held = ruler.compare(folds, rng)
