@@ -72,7 +72,7 @@ def write_corrected(
     OSError
         When the target cannot be written.
     """
-    return write_parts([CorrectedPart(cloud_file, correction, sigma)], target, watch)[0]
+    return write_parts([CorrectedPart(cloud_file, correction, sigma, watch)], target)[0]
 
 
 @dataclass(frozen=True)
@@ -82,14 +82,15 @@ class CorrectedPart:
     Parameters
     ----------
     file : CloudFile
-        All of the file, or those of one of several scanners.
-    correction, sigma
+        All of the file, or those of one of several scanners or drives.
+    correction, sigma, watch
         As of write_corrected.
     """
 
     file: CloudFile
     correction: SupportsApply
     sigma: PointSigma | None = None
+    watch: Callable[[np.ndarray], object] | None = None
 
     def move(self, layout: LasLayout, records: np.ndarray, sigmas: np.ndarray | None) -> int:
         """Correct its points among records in place; returns those outside the trajectory.
@@ -114,21 +115,19 @@ class CorrectedPart:
             sigmas[rows] = self.sigma.of_integers(xyz, *scaled)
         if not isinstance(rows, slice):  # which is a view
             records[rows] = some
+        if self.watch is not None and len(some):
+            self.watch(some["gps_time"] + self.file.time_constant)
         return outside
 
 
-def write_parts(
-    parts: Sequence[CorrectedPart],
-    target: str | Path,
-    watch: Callable[[np.ndarray], object] | None = None,
-) -> list[int]:
+def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]:
     """Copy a file whose points several scanners measured, as write_corrected does.
 
     Parameters
     ----------
     parts : sequence of CorrectedPart
         Of one file; with sigmas, or without.
-    target, watch
+    target : path
         As of write_corrected.
 
     Returns
@@ -143,7 +142,7 @@ def write_parts(
     """
     layout, target = read_layout(parts[0].file.path), Path(target)
     _check_target(layout.path, target)
-    constant, has_sigmas = parts[0].file.time_constant, parts[0].sigma is not None
+    has_sigmas = parts[0].sigma is not None
     with output_file(target) as copy:
         with _Output(copy) as output, open(layout.path, "rb") as file:
             written = add_sigma_fields(layout) if has_sigmas else layout
@@ -159,8 +158,6 @@ def write_parts(
                 high = np.maximum(high, [records[name].max() for name in "XYZ"])
                 raw = records.view(np.uint8) if sigmas is None else with_sigmas(records, sigmas)
                 output.encode(encoder.compress_many, raw)
-                if watch is not None:
-                    watch(records["gps_time"] + constant)
             output.encode(encoder.done)
             _finish(written, head, np.stack([high, low]), file, output)
         _check_copy(layout, copy)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from mlscorr.io.nearness import check_together
 from mlscorr.io.project_sections import ProjectFile
 from mlscorr.io.projection import check_crs
 from mlscorr.io.survey_file import SurveyParts, read_parts, read_survey_file, survey_toml
-from mlscorr.io.survey_paths import existing, matching
+from mlscorr.io.survey_paths import check_distinct, existing, matching
 from mlscorr.io.survey_sections import CloudSection, SurveyFile
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory_sessions import check_systems
@@ -34,11 +35,14 @@ class DriveParts:
     name : str
     parts : SurveyParts
     notes : tuple of str
+    ids : tuple of int, optional
+        The point_source_ids of its points, where files hold those of other drives, too.
     """
 
     name: str
     parts: SurveyParts
     notes: tuple[str, ...] = ()
+    ids: tuple[int, ...] | None = None
 
     @property
     def trajectory(self) -> Trajectory:
@@ -167,7 +171,9 @@ def _drive(path, settings, name, section):
         files = CloudSection(files=section.files, gps_time=settings.cloud.gps_time)
         given = {"name": name, "crs": settings.crs, "cloud": files} | shared | own
         own_settings = SurveyFile(trajectory=section.trajectory, **given)
-        return DriveParts(name, read_parts(path, own_settings))
+        return DriveParts(
+            name, read_parts(path, own_settings), ids=_ids(path, name, section, own_settings)
+        )
     toml = survey_toml(path.parent / section.survey)
     stated = read_survey_file(toml)
     given = {n: getattr(settings, n) for n in BELIEFS if n in settings.model_fields_set}
@@ -180,22 +186,48 @@ def _drive(path, settings, name, section):
             )
         notes.append(f"Control points are those of the project, not {stated.control.file}.")
     whole = stated.model_copy(update={**given, "control": None, "name": name})
-    return DriveParts(name, read_parts(toml, whole), tuple(notes))
+    ids = _ids(path, name, section, whole)
+    return DriveParts(name, read_parts(toml, whole), tuple(notes), ids)
+
+
+def _ids(path, name, section, settings):
+    """The point_source_ids of a drive; None where all points of its files are its."""
+    ids = section.point_source_ids
+    if ids is None:
+        return None
+    if isinstance(settings.scanner, list) and any(s.point_source_ids for s in settings.scanner):
+        raise ValueError(
+            f"point_source_ids of drive {name} in {path} tell its points, and those of its "
+            "[[scanner]] which scanner measured them: an id can't tell both. Write the points of "
+            "each scanner, or of each drive, into files of their own."
+        )
+    return tuple(sorted(set(ids)))
 
 
 def _check_tiles(path, settings, drives):
-    """Refuse a tile of no drive, and one of two."""
-    owners: dict[Path, list[str]] = {}
+    """Refuse a tile of no drive, and one of two whose points nothing tells apart."""
+    owners: dict[Path, list[DriveParts]] = {}
     for drive in drives:
         for file in drive.parts.files.clouds:
-            owners.setdefault(file.resolve(), []).append(drive.name)
-    if shared := {file: own for file, own in owners.items() if len(own) > 1}:
-        file, own = next(iter(shared.items()))
+            owners.setdefault(file.resolve(), []).append(drive)
+    shared = {file: own for file, own in owners.items() if len(own) > 1}
+    if doubtful := [file for file, own in shared.items() if any(d.ids is None for d in own)]:
+        names = " and ".join(drive.name for drive in shared[doubtful[0]])
         raise ValueError(
-            f"{len(shared)} of {len(owners)} cloud files of {path} are of two drives (first: "
-            f"{file}, of {' and '.join(own)}), and each file is of one. Where a tile holds the "
-            "points of several, split it by drive first, as by point_source_id."
+            f"{len(doubtful)} of {len(owners)} cloud files of {path} are of two drives (first: "
+            f"{doubtful[0]}, of {names}), and nothing tells whose their points are. Name each in "
+            "one [[drive]], or give each drive its point_source_ids."
         )
+    for file, own in shared.items():
+        number, count = Counter(number for drive in own for number in drive.ids).most_common(1)[0]
+        if count > 1:
+            names = " and ".join(drive.name for drive in own if number in drive.ids)
+            raise ValueError(
+                f"point_source_id {number} of {file} is of drives {names} in {path}: each point is "
+                "of one."
+            )
+    if shared:
+        check_distinct(path, [*shared])
     named = [f for name in settings.cloud.files or () for f in matching(path, "cloud.files", name)]
     if orphans := [file for file in named if file.resolve() not in owners]:
         raise ValueError(

@@ -10,6 +10,7 @@ from mlscorr.io.survey_sections import (
     CalibratedMountingSection,
     ControlSection,
     MatchingSection,
+    PointSource,
     PosSection,
     Scanners,
     ScannerSection,
@@ -19,7 +20,8 @@ from mlscorr.io.survey_sections import (
 from mlscorr.io.toml_file import TomlSection
 
 FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system
-RESERVED = ("tasks", "log.txt", "project.json", "project.html")  # beside the drives
+SHARED_TILES = "tiles"  # folder of the corrected files of more than one drive
+RESERVED = ("tasks", SHARED_TILES, "log.txt", "project.json", "project.html")  # beside the drives
 
 
 class TilesSection(TomlSection):
@@ -35,6 +37,7 @@ class DriveSection(TomlSection):
     name: Annotated[str, Field(min_length=1)] | None = None
     survey: str | None = None
     files: Annotated[list[str], Field(min_length=1)] | None = None
+    point_source_ids: Annotated[list[PointSource], Field(min_length=1)] | None = None
     trajectory: Trajectories | None = None
     mounting: CalibratedMountingSection | None = None
     scanner: Scanners | None = None

@@ -2,13 +2,13 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mlscorr.io.control import NO_POINTS, holds_points, read_control_list
 from mlscorr.io.conversion import conversion_notes
 from mlscorr.io.inputs import input_file
-from mlscorr.io.las import spread_times
+from mlscorr.io.las import read_chunks, spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
@@ -267,7 +267,11 @@ def survey_toml(path: str | Path) -> Path:
 
 
 def cloud_file(
-    path: Path, trajectory: Trajectory, setting: str, crs: str | None
+    path: Path,
+    trajectory: Trajectory,
+    setting: str,
+    crs: str | None,
+    ids: tuple[int, ...] | None = None,
 ) -> tuple[CloudFile, str]:
     """CloudFile of a path, and the sentence on its time system.
 
@@ -279,6 +283,8 @@ def cloud_file(
         cloud.gps_time of survey.toml.
     crs : str or None
         That of survey.toml, which can be used.
+    ids : tuple of int, optional
+        Only the points with these point_source_ids are of the trajectory.
 
     Raises
     ------
@@ -291,9 +297,13 @@ def cloud_file(
         Where the file states another CRS.
     """
     layout = read_layout(path)
-    times = spread_times(layout)[1]
+    file = CloudFile(path, layout.points, 0.0, "", ids)
+    records = spread_records(layout)[1]
+    times = records["gps_time"][file.rows(records["point_source_id"])]
+    if not len(times) and (chunk := next(read_chunks(file), None)) is not None:  # too few of them
+        times = chunk.gps_time
     match = match_times(path.name, times, layout.is_standard, trajectory, setting)
     if crs is not None and (conflict := crs_conflict(layout, crs)):
         warnings.warn(conflict, stacklevel=3)
-    file = CloudFile(path, layout.points, match.constant, match.cloud_system)
+    file = replace(file, time_constant=match.constant, time_system=match.cloud_system)
     return file, f"gps_time of {path.name}: {match}."

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from mlscorr.correction import PointSigma
+from mlscorr.correction import Correction, PointSigma
 from mlscorr.estimate import Support
 from mlscorr.evaluate.scores import Correcting
 from mlscorr.io.conversion import written_name
@@ -22,7 +22,6 @@ def write_clouds(
     folder: Path,
     correction: Correcting | Mapping[str, Correcting],
     watch: Callable[[np.ndarray], object],
-    sigma: Callable[[Survey], PointSigma] | None = None,
 ) -> list[tuple[Path, int, int]]:
     """Write a survey's clouds into a folder, under their names, as LAZ what was no LAS.
 
@@ -32,9 +31,7 @@ def write_clouds(
     folder : Path
     correction : anything with ``apply(cloud) -> cloud``, or that of each scanner by its name
     watch : function of gps_time (n,)
-        Is told the times of the points that were just written.
-    sigma : function, optional
-        ``sigma(survey)`` of a scanner gives PointSigma; each point gets three fields more.
+        Is told the times of the points that are written.
 
     Returns
     -------
@@ -43,14 +40,13 @@ def write_clouds(
     """
     parts: dict[Path, list[CorrectedPart]] = {}
     for name, part in survey.by_scanner.items():
-        sigmas = sigma and sigma(part)
         moved = correction[name] if isinstance(correction, Mapping) else correction
         for file in part.clouds:
-            parts.setdefault(file.path, []).append(CorrectedPart(file, moved, sigmas))
+            parts.setdefault(file.path, []).append(CorrectedPart(file, moved, watch=watch))
     written = []
     for source, some in parts.items():
         path = folder / written_name(source)
-        outside = write_parts(some, path, watch)
+        outside = write_parts(some, path)
         written.append((path, sum(part.file.points for part in some), sum(outside)))
     return written
 
@@ -75,6 +71,16 @@ class WrittenClouds:
     uncontrolled: int = 0
     extrapolated: int = 0
 
+    def below(self, folder: str) -> WrittenClouds:
+        """The same, with names of files in a folder.
+
+        Parameters
+        ----------
+        folder : str
+        """
+        rows = tuple((f"{folder}/{name}", content, points) for name, content, points in self.files)
+        return replace(self, files=rows)
+
     @classmethod
     def join(cls, parts: Iterable[WrittenClouds]) -> WrittenClouds:
         """Those of some files together.
@@ -92,33 +98,86 @@ class WrittenClouds:
         )
 
 
-def write_counted(
-    survey: Survey,
-    folder: Path,
-    correction: Correcting,
-    held: tuple[tuple[float, float], Support],
-    done: Callable[[int], object],
-    sigma: Callable[[Survey], PointSigma] | None = None,
-) -> WrittenClouds:
-    """Write a survey's clouds, and count the points that nothing holds.
+@dataclass(frozen=True)
+class MovedClouds:
+    """Clouds of a survey, how they are corrected, and what holds that.
 
     Parameters
     ----------
-    survey, folder, correction, sigma
-        As of write_clouds.
+    survey : Survey
+    correction : Correction
     held : pair of (float, float) and Support
         First and last control epoch (s), and what holds the correction along the drive.
-    done : function of a number of points
     """
+
+    survey: Survey
+    correction: Correction
+    held: tuple[tuple[float, float], Support]
+
+    def parts(
+        self, watch: Callable[[np.ndarray], object], with_sigma: bool
+    ) -> Iterator[CorrectedPart]:
+        """The points of each file and scanner.
+
+        Parameters
+        ----------
+        watch : function of gps_time (n,)
+        with_sigma : bool
+            Whether each point gets its sigmas.
+        """
+        for part in self.survey.by_scanner.values():
+            of_part = self.correction, part.scanner, part.mounting
+            sigma = PointSigma.of(*of_part) if with_sigma else None
+            for file in part.clouds:
+                yield CorrectedPart(file, self.correction, sigma, watch)
+
+
+def write_counted(
+    drives: Sequence[MovedClouds], folder: Path, done: Callable[[int], object], with_sigma: bool
+) -> list[WrittenClouds]:
+    """Write the clouds of drives, a file of several once, and count the points that nothing holds.
+
+    Parameters
+    ----------
+    drives : sequence of MovedClouds
+        One, or several that share files.
+    folder : Path
+    done : function of a number of points
+    with_sigma : bool
+        Whether each point gets three fields more: its sigmas.
+
+    Returns
+    -------
+    list of WrittenClouds
+        Of each drive, with the numbers of its own points.
+    """
+    counts = [np.zeros(2, int) for _ in drives]
+    parts: dict[Path, list[tuple[int, CorrectedPart]]] = {}
+    for number, drive in enumerate(drives):
+        for part in drive.parts(_counting(drive.held, counts[number], done), with_sigma):
+            parts.setdefault(part.file.path, []).append((number, part))
+    rows: list[list] = [[] for _ in drives]
+    for source, some in parts.items():
+        path = folder / written_name(source)
+        outside = write_parts([part for _, part in some], path)
+        content = sha256(path)
+        for number in dict.fromkeys(number for number, _ in some):
+            own = [place for place, (owner, _) in enumerate(some) if owner == number]
+            points = sum(some[place][1].file.points for place in own)
+            rows[number].append((path.name, content, points, sum(outside[place] for place in own)))
+    return [
+        WrittenClouds(tuple(row[:3] for row in own), sum(row[3] for row in own), *count.tolist())
+        for own, count in zip(rows, counts, strict=True)
+    ]
+
+
+def _counting(held, counts, done):
+    """A function of gps_time that counts, and tells how many there were."""
     (first, last), support = held
-    counts = np.zeros(2, int)
 
     def watch(times):
         is_outside = (times < first) | (times > last)
-        is_weak = support.contains(times)
-        counts[:] += np.count_nonzero([is_outside, is_weak], axis=1)
+        counts[:] += np.count_nonzero([is_outside, support.contains(times)], axis=1)
         done(len(times))
 
-    written = write_clouds(survey, folder, correction, watch, sigma)
-    files = tuple((path.name, sha256(path), points) for path, points, _ in written)
-    return WrittenClouds(files, sum(outside for _, _, outside in written), *counts.tolist())
+    return watch

@@ -23,7 +23,7 @@ from mlscorr.io.result_tables import write_targets_csv
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.io.trajectory_exports import check_exports, export_trajectory
 from mlscorr.io.weak_files import write_weak
-from mlscorr.pipeline.clouds import WrittenClouds, write_counted
+from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Survey, Trajectory
 from mlscorr.survey.data_frame import rows_frame
@@ -183,8 +183,8 @@ class CorrectedSurvey(Summary):
         check_exports(trajectories, self.survey.crs, is_read=True)
         with output_folder(out, self.survey.inputs, overwrite) as folder:
             done = (progress or silent)("Writing the cloud", self.survey.points)
-            moved = self.survey, folder, self.estimate.correction, self.held
-            written = write_counted(*moved, done, self.point_sigma if sigma else None)
+            moved = MovedClouds(self.survey, self.estimate.correction, self.held)
+            (written,) = write_counted([moved], folder, done, sigma)
             return self.write_beside(folder, written, progress, page, trajectories)
 
     @property

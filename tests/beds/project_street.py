@@ -71,6 +71,32 @@ def write_project(folder, duration=8.0, tiles=1):
     return folder / "project.toml"
 
 
+def share_tiles(folder):
+    "The tiles of both drives as tiles of the project, whose points point_source_ids tell apart"
+    names = sorted(path.name for path in (folder / "first").glob("*.laz"))
+    (folder / "tiles").mkdir()
+    for name in names:
+        first, second = (laspy.read(folder / drive / name) for drive in ("first", "second"))
+        points = np.concatenate([first.points.array, second.points.array])
+        points["point_source_id"] = np.repeat([1, 2], [len(first), len(second)])
+        number = np.concatenate([np.arange(len(first)), np.arange(len(second))])
+        order = np.argsort(number // 1000, kind="stable")  # now of the one, now of the other
+        whole = laspy.LasData(first.header)
+        whole.points = laspy.ScaleAwarePointRecord(
+            points[order], first.header.point_format, first.header.scales,
+            first.header.offsets,
+        )  # fmt: skip
+        whole.write(folder / "tiles" / name)
+        (folder / "first" / name).unlink()
+        (folder / "second" / name).unlink()
+    text = PROJECT.replace('survey = "first"', 'survey = "first"\npoint_source_ids = [1]')
+    text = text.replace('["second/*.laz"]', '["tiles/*.laz"]\npoint_source_ids = [2]')
+    (folder / "project.toml").write_text(text)
+    survey = folder / "first" / "survey.toml"
+    survey.write_text(survey.read_text().replace('"*.laz"', '"../tiles/*.laz"'))
+    return folder / "project.toml"
+
+
 def error(rows):
     "What the second drive's record is off (n, 3). Units: m"
     return np.broadcast_to(SHIFT, (len(rows), 3))

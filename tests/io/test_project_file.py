@@ -10,6 +10,14 @@ TRAJECTORY = "gps_time,easting,northing,height,roll,pitch,heading\n" + "".join(
 DRIVE = (
     '[[drive]]\nname = "{0}"\nfiles = ["{0}/*.laz"]\n\n[drive.trajectory]\nfile = "{0}/way.csv"\n'
 )
+IDS = DRIVE.replace('"{0}/*.laz"', '"a/*.laz"').replace('"]\n\n', '"]\npoint_source_ids = {1}\n\n')
+SCANNER = """
+[[drive.scanner]]
+point_source_ids = [1]
+
+[[drive.scanner]]
+point_source_ids = [2]
+"""
 SURVEY = '{}[cloud]\nfiles = ["*.laz"]\n\n[trajectory]\nfile = "way.csv"\n'
 
 
@@ -47,7 +55,9 @@ def test_drives_are_read_by_their_files(city):
     [
         ([DRIVE.format("a"), DRIVE.format("a")], "names of their own"),
         ([DRIVE.format("a"), DRIVE.format("b").replace("b/*", "a/*")], "of two drives"),
-        ([DRIVE.format("a").replace('name = "a"', 'name = "tasks"')], "can't be a folder"),
+        ([DRIVE.format("a").replace('name = "a"', 'name = "tiles"')], "can't be a folder"),
+        ([IDS.format("a", "[1, 2]"), IDS.format("b", "[2]")], "point_source_id 2 of .* of one"),
+        ([IDS.format("a", "[1]") + SCANNER, IDS.format("b", "[2]")], "can't tell both"),
         (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "are of no drive"),
         ([DRIVE.format("a").replace("a/*.laz", "s3://bucket/a.laz")], "are addresses"),
         (['[[drive]]\nname = "a"\n'], "give a drive its survey"),

@@ -122,6 +122,45 @@ def test_workers_change_no_byte(project, corrected, tmp_path):
         assert (tmp_path / "out" / drive / "report.html").is_file()
 
 
+def test_tiles_of_two_drives_are_told_apart_by_point_source_id(project, corrected, tmp_path):
+    "Each point moves as in a tile of its drive alone, and a tile keeps all of its points"
+    result, separate = corrected
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    bed.share_tiles(folder)
+    out = tmp_path / "out"
+    shared = correct_project(folder, out, QUICK)
+    assert shared.is_whole
+    for name in ("tile-1.laz", "tile-2.laz"):
+        tile = laspy.read(out / "tiles" / name)
+        assert len(tile) == len(laspy.read(folder / "tiles" / name))
+        for number, drive in enumerate(("first", "second"), start=1):
+            own = tile.xyz[np.asarray(tile.point_source_id) == number]
+            assert np.abs(own - laspy.read(separate / drive / name).xyz).max() < 1e-6  # m
+    for row, before in zip(shared.document["drives"], result.document["drives"], strict=True):
+        assert row["state"] == before["state"] and row["tied_with"] == before["tied_with"]
+    report = json.loads((out / "second" / "report.json").read_text())
+    assert [row["name"] for row in report["files"]] == [
+        "../tiles/tile-1.laz",
+        "../tiles/tile-2.laz",
+    ]
+    alone = json.loads((separate / "second" / "report.json").read_text())
+    assert report["coverage"] == alone["coverage"]
+
+
+def test_points_of_no_drive_are_refused_with_their_tile(project, tmp_path):
+    "A tile with an id that no drive names is named with the number of such points; exit code 4"
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    bed.share_tiles(folder)
+    cloud = laspy.read(folder / "tiles" / "tile-1.laz")
+    cloud.point_source_id[:50] = 9
+    cloud.write(folder / "tiles" / "tile-1.laz")
+    result = correct_project(folder, tmp_path / "out", QUICK)
+    (fault,) = result.document["faults"]
+    assert fault["name"] == "tiles/tile-1.laz" and "first: 9" in fault["fault"]
+    assert f"50 of the {len(cloud)} points" in fault["fault"]
+    assert [path.name for path in (tmp_path / "out" / "tiles").iterdir()] == ["tile-2.laz"]
+
+
 def test_a_project_of_one_drive_is_its_survey(project, tmp_path):
     "The same clouds and trajectory, to the byte, as of the survey by itself"
     folder = shutil.copytree(project.parent, tmp_path / "city")

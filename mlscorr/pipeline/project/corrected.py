@@ -12,10 +12,10 @@ from mlscorr.estimate import place_control
 from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.evaluate.ties import misfit, misfit_section, tie_section
+from mlscorr.pipeline.clouds import MovedClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.file_finding import FileFinding, join_findings
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, drive_estimates
-from mlscorr.pipeline.project.file_tasks import DriveMotion
 from mlscorr.pipeline.project.joint import FoundDrive
 from mlscorr.pipeline.project.joint_estimate import JointEstimate
 from mlscorr.survey import Matched, Survey
@@ -152,7 +152,7 @@ def _tied_with(state):
     return f"Estimated together with other drives of the project, by ties: {listed}."
 
 
-def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> DriveMotion:
+def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> MovedClouds:
     """How a drive's clouds are moved, without what only a report needs.
 
     Parameters
@@ -173,4 +173,4 @@ def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> DriveMotion:
         layouts=(),
         inputs=(),
     )
-    return DriveMotion(bare, correction, corrected.held)
+    return MovedClouds(bare, correction, corrected.held)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mlscorr.io.output import check_output, output_file, write_json
 from mlscorr.io.project_file import ProjectParts, read_project
+from mlscorr.io.project_sections import SHARED_TILES
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.io.trajectory_exports import check_exports
 from mlscorr.pipeline.clouds import WrittenClouds
@@ -132,7 +133,8 @@ def _check_out(project, out, options):
         )
     check_output(out, project.files, options.overwrite or (options.resume and is_ours))
     for drive in project.drives:
-        check_output(out / drive.name, drive.parts.files.clouds, overwrite=True)
+        for folder in (drive.name, SHARED_TILES):
+            check_output(out / folder, drive.parts.files.clouds, overwrite=True)
     if options.overwrite and not options.resume and is_ours:
         with TaskStore(out / STORE).locked():
             shutil.rmtree(out / STORE)
@@ -173,14 +175,14 @@ class _Work:
 
     def _planned(self) -> list[PlannedDrive]:
         """The drives with the clouds that can be read."""
-        tasks = [task for drive in self.project.drives for task in tile_tasks(drive)]
+        tasks = tile_tasks(self.project)
         self.progress.begin("tiles", tasks)
         tiles = self.run.results(tasks)
-        planned = []
-        for drive in self.project.drives:
-            own = [tiles[t.name] for t in tasks if t.drive == drive.name and t.name in tiles]
-            if own:
-                planned.append(planned_drive(self.project, drive, own))
+        owned = [
+            (drive, [own[drive.name] for own in tiles.values() if drive.name in own])
+            for drive in self.project.drives
+        ]
+        planned = [planned_drive(self.project, drive, own) for drive, own in owned if own]
         if not planned:
             raise ValueError(
                 f"None of the {len(tasks)} cloud files of {self.project.path} can be read. The "
@@ -197,14 +199,16 @@ class _Work:
         every = [task for own in tasks.values() for task in own]
         self.progress.begin("findings", every)
         findings = self.run.results(every)
-        planned[:] = [_without(d, tasks[d.survey.name], findings) for d in planned]
+        lost = {_path(task) for task in every if task.name not in findings}
+        every = [task for task in every if _path(task) not in lost]
+        planned[:] = [_without(drive, lost) for drive in planned]
         planned[:] = [drive for drive in planned if drive.survey.clouds]
-        files = [task.key for task in every if task.name in findings]
+        files = [task.key for task in every]
         lists = [d.survey.control for d in planned], [d.survey.check for d in planned]
         key = digest(VERSION, files, *lists, self.options.order, self.ties, self.options.sigma)
         keys = {d.survey.name: digest(key, d.survey.name) for d in planned}
         if not all(_is_there(store, own) for own in keys.values()):
-            self._estimate(planned, tasks, findings, keys, origin)
+            self._estimate(planned, every, findings, keys, origin)
         return keys
 
     def _estimate(self, planned, tasks, findings, keys, origin):
@@ -212,8 +216,8 @@ class _Work:
         self.progress.say(f"Estimating {len(planned)} drives together.")
         drives = []
         for drive in planned:
-            names = [task.name for task in tasks[drive.survey.name] if task.name in findings]
-            drives.append(found_drive(drive.survey, [findings[name] for name in names]))
+            own = [findings[task.name] for task in tasks if task.drive == drive.survey.name]
+            drives.append(found_drive(drive.survey, own))
         if self.ties != "only" and not any(len(drive.control) for drive in drives):
             raise ValueError(_nothing_found(self.project, drives))
         parts = estimate_drives(drives, self.options.order, origin, self.ties != "off")
@@ -226,19 +230,16 @@ class _Work:
 
     def _clouds(self, planned, keys):
         """WrittenClouds of each drive by its name."""
-        tasks = {
-            d.survey.name: cloud_tasks(
-                self.run.store, d, keys[d.survey.name], self.out / d.survey.name, self.options.sigma
-            )
-            for d in planned
-        }
-        every = [task for own in tasks.values() for task in own]
+        tasks = cloud_tasks(self.run.store, planned, keys, self.out, self.options.sigma)
+        every = [task for task, _ in tasks]
         self.progress.begin("clouds", every)
         written = self.run.results(every)
-        return {
-            name: WrittenClouds.join(written[t.name].value for t in own if t.name in written)
-            for name, own in tasks.items()
-        }
+        clouds: dict[str, list[WrittenClouds]] = {drive.survey.name: [] for drive in planned}
+        for task, names in tasks:
+            if task.name in written:
+                for name, own in zip(names, written[task.name].value, strict=True):
+                    clouds[name].append(own if len(names) == 1 else own.below(f"../{task.drive}"))
+        return {name: WrittenClouds.join(own) for name, own in clouds.items()}
 
     def _reports(self, planned, keys, clouds):
         """DriveResult and report.json of each drive."""
@@ -265,13 +266,17 @@ class _Work:
         ]
 
 
-def _without(drive, tasks, findings):
-    """A drive without the files that could not be read."""
-    lost = [task.name for task in tasks if task.name not in findings]
-    if not lost:
-        return drive
+def _path(task):
+    """Path of the cloud that a task reads."""
+    return task.arguments[0].file.path
+
+
+def _without(drive, lost):
+    """A drive without the files, by their paths, that could not be read."""
     survey = drive.survey
-    clouds = [f for f in survey.clouds if f"{survey.name}/{f.name}" not in lost]
+    clouds = [file for file in survey.clouds if file.path not in lost]
+    if len(clouds) == len(survey.clouds):
+        return drive
     mounted = [
         replace(m, clouds=tuple(file for file in m.clouds if file in clouds))
         for m in survey.scanners

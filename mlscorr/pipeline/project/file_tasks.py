@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -12,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.correction import Correction, PointSigma
-from mlscorr.estimate import Support
 from mlscorr.io.identity import FileIdentity
+from mlscorr.io.las import count_sources
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box
 from mlscorr.io.survey_file import cloud_file
@@ -46,19 +46,60 @@ class Tile:
     box: np.ndarray
 
 
-def read_tile(path: Path, ends: Trajectory, system: str, crs: str | None) -> Tile:
-    """A cloud file by its header, and by some of its times.
+@dataclass(frozen=True)
+class TileOwner:
+    """A drive that has points in a cloud file.
+
+    Parameters
+    ----------
+    name : str
+    ends : Trajectory
+        Its first and last epoch.
+    system, crs
+        As of cloud_file.
+    ids : tuple of int or None
+        The point_source_ids of its points; None where all points of the file are its.
+    """
+
+    name: str
+    ends: Trajectory
+    system: str
+    crs: str | None
+    ids: tuple[int, ...] | None
+
+
+def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
+    """A cloud file by its header, and by some of its times, for each drive with points in it.
 
     Parameters
     ----------
     path : Path
-    ends : Trajectory
-        First and last epoch of its drive.
-    system, crs
-        As of cloud_file.
+    owners : sequence of TileOwner
+        One without ids, or some with different ones.
+
+    Raises
+    ------
+    ValueError
+        As of cloud_file, and for points of no drive.
     """
-    file, note = cloud_file(path, ends, system, crs)
-    return Tile(file, note, cloud_box(read_layout(path)))
+    layout = read_layout(path)
+    box, counts = cloud_box(layout), None
+    if owners[0].ids is not None:
+        counts = count_sources(layout)
+        every = [number for owner in owners for number in owner.ids or ()]
+        if len(other := np.setdiff1d(np.flatnonzero(counts), every)):
+            raise ValueError(
+                f"{counts[other].sum()} of the {layout.points} points of {path} have a "
+                f"point_source_id that is of no drive (first: {other[0]}). Add it to the "
+                "point_source_ids of the [[drive]] that measured these points."
+            )
+    tiles = {}
+    for owner in owners:
+        points = layout.points if counts is None else int(counts[list(owner.ids or ())].sum())
+        if points:
+            file, note = cloud_file(path, owner.ends, owner.system, owner.crs, owner.ids)
+            tiles[owner.name] = Tile(replace(file, points=points), note, box)
+    return tiles
 
 
 @lru_cache(maxsize=SETTINGS.cached)
@@ -119,23 +160,6 @@ def _check_same(path, identity):
 
 
 @dataclass(frozen=True)
-class DriveMotion:
-    """How a drive's clouds are moved.
-
-    Parameters
-    ----------
-    survey : Survey
-    correction : Correction
-    held : pair of (float, float) and Support
-        As of write_counted.
-    """
-
-    survey: Survey
-    correction: Correction
-    held: tuple[tuple[float, float], Support]
-
-
-@dataclass(frozen=True)
 class CloudInput:
     """Which file is corrected, and how.
 
@@ -143,18 +167,18 @@ class CloudInput:
     ----------
     folder : Path
         Of the store.
-    motion : str
-        Key of the drive's DriveMotion there.
+    motions : tuple of str
+        Key there of the MovedClouds of each drive that has points in the file.
     path : Path
     identity : FileIdentity
     target : Path
-        Folder of the drive's results.
+        Folder of the results.
     with_sigma : bool
         Whether each point gets its sigmas.
     """
 
     folder: Path
-    motion: str
+    motions: tuple[str, ...]
     path: Path
     identity: FileIdentity
     target: Path
@@ -168,15 +192,10 @@ def write(inputs: CloudInput) -> Written:
     ----------
     inputs : CloudInput
     """
-    motion: DriveMotion = _kept(inputs.folder, "motions", inputs.motion)
-    correction, survey = motion.correction, _of_file(motion.survey, inputs.path)
-
-    def sigma(part):
-        return PointSigma.of(correction, part.scanner, part.mounting)
-
+    kept = [_kept(inputs.folder, "motions", key) for key in inputs.motions]
+    drives = [replace(each, survey=_of_file(each.survey, inputs.path)) for each in kept]
     with _moved_into(inputs.folder, inputs.target) as (part, outputs):
-        sigmas = sigma if inputs.with_sigma else None
-        written = write_counted(survey, part, correction, motion.held, silent("", 0), sigmas)
+        written = write_counted(drives, part, silent("", 0), inputs.with_sigma)
         _check_same(inputs.path, inputs.identity)
     return Written(written, tuple(outputs))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from mlscorr.io.identity import FileIdentity
 from mlscorr.io.project_file import DriveParts, ProjectParts
+from mlscorr.io.project_sections import SHARED_TILES
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.project.file_tasks import (
@@ -17,6 +18,7 @@ from mlscorr.pipeline.project.file_tasks import (
     FindingInput,
     ReportInput,
     Tile,
+    TileOwner,
     find,
     read_tile,
     report,
@@ -27,21 +29,31 @@ from mlscorr.survey import CloudFile, ControlPoints, Survey, Trajectory
 from mlscorr.targets import search_radius
 
 
-def tile_tasks(drive: DriveParts) -> list[Task]:
-    """Tasks that read the headers of a drive's clouds.
+def tile_tasks(project: ProjectParts) -> list[Task]:
+    """Tasks that read the headers of all clouds, each once.
 
     Parameters
     ----------
-    drive : DriveParts
+    project : ProjectParts
     """
-    parts, whole = drive.parts, drive.trajectory
-    ends = Trajectory(whole.gps_time[[0, -1]], whole.position[[0, -1]], whole.attitude[[0, -1]])
+    tiles: dict[Path, tuple[Path, list[TileOwner]]] = {}
+    for drive in project.drives:
+        parts, whole = drive.parts, drive.trajectory
+        ends = Trajectory(whole.gps_time[[0, -1]], whole.position[[0, -1]], whole.attitude[[0, -1]])
+        owner = TileOwner(drive.name, ends, parts.system, parts.settings.crs, drive.ids)
+        for path in parts.files.clouds:
+            tiles.setdefault(path.resolve(), (path, []))[1].append(owner)
     tasks = []
-    for path in parts.files.clouds:
-        inputs = path, ends, parts.system, parts.settings.crs
-        key, name = digest(VERSION, FileIdentity.of(path), *inputs), task_name(drive.name, path)
-        tasks.append(Task("tiles", key, drive.name, name, 0, read_tile, inputs))
+    for path, own in tiles.values():
+        key, folder = digest(VERSION, FileIdentity.of(path), path, own), _folder(own)
+        name = task_name(folder, path)
+        tasks.append(Task("tiles", key, folder, name, 0, read_tile, (path, tuple(own))))
     return tasks
+
+
+def _folder(drives):
+    """Where the corrected copy of a file of some drives lies."""
+    return drives[0].name if len(drives) == 1 else SHARED_TILES
 
 
 def task_name(drive: str, file: Path | CloudFile) -> str:
@@ -159,29 +171,39 @@ def finding_tasks(
 
 
 def cloud_tasks(
-    store: TaskStore, drive: PlannedDrive, motion: str, target: Path, with_sigma: bool
-) -> list[Task]:
-    """Tasks that write a drive's corrected clouds.
+    store: TaskStore,
+    drives: Sequence[PlannedDrive],
+    motions: Mapping[str, str],
+    out: Path,
+    with_sigma: bool,
+) -> list[tuple[Task, list[str]]]:
+    """Tasks that write corrected clouds, each with the names of the drives whose points it holds.
 
     Parameters
     ----------
     store : TaskStore
-    drive : PlannedDrive
-    motion : str
-        Key of the drive's DriveMotion in the store.
-    target : Path
-        Folder of the drive's results.
+    drives : sequence of PlannedDrive
+    motions : mapping
+        Keys of each drive's MovedClouds in the store.
+    out : Path
+        Folder of the project's results.
     with_sigma : bool
     """
+    owners: dict[Path, list[PlannedDrive]] = {}
+    for drive in drives:
+        for path in drive.survey.cloud_paths:
+            owners.setdefault(path, []).append(drive)
     tasks = []
-    for path in drive.survey.cloud_paths:
-        own = [file for file in drive.survey.clouds if file.path == path]
-        identity, name = drive.identities[path], task_name(drive.survey.name, path)
-        inputs = CloudInput(store.folder, motion, path, identity, target, with_sigma)
-        parts = [(file.time_constant, file.point_source_ids) for file in own]
-        key = digest(VERSION, motion, parts, path.name, identity, with_sigma)
-        points = sum(file.points for file in own)
-        tasks.append(Task("clouds", key, drive.survey.name, name, points, write, (inputs,)))
+    for path, own in owners.items():
+        surveys, identity = [drive.survey for drive in own], own[0].identities[path]
+        folder, used = _folder(surveys), tuple(motions[survey.name] for survey in surveys)
+        files = [[file for file in survey.clouds if file.path == path] for survey in surveys]
+        parts = [[(file.time_constant, file.point_source_ids) for file in some] for some in files]
+        key = digest(VERSION, used, parts, path.name, identity, with_sigma)
+        points = sum(file.points for some in files for file in some)
+        inputs = CloudInput(store.folder, used, path, identity, out / folder, with_sigma)
+        task = Task("clouds", key, folder, task_name(folder, path), points, write, (inputs,))
+        tasks.append((task, [survey.name for survey in surveys]))
     return tasks
 
 

@@ -118,7 +118,7 @@ class Written:
 
     Parameters
     ----------
-    value : WrittenClouds or dict
+    value : list of WrittenClouds, or dict
     outputs : tuple of (str, FileIdentity)
         By their names within a folder.
     """
