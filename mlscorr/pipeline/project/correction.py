@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from mlscorr.pipeline.project.document import ProjectResult, drive_result, proje
 from mlscorr.pipeline.project.engine import engine
 from mlscorr.pipeline.project.file_tasks import ReportInput
 from mlscorr.pipeline.project.joint_estimate import estimate_drives
-from mlscorr.pipeline.project.progress import Progress
+from mlscorr.pipeline.project.progress import Progress, logged
 from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.stages import (
     PlannedDrive,
@@ -103,24 +102,12 @@ def correct_project(
     check_exports(options.trajectories, project.crs, is_read=True)
     _check_out(project, out, options)
     store = TaskStore(out / STORE)
-    with store.locked(), _progress(out, tell) as progress:
+    with store.locked(), logged(out / "log.txt", store.folder / "plan.json", tell) as progress:
         with engine(options.workers, options.scheduler) as chosen:
             work = _Work(project, out, options, Run(store, chosen, progress.ended), progress)
             result = work.result()
         progress.note(result.sentence)
     return result
-
-
-@contextmanager
-def _progress(out: Path, tell: Callable[[str], object]) -> Iterator[Progress]:
-    """Progress with its log; what ends the run early stands there, too."""
-    with open(out / "log.txt", "a", encoding="utf-8") as log:
-        progress = Progress(log, out / STORE / "plan.json", tell)
-        try:
-            yield progress
-        except BaseException as error:
-            progress.note(f"Ended early: {type(error).__name__} {error}")
-            raise
 
 
 def _check_out(project, out, options):

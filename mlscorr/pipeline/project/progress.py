@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -114,6 +115,25 @@ class Progress:
             f"{100 * share:.0f} %, {counts['points'] / elapsed / 1e6:.1f} M points/s, "
             f"{duration(left)} left, {counts['faults']} failures"
         )
+
+
+@contextmanager
+def logged(log: Path, plan: Path, tell: Callable[[str], object]) -> Iterator[Progress]:
+    """Progress with its log; what ends the run early stands there, too.
+
+    Parameters
+    ----------
+    log : Path
+    plan, tell
+        As of Progress.
+    """
+    with open(log, "a", encoding="utf-8") as stream:
+        progress = Progress(stream, plan, tell)
+        try:
+            yield progress
+        except BaseException as error:
+            progress.note(f"Ended early: {type(error).__name__} {error}")
+            raise
 
 
 def duration(seconds: float) -> str:
