@@ -106,6 +106,24 @@ def describe_projection(crs: str) -> tuple[str, str, str]:
     )
 
 
+def crs_notes(crs: str | None, trajectory: Trajectory, is_sbet: bool) -> list[str]:
+    """Sentences on the CRS; warns where the trajectory lies outside its area.
+
+    Parameters
+    ----------
+    crs : str or None
+    trajectory : Trajectory
+    is_sbet : bool
+        Whether its file is an SBET, with latitudes and longitudes.
+    """
+    if crs is None:
+        return ["No CRS was given."]
+    projected = check_crs(crs)
+    check_area(projected, trajectory)
+    notes = [f"Coordinates are in {crs} ({projected.name})."]
+    return notes + list(describe_projection(crs) if is_sbet else ())
+
+
 @lru_cache
 def _parse_crs(crs):
     from pyproj import CRS

@@ -12,7 +12,7 @@ from mlscorr.io.las import read_chunks, spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
-from mlscorr.io.projection import check_area, check_crs, describe_projection
+from mlscorr.io.projection import check_crs, crs_notes
 from mlscorr.io.session_points import check_belongings
 from mlscorr.io.survey_paths import SurveyPaths, files_of
 from mlscorr.io.survey_scanners import clouds_of, mounted_scanners, scanner_notes
@@ -173,24 +173,6 @@ def stated_pos(settings: PlannedSurveyFile) -> Pos | None:
     settings : PlannedSurveyFile
     """
     return settings.pos.pos() if "pos" in settings.model_fields_set else None
-
-
-def crs_notes(crs: str | None, trajectory: Trajectory, is_sbet: bool) -> list[str]:
-    """Sentences on the CRS; warns where the trajectory lies outside its area.
-
-    Parameters
-    ----------
-    crs : str or None
-    trajectory : Trajectory
-    is_sbet : bool
-        Whether its file is an SBET, with latitudes and longitudes.
-    """
-    if crs is None:
-        return ["No CRS was given."]
-    projected = check_crs(crs)
-    check_area(projected, trajectory)
-    notes = [f"Coordinates are in {crs} ({projected.name})."]
-    return notes + list(describe_projection(crs) if is_sbet else ())
 
 
 def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFile:

@@ -12,9 +12,9 @@ from mlscorr.io.control import holds_points, read_control_list
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
-from mlscorr.io.projection import check_crs
+from mlscorr.io.projection import check_crs, crs_notes
 from mlscorr.io.session_points import check_belongings
-from mlscorr.io.survey_file import cloud_file, crs_notes, stated_pos, survey_toml
+from mlscorr.io.survey_file import cloud_file, stated_pos, survey_toml
 from mlscorr.io.survey_paths import (
     check_distinct,
     check_sessions,
