@@ -14,6 +14,7 @@ from mlscorr.cli.terminal import (
     Overwrite,
     Quiet,
     exit_code,
+    path_or_url,
     say,
     say_statements,
     warn,
@@ -23,7 +24,11 @@ from mlscorr.cli.work import print_json, work
 
 def correct(
     survey: Annotated[
-        Path, typer.Argument(help="survey.toml or project.toml, or the folder that holds it.")
+        Path,
+        typer.Argument(
+            help="survey.toml or project.toml, or the folder that holds it; a path or a URL.",
+            parser=path_or_url,
+        ),
     ],
     out: Out,
     order: Annotated[

@@ -44,13 +44,38 @@ def is_quiet() -> bool:
     return _voice["quiet"]
 
 
-SurveyArgument = Annotated[Path, typer.Argument(help="survey.toml, or the folder that holds it.")]
 Out = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
 Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in the folder.")]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Print errors and warnings only.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+
+
+def path_or_url(name: str) -> Path:
+    """The path of a name, or that of a URL; ends with a sentence where there can be none.
+
+    Parameters
+    ----------
+    name : str
+
+    Raises
+    ------
+    typer.Exit
+    """
+    from mlscorr.io.storage import as_path
+
+    with exit_code(Exit.USAGE):
+        return as_path(name)
+
+
+SurveyArgument = Annotated[
+    Path,
+    typer.Argument(
+        help="survey.toml, or the folder that holds it; a path or a URL.",
+        parser=path_or_url,
+    ),
+]
 
 
 class Exit(IntEnum):

@@ -20,8 +20,10 @@ from mlscorr.io.control_lists import (
     unnamed_columns,
     with_check_points,
 )
+from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
+from mlscorr.io.storage import as_path
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.table_rows import read_rows
 from mlscorr.io.tables import read_layout
@@ -139,9 +141,9 @@ def holds_points(path: str | Path) -> bool:
     -------
     bool
     """
-    if Path(path).suffix.lower() == SUFFIX:
+    if as_path(path).suffix.lower() == SUFFIX:
         return True
-    with Path(path).open(encoding=ENCODING, errors="replace") as file:
+    with open_file(path, ENCODING, errors="replace") as file:
         lines = (line for line in file if line.strip(" \t\r\n,;"))
         first = [*zip(range(2), lines, strict=False)]
     return len(first) > 1 or any(len(re.findall(r"\d+[.,]\d", line)) > 1 for _, line in first)

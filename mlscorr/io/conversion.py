@@ -23,8 +23,10 @@ import numpy as np
 from mlscorr.io.cloud_sources import CloudSource
 from mlscorr.io.e57 import open_e57
 from mlscorr.io.las_writer import INTEGER_LIMIT, cloud_writer
+from mlscorr.io.opening import open_file
 from mlscorr.io.ply_clouds import open_ply
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.storage import file_state, is_remote
 from mlscorr.io.time_systems import ADJUSTMENT, WEEK
 from mlscorr.survey import CloudFile, PointCloud
 
@@ -123,8 +125,7 @@ def converted(path: Path) -> Converted:
     OSError
         When the disk refuses.
     """
-    state = path.stat()
-    return _converted(path.absolute(), state.st_size, state.st_mtime_ns, _limit.get())
+    return _converted(path.absolute(), *file_state(path), _limit.get())
 
 
 def conversion_notes(paths: Iterable[Path]) -> list[str]:
@@ -159,11 +160,21 @@ def recorded_points(file: CloudFile) -> int:
 
 @cache
 def _converted(path, size, changed, limit):
-    source = OPENERS[path.suffix.lower()](path)
+    source = OPENERS[path.suffix.lower()](_on_disk(path))
     if limit is not None and source.points <= limit:
         return _converted(path, size, changed, None)
     target = Path(tempfile.mkdtemp(dir=_folder())) / written_name(path)
     return _convert(source, target, limit)
+
+
+def _on_disk(path):
+    """A file, or the copy of one in a store: what reads it needs a disk."""
+    if not is_remote(path):
+        return path
+    copy = Path(tempfile.mkdtemp(dir=_folder())) / path.name
+    with open_file(path) as source, open(copy, "wb") as target:
+        shutil.copyfileobj(source, target, SETTINGS.copied_bytes)
+    return copy
 
 
 @cache

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.storage import ETAG, file_state
 
 
 @dataclass(frozen=True)
@@ -18,14 +19,14 @@ class FileIdentity:
     ----------
     size : int
         Units: bytes.
-    changed : int
-        Time of the last change. Units: ns.
+    changed : int or str
+        Time of the last change (ns), or a store's ETag.
     digest : str
-        SHA-256 of its first and last bytes.
+        SHA-256 of its first and last bytes; of none where an ETag tells contents apart.
     """
 
     size: int
-    changed: int
+    changed: int | str
     digest: str
 
     @classmethod
@@ -41,9 +42,10 @@ class FileIdentity:
         OSError
             Where it can't be read.
         """
-        state, hashed = os.stat(path), hashlib.sha256()
-        with open(path, "rb") as file:
-            hashed.update(file.read(SETTINGS.identified_bytes))
-            file.seek(max(0, state.st_size - SETTINGS.identified_bytes))
-            hashed.update(file.read(SETTINGS.identified_bytes))
-        return cls(state.st_size, state.st_mtime_ns, hashed.hexdigest())
+        (size, changed), hashed = file_state(path), hashlib.sha256()
+        if not str(changed).startswith(ETAG):
+            with open_file(path, is_scattered=True) as file:
+                hashed.update(file.read(SETTINGS.identified_bytes))
+                file.seek(max(0, size - SETTINGS.identified_bytes))
+                hashed.update(file.read(SETTINGS.identified_bytes))
+        return cls(size, changed, hashed.hexdigest())

@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from mlscorr.io.storage import as_path, file_state, is_remote
 from mlscorr.survey import InputFile
 
 
@@ -20,7 +21,8 @@ def input_file(what: str, path: str | Path) -> InputFile:
     -------
     InputFile
     """
-    return InputFile(what, Path(path), _state(path))
+    path = as_path(path)
+    return InputFile(what, path, _state(path))
 
 
 def check_unchanged(inputs: Sequence[InputFile]) -> None:
@@ -51,6 +53,9 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
 def _state(path):
     """Disk, number, size, and times of last change of content and of file; zeros without one."""
     try:
+        if is_remote(path):
+            size, changed = file_state(path)
+            return 0, 0, size, changed, 0
         s = os.stat(path)
     except FileNotFoundError:
         return (0,) * 5

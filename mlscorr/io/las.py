@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout, decoding
+from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.survey import CloudFile, PointCloud
 
@@ -132,7 +133,7 @@ def sha256(path: str | Path) -> str:
     str
         Hexadecimal digits.
     """
-    with open(path, "rb") as file:
+    with open_file(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
@@ -175,7 +176,7 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     places = np.asarray(places)
     records = np.empty(len(places), layout.record)
     buffer = bytearray(layout.record_length)
-    with open(layout.path, "rb") as file:
+    with open_file(layout.path, is_scattered=True) as file:
         decoder = layout.decoder(file, threads=False, is_brief=True)
         for k, place in enumerate(places):
             with _decoding(layout, place, place + 1):
@@ -231,7 +232,7 @@ def read_records(
     length = layout.record_length
     last = layout.points if end is None else end
     buffer = np.empty(min(chunk_size, last - first) * length, np.uint8)
-    with open(layout.path, "rb") as file:
+    with open_file(layout.path) as file:
         decoder = layout.decoder(file, is_brief=is_brief)
         if first:
             decoder.seek(first)

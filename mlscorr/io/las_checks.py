@@ -9,7 +9,9 @@ from laspy import PointFormat, supported_point_formats
 
 from mlscorr.io.conversion import converted, is_foreign
 from mlscorr.io.las_layout import LasLayout, decoding
+from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.storage import as_path, file_state, is_there
 
 HEADER_SIZES = (227, 227, 227, 235, 375)  # bytes, of LAS 1.0 to 1.4
 EVLR_HEADER = struct.Struct("<2x16sHQ32s")  # owner, record, length of data, description
@@ -34,13 +36,13 @@ def read_layout(path: str | Path) -> LasLayout:
         When the file is missing, is none of these, has no points or no gps_time, or holds less
         than its header says.
     """
-    path = Path(path)
-    if not path.is_file():
+    path = as_path(path)
+    if not is_there(path):
         raise ValueError(f"There is no file {path}. Check cloud.files in survey.toml.")
     source = path if is_foreign(path) else None
     path = converted(path).path if source else path
-    size = path.stat().st_size
-    with open(path, "rb") as file:
+    size = file_state(path)[0]
+    with open_file(path, is_scattered=True) as file:
         head = file.read(HEADER_SIZES[0])
         if head[:4] != b"LASF" or len(head) < HEADER_SIZES[0]:
             raise ValueError(

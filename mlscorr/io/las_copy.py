@@ -19,8 +19,10 @@ from mlscorr.io.extra_bytes import add_sigma_fields, with_sigmas
 from mlscorr.io.las import read_records, times_at
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LASZIP, LasLayout
+from mlscorr.io.opening import open_file
 from mlscorr.io.output import PART, output_file
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.storage import is_remote
 from mlscorr.survey import CloudFile, PointCloud
 
 LASZIP_RECORD = 22204  # of the VLR that says how points are compressed
@@ -144,7 +146,7 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
     _check_target(layout.path, target)
     has_sigmas = parts[0].sigma is not None
     with output_file(target) as copy:
-        with _Output(copy) as output, open(layout.path, "rb") as file:
+        with _Output(copy) as output, open_file(layout.path) as file:
             written = add_sigma_fields(layout) if has_sigmas else layout
             head, encoder = _start(written, output, target.suffix.lower() == ".laz")
             outside, untimed = np.zeros(len(parts), int), 0
@@ -237,7 +239,7 @@ def _check_target(source, target):
     if target.suffix.lower() not in (".las", ".laz"):
         raise ValueError(f"The corrected file {target} must end in .las or .laz.")
     for path in (target, target.with_name(target.name + PART)):
-        if path.exists() and path.samefile(source):
+        if path.exists() and not is_remote(source) and path.samefile(source):
             raise ValueError(
                 f"The corrected file {path} is the input itself, which would be lost. Choose "
                 "another output folder."

@@ -19,8 +19,10 @@ from mlscorr.io.layouts import (
     is_comment,
     split,
 )
+from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX, read_sheets
+from mlscorr.io.storage import as_path
 from mlscorr.io.text_files import shown
 
 WORDS = ("name", "kind", "role")  # columns that hold no numbers
@@ -59,7 +61,7 @@ def find_layout(
         For columns that stand for the same, units that are not metric, thousands marks, and two
         sheets that hold a table.
     """
-    path, chosen = Path(path), dict(chosen or {})
+    path, chosen = as_path(path), dict(chosen or {})
     is_numbered = any(isinstance(column, int) for column in chosen.values())
     if is_numbered:
         positions = {name: int(number) - 1 for name, number in chosen.items()}
@@ -102,7 +104,7 @@ def _numbered(positions):
 
 
 def _encodings(path):
-    with path.open("rb") as file:
+    with open_file(path) as file:
         return ("utf-16",) if file.read(2) in (b"\xff\xfe", b"\xfe\xff") else tuple(
             name for name in ENCODINGS if name != "utf-16"
         )  # fmt: skip
@@ -110,7 +112,7 @@ def _encodings(path):
 
 def _are_pairs(path):
     """Whether letters beyond ASCII come in pairs of bytes, as Chinese ones do and umlauts don't."""
-    with path.open("rb") as file:
+    with open_file(path) as file:
         start = file.read(SETTINGS.copied_bytes)
     return all(len(run) % 2 == 0 for run in re.findall(rb"[\x80-\xff]+", start))
 
@@ -238,7 +240,7 @@ def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
     -------
     list of str
     """
-    path = Path(path)
+    path = as_path(path)
     encodings = (None,) if path.suffix.lower() == SUFFIX else _encodings(path)
     longest: list[str] = []
     for encoding in encodings:

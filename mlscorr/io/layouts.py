@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mlscorr.io.column_names import plain
+from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.text_files import ENCODING, shown
 
@@ -107,7 +108,7 @@ def head(path: Path, encoding: str = ENCODING) -> list[tuple[int, str]]:
     """
     lines, longest = [], SETTINGS.longest_line
     try:
-        with path.open(encoding=encoding) as file:
+        with open_file(path, encoding) as file:
             for number in range(1, SETTINGS.sampled_lines + 1):
                 line = file.readline(longest)
                 if not line or len(line) == longest:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from mlscorr.io.folders import exchange, move_into, remove, take_along
 from mlscorr.io.inputs import check_unchanged
+from mlscorr.io.storage import is_remote
 from mlscorr.survey import InputFile
 
 try:
@@ -50,7 +51,7 @@ def check_output(out: str | Path, inputs: Iterable[str | Path], overwrite: bool 
             )
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out} is a file; the results need a folder. Choose another name.")
-    for path in map(Path, inputs):
+    for path in (Path(path) for path in inputs if not is_remote(path)):
         # a link to an input counts where it stands and where it leads
         if out.resolve() in (path.resolve().parent, path.parent.resolve()):
             raise ValueError(

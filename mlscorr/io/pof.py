@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.leap_seconds import leap_seconds
+from mlscorr.io.opening import read_bytes
+from mlscorr.io.storage import as_path
 from mlscorr.io.tables import check_finite
 from mlscorr.io.time_systems import DAY
 
@@ -66,8 +68,8 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
     UserWarning
         Where the header does not know whether its times are GPS or UTC.
     """
-    path = Path(path)
-    data = path.read_bytes()
+    path = as_path(path)
+    data = read_bytes(path)
     header, day = _header(path, data)
     names = (*FIELDS, "distance")[: 8 if header["minor"] >= 1 else 7]
     width, count = 8 * len(names), int(header["entries"])
@@ -113,8 +115,7 @@ def read_poq(path: str | Path) -> dict[str, np.ndarray]:
     ValueError
         For a file that was cut off.
     """
-    path = Path(path)
-    data, start = path.read_bytes(), QUALITY_HEADER.itemsize
+    data, start = read_bytes(path), QUALITY_HEADER.itemsize
     header = np.frombuffer(data[:start].ljust(start, b"\0"), QUALITY_HEADER)[0]
     satellites = 2 if header["minor"] >= 1 else 1  # counts, of GPS and of GLONASS
     kind = np.dtype([("values", "<f8", len(QUALITIES)), ("satellites", "<u2", satellites)])

@@ -14,6 +14,7 @@ from mlscorr.io.inputs import input_file
 from mlscorr.io.nearness import check_together
 from mlscorr.io.project_sections import ProjectFile
 from mlscorr.io.projection import check_crs
+from mlscorr.io.storage import as_path, beside, is_folder, is_there
 from mlscorr.io.survey_file import SurveyParts, read_parts, read_survey_file, survey_toml
 from mlscorr.io.survey_paths import check_distinct, existing, matching
 from mlscorr.io.survey_sections import CloudSection, SurveyFile
@@ -92,9 +93,9 @@ def is_project(path: str | Path) -> bool:
     ----------
     path : path
     """
-    path = Path(path)
-    if path.is_dir():
-        return (path / FILE_NAME).is_file() and not (path / "survey.toml").is_file()
+    path = as_path(path)
+    if is_folder(path):
+        return is_there(path / FILE_NAME) and not is_there(path / "survey.toml")
     return path.name == FILE_NAME or path.name.endswith(f".{FILE_NAME}")
 
 
@@ -113,7 +114,8 @@ def read_project(path: str | Path) -> ProjectParts:
     FileNotFoundError
         For files that aren't there.
     """
-    path = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
+    path = as_path(path).absolute()
+    path = path / FILE_NAME if is_folder(path) else path
     settings = read_project_file(path)
     drives = tuple(_drive(path, settings, name, section) for name, section in settings.drives)
     _check_tiles(path, settings, drives)
@@ -144,23 +146,12 @@ def read_project_file(path: str | Path) -> ProjectFile:
     FileNotFoundError
         Where there is none.
     """
-    path = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
+    path = as_path(path)
+    path = path / FILE_NAME if is_folder(path) else path
     settings = read_toml(path, ProjectFile, "a project")
-    _check_url(path, settings)
     if settings.crs is not None:
         check_crs(settings.crs)
     return settings
-
-
-def _check_url(path, settings):
-    """Refuse addresses: files are read where they lie."""
-    names = [*(settings.cloud.files or ()), *(n for d in settings.drive for n in d.files or ())]
-    names += [drive.survey for drive in settings.drive if drive.survey]
-    if urls := [name for name in names if "://" in name]:
-        raise ValueError(
-            f"{len(urls)} names in {path} are addresses (first: {urls[0]}), and files are read "
-            "from disks that all workers share: mount the store there, or copy the files."
-        )
 
 
 def _drive(path, settings, name, section):
@@ -174,7 +165,7 @@ def _drive(path, settings, name, section):
         return DriveParts(
             name, read_parts(path, own_settings), ids=_ids(path, name, section, own_settings)
         )
-    toml = survey_toml(path.parent / section.survey)
+    toml = survey_toml(beside(path, section.survey))
     stated = read_survey_file(toml)
     given = {n: getattr(settings, n) for n in BELIEFS if n in settings.model_fields_set}
     notes = []

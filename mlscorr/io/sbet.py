@@ -22,9 +22,11 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import attitude_from_angles
+from mlscorr.io.opening import read_doubles
 from mlscorr.io.pof import POQ_SUFFIX, read_pof, read_poq
 from mlscorr.io.projection import project
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.storage import as_path, file_state
 from mlscorr.io.tables import check_finite
 from mlscorr.io.time_systems import WEEK
 from mlscorr.survey import Trajectory
@@ -145,10 +147,12 @@ def is_sbet(path: str | Path) -> bool:
     ----------
     path : path
     """
-    size, width = Path(path).stat().st_size, 8 * len(SBET_FIELDS)
+    size, width = file_state(path)[0], 8 * len(SBET_FIELDS)
     if size % width or size < 2 * width:
         return False
-    table = np.memmap(path, "<f8", "r").reshape(-1, len(SBET_FIELDS))[[0, size // width // 2, -1]]
+    places = [0, size // width // 2, size // width - 1]
+    fields = len(SBET_FIELDS)
+    table = np.stack([read_doubles(path, place * fields, fields) for place in places])
     with np.errstate(invalid="ignore"):
         angles = np.abs(table[:, [SBET_FIELDS.index(name) for name in LIMITS]])
         is_within = (angles <= list(LIMITS.values())).all()
@@ -160,8 +164,7 @@ def is_sbet(path: str | Path) -> bool:
 
 def _read_records(path, fields, what):
     """Records of a headerless file as a dict of (n,) float64 arrays."""
-    path = Path(path)
-    size, width = path.stat().st_size, 8 * len(fields)
+    size, width = file_state(path)[0], 8 * len(fields)
     if size == 0:
         raise ValueError(f"{path} is empty.")
     if size % width:
@@ -169,7 +172,7 @@ def _read_records(path, fields, what):
             f"{path} has {size} bytes, {size % width} more than {size // width} whole {what} "
             f"records of {width} bytes: it was cut off, or it is not {what}."
         )
-    table = np.fromfile(path, dtype="<f8").reshape(-1, len(fields))
+    table = read_doubles(path).reshape(-1, len(fields))
     check_finite(path, table, f"{what} record")
     return dict(zip(fields, table.T.astype(float), strict=True))
 
@@ -198,7 +201,7 @@ def _cause(accuracy, gps_time):
 
 def _sigmas(path, gps_time, constant):
     """Sigmas (n, 3) of E, N, H (m) and roll, pitch, heading (rad) at the trajectory's times."""
-    if is_poq := Path(path).suffix.lower() == POQ_SUFFIX:
+    if is_poq := as_path(path).suffix.lower() == POQ_SUFFIX:
         record = read_poq(path)
         record["gps_time"] += constant
     else:

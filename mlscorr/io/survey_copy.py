@@ -9,6 +9,8 @@ import numpy as np
 import tomlkit
 
 from mlscorr.io.conversion import written_name
+from mlscorr.io.opening import read_bytes
+from mlscorr.io.storage import as_path, is_remote, is_url
 from mlscorr.io.survey_paths import matching
 from mlscorr.io.text_files import ENCODING
 from mlscorr.survey import Mounting
@@ -41,8 +43,8 @@ def write_survey_copy(
     trajectory : str, optional
         New trajectory.file of all sessions, in the folder.
     """
-    source = Path(source)
-    document = tomlkit.parse(source.read_text(encoding=ENCODING))
+    source = as_path(source)
+    document = tomlkit.parse(read_bytes(source).decode(ENCODING))
     there = _way(source.absolute().parent, Path(folder).absolute())
     for section, key in PATHS:
         if key in document.get(section, {}):
@@ -134,6 +136,8 @@ def mounting_values(mounting: Mounting) -> tuple[list[float], list[float]]:
 
 def _way(old, new):
     """The way from the new folder to the old one, links resolved; absolute if there is none."""
+    if is_remote(old):
+        return old
     try:
         return PurePath(os.path.relpath(old.resolve(), new.resolve()))
     except ValueError:  # another drive
@@ -142,6 +146,10 @@ def _way(old, new):
 
 def _moved(there, name, folder=None):
     """A path, or a pattern if it is one in its old folder, as it is seen from the new folder."""
+    if is_url(name):
+        return name
+    if is_remote(there):
+        return str((there / name).resolve())
     if folder is not None and glob.has_magic(name) and not (folder / name).exists():
         there = PurePath(glob.escape(str(there)))
     return (there / name).as_posix()

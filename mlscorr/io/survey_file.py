@@ -14,6 +14,7 @@ from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
 from mlscorr.io.projection import check_crs, crs_notes
 from mlscorr.io.session_points import check_belongings
+from mlscorr.io.storage import as_path, is_folder, is_there
 from mlscorr.io.survey_paths import SurveyPaths, files_of
 from mlscorr.io.survey_scanners import clouds_of, mounted_scanners, scanner_notes
 from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
@@ -237,10 +238,10 @@ def survey_toml(path: str | Path) -> Path:
     FileNotFoundError
         Where there is none.
     """
-    path = Path(path)
-    if path.is_dir():
+    path = as_path(path)
+    if is_folder(path):
         path = path / FILE_NAME
-    if not path.is_file():
+    if not is_there(path):
         raise FileNotFoundError(
             f"{path} does not exist; a survey is a folder with {FILE_NAME}, "
             "which mlscorr init makes."

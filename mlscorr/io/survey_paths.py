@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mlscorr.io.conversion import written_name
+from mlscorr.io.storage import beside, files_like, is_there
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
 from mlscorr.io.trajectory_sessions import SessionFile
 from mlscorr.survey import CloudFile
@@ -123,12 +124,12 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
     FileNotFoundError
         Where there is none.
     """
-    folder = path.parent
-    if not glob.has_magic(name) or (folder / name).exists():
+    there = beside(path, name)
+    if not glob.has_magic(name) or is_there(there):
         return [existing(path, key, name)]
-    matches = sorted(folder / match for match in glob.glob(name, root_dir=folder, recursive=True))
+    matches = files_like(path.parent, name)
     if not matches:
-        raise FileNotFoundError(f"{key} of {path}: no file is like {folder / name}.")
+        raise FileNotFoundError(f"{key} of {path}: no file is like {there}.")
     return matches
 
 
@@ -192,8 +193,8 @@ def existing(path: Path, key: str, name: str) -> Path:
     FileNotFoundError
         Where there is none.
     """
-    there = path.parent / name
-    if not there.is_file():
+    there = beside(path, name)
+    if not is_there(there):
         raise FileNotFoundError(f"{key} of {path} names {there}, which does not exist.")
     return there
 

@@ -4,12 +4,12 @@ import csv
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mlscorr.io.layouts import SEPARATORS, TableLayout, is_comment, not_text
+from mlscorr.io.opening import open_file, text_source
 from mlscorr.io.sheets import read_sheets
 from mlscorr.io.text_files import ENCODING, shown
 
@@ -71,7 +71,7 @@ def _all_rows(layout):
         rows = dict(read_sheets(layout.path))[layout.sheet]
         yield from ((number, cells) for number, cells in rows if number > layout.lines)
         return
-    with layout.path.open(encoding=layout.encoding, newline="") as file:
+    with open_file(layout.path, layout.encoding, newline="") as file:
         try:
             for _ in range(layout.lines):
                 next(file)
@@ -117,7 +117,7 @@ def read_numbers(
         warnings.filterwarnings("ignore", message=".*input contained no data")
         try:
             table = np.loadtxt(
-                path if layout.is_own else _plain_lines(layout),
+                text_source(path, ENCODING) if layout.is_own else _plain_lines(layout),
                 delimiter="," if layout.is_own else "\t",
                 skiprows=layout.lines if layout.is_own else 0,
                 usecols=columns,
@@ -141,7 +141,7 @@ def _plain_lines(layout):
 
 def _check_width(path, lines, width):
     """Refuse rows with more cells than the header, as decimal commas make them."""
-    with Path(path).open("rb") as file:
+    with open_file(path) as file:
         for number, line in enumerate(file, start=1):
             if line.count(b",") >= width and number > lines and not line.startswith(b"#"):
                 raise ValueError(_too_wide(f"Line {number} of {path}", line.count(b",") + 1, width))

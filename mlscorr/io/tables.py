@@ -8,8 +8,10 @@ import numpy as np
 from mlscorr.io.column_names import find_meanings
 from mlscorr.io.layout_search import NUMBER, check_chosen, find_layout, likely_header
 from mlscorr.io.layouts import TableLayout, not_text
+from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
+from mlscorr.io.storage import as_path
 from mlscorr.io.text_files import ENCODING, nearest, shown
 
 
@@ -30,9 +32,9 @@ def read_header(path: str | Path) -> tuple[list[str], int]:
     ValueError
         When the file holds nothing but blank lines or is not text.
     """
-    path, longest = Path(path), SETTINGS.longest_line
+    path, longest = as_path(path), SETTINGS.longest_line
     try:
-        with path.open(encoding=ENCODING) as file:
+        with open_file(path, ENCODING) as file:
             for number, line in enumerate(iter(lambda: file.readline(longest), ""), start=1):
                 if len(line) == longest:
                     raise ValueError(
@@ -122,7 +124,7 @@ def read_layout(
     ValueError
         For a table whose columns are missing or can be understood in two ways, and for no text.
     """
-    path, refusal = Path(path), None
+    path, refusal = as_path(path), None
     if path.suffix.lower() != SUFFIX:
         try:
             header, lines = read_header(path)

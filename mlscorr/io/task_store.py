@@ -18,13 +18,15 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.io.folders import remove
 from mlscorr.io.output import PART
+from mlscorr.io.storage import is_remote
 
 try:
     import fcntl
 except ImportError:  # Windows: nothing tells that another run is at work
     fcntl = None
 
-ROOMS = ("mlscorr", "numpy", "scipy", "pathlib")  # whose classes results hold
+KINDS = (str, int, float, Path, np.generic)  # of values that are told by what they print
+ROOMS = ("mlscorr", "numpy", "scipy", "pathlib", "upath")  # whose classes results hold
 MAKERS = {  # functions that make values; no other is called while a result is loaded
     ("mlscorr.estimate.prior", "position_prior"),
     ("numpy._core.multiarray", "_reconstruct"),
@@ -33,6 +35,7 @@ MAKERS = {  # functions that make values; no other is called while a result is l
     ("numpy.core.multiarray", "_reconstruct"),
     ("numpy.core.multiarray", "scalar"),
     ("numpy.core.numeric", "_frombuffer"),
+    ("upath.core", "_make_instance"),
 }
 PLAIN = ("complex", "frozenset", "range", "set", "slice")  # of Python itself
 
@@ -77,7 +80,7 @@ def _feed(update: Callable[[bytes], object], value: Any) -> None:
     elif isinstance(value, tuple | list):
         for item in value:
             _feed(update, item)
-    elif value is None or isinstance(value, str | int | float | Path | np.generic):
+    elif value is None or isinstance(value, KINDS) or is_remote(value):
         update(repr(value).encode())
     else:
         raise TypeError(f"A {type(value).__name__} has no digest.")

@@ -6,6 +6,8 @@ from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 
+from mlscorr.io.opening import open_file
+
 ENCODING = "utf-8-sig"  # UTF-8, with or without a byte order mark
 
 
@@ -57,7 +59,7 @@ def warn_of_cut(path: str | Path) -> None:
     -----
     UserWarning
     """
-    with Path(path).open("rb") as file:
+    with open_file(path) as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(size - 1, 0))
         last = file.read()

@@ -6,6 +6,8 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from mlscorr.io.opening import read_bytes
+from mlscorr.io.storage import as_path, is_folder, is_there
 from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -39,11 +41,12 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
     FileNotFoundError
         Where there is no such file.
     """
-    if not Path(path).is_file():
-        what = "is a folder" if Path(path).is_dir() else "does not exist"
+    path = as_path(path)
+    if not is_there(path):
+        what = "is a folder" if is_folder(path) else "does not exist"
         raise FileNotFoundError(f"{path} {what}; {kind} is a TOML file.")
     try:
-        document = tomllib.loads(Path(path).read_text(encoding=ENCODING))
+        document = tomllib.loads(read_bytes(path).decode(ENCODING))
     except UnicodeDecodeError:
         raise ValueError(f"{path} is not a text file in UTF-8.") from None
     except tomllib.TOMLDecodeError as error:

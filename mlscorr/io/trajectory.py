@@ -7,10 +7,12 @@ import numpy as np
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
 from mlscorr.io.course import check_heading, checked_motion
+from mlscorr.io.opening import open_file
 from mlscorr.io.output import output_file
 from mlscorr.io.pof import POF_SUFFIX
 from mlscorr.io.sbet import is_sbet, read_riegl, read_sbet
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.storage import as_path
 from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.text_files import warn_of_cut
 from mlscorr.io.trajectory_tables import (
@@ -102,8 +104,8 @@ def read_trajectory_file(
     ValueError, UserWarning
         As read_trajectory; also for what can be understood in two ways.
     """
-    path = Path(path)
-    with path.open("rb") as file:
+    path = as_path(path)
+    with open_file(path) as file:
         start = file.read(SETTINGS.longest_line)
     suffix = path.suffix.lower()
     if suffix == POF_SUFFIX or suffix in SBET_SUFFIXES or is_sbet(path):

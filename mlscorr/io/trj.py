@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.io.opening import read_bytes
+
 MARK = b"TSCANTRJ"
 VERSION = 20010715  # the only one that is documented
 FIELDS = ("gps_time", "easting", "northing", "height", "heading", "roll", "pitch")
@@ -32,7 +34,7 @@ def read_trj(path: str | Path) -> dict[str, np.ndarray]:
     ValueError
         For another version, and a file of another size than its header announces.
     """
-    data = Path(path).read_bytes()
+    data = read_bytes(path)
     start = struct.calcsize("<8s4i")
     mark, version, header, count, width = struct.unpack("<8s4i", data[:start].ljust(start, b"\0"))
     if mark != MARK or version != VERSION or width < 8 * len(FIELDS) or header < start or count < 1:

@@ -25,13 +25,13 @@ class InputFile:
     what : str
         What it is, in words.
     path : Path
-    state : tuple of int
-        Disk, number, size (bytes) and times of change (ns) when its reading began.
+    state : tuple of int or str
+        Disk, number, size (bytes) and times of change (ns; a store's ETag) when its reading began.
     """
 
     what: str
     path: Path
-    state: tuple[int, ...]
+    state: tuple[int | str, ...]
 
 
 @dataclass(frozen=True)

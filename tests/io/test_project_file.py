@@ -59,14 +59,14 @@ def test_drives_are_read_by_their_files(city):
         ([IDS.format("a", "[1, 2]"), IDS.format("b", "[2]")], "point_source_id 2 of .* of one"),
         ([IDS.format("a", "[1]") + SCANNER, IDS.format("b", "[2]")], "can't tell both"),
         (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "are of no drive"),
-        ([DRIVE.format("a").replace("a/*.laz", "s3://bucket/a.laz")], "are addresses"),
+        ([DRIVE.format("a").replace("a/*.laz", "s4://bucket/a.laz")], "unknown scheme s4://"),
         (['[[drive]]\nname = "a"\n'], "give a drive its survey"),
         (["name = 1\n", DRIVE.format("a")], "name = 1 can't be used"),
         (['nmae = "x"\n', DRIVE.format("a")], "the nearest known one is name"),
     ],
 )
 def test_what_is_wrong_is_said(city, parts, words):
-    "Drives without names or files of their own, files of no drive, addresses, unknown keys"
+    "Drives without names or files of their own, files of no drive, unknown schemes and keys"
     with pytest.raises(ValueError, match=words):
         read_project(write(city, *parts))
 

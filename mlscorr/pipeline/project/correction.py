@@ -98,7 +98,7 @@ def correct_project(
         When writing fails.
     """
     options, out = options or Options(), Path(out).absolute()
-    project = read_project(Path(path).absolute())
+    project = read_project(path)
     check_exports(options.trajectories, project.crs, is_read=True)
     _check_out(project, out, options)
     store = TaskStore(out / STORE)
