@@ -26,13 +26,13 @@ def information_edges(layout: Layout, knots: Knots, sides: Sequence[Sides]) -> n
         Numbered as the knots are, and not in the order of elimination.
     """
     about = list(knots.cells.reshape(len(knots.cells), -1).T)
-    pairs = [_distinct(a, b) for a, b in combinations(about, 2)]
+    pairs = [_distinct(combinations(about, 2))]
     for part in sides:
         groups = [[part.unknown]]
         groups += [list(_visible(layout, knots, part, e)) for e in range(part.cell.shape[1])]
         for left, right in combinations(groups, 2):
-            pairs += [_distinct(a, b) for a, b in product(left, right)]
-    return np.concatenate([np.zeros((0, 2), dtype=np.int64), *pairs])
+            pairs.append(_distinct(product(left, right)))
+    return np.concatenate(pairs)
 
 
 def _visible(layout, knots, sides, e):
@@ -44,9 +44,9 @@ def _visible(layout, knots, sides, e):
         yield np.where(is_between, after, -1)
 
 
-def _distinct(a, b):
-    """Distinct pairs of nodes where both are some."""
-    is_pair = (a >= 0) & (b >= 0)
-    size = np.int64(1) << 32
-    codes = np.unique(a[is_pair] * size + b[is_pair])
-    return np.column_stack([codes // size, codes % size])
+def _distinct(pairs):
+    """Distinct pairs (h, 2) of nodes of some pairs of arrays, where both are some."""
+    bits, codes = 32, [np.zeros(0, dtype=np.int64)]
+    codes += [(a << bits | b)[(a >= 0) & (b >= 0)] for a, b in pairs]
+    codes = np.unique(np.concatenate(codes))
+    return np.column_stack([codes >> bits, codes & ((1 << bits) - 1)])
