@@ -58,7 +58,7 @@ PROJECT_FLOORS = (  # of the modules within pipeline/project, which stands on to
     ("drive_estimate", "joint_estimate"),
     ("stages", "corrected"),
     ("document",),
-    ("correction",),
+    ("correction", "checking"),
     ("status",),
 )
 PROJECT_FLOOR = {room: number for number, rooms in enumerate(PROJECT_FLOORS) for room in rooms}

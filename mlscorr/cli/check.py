@@ -11,9 +11,16 @@ CODES = {"survey.toml": Exit.USAGE, "data": Exit.BAD_DATA, "system": Exit.READ_O
 
 
 def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
-    """Tell in seconds all that is wrong with a survey, and what a correction of it will take."""
+    """Tell in seconds all that is wrong with a survey or project, and what correcting it takes."""
     with exit_code(Exit.BAD_DATA):
-        checked = mlscorr.check(survey)
+        from mlscorr.io.project_file import is_project
+
+        if is_project(survey):
+            from mlscorr.pipeline.project import check_project
+
+            checked = check_project(survey)
+        else:
+            checked = mlscorr.check(survey)
     for title, amounts in (
         ("Read", checked.read),
         ("Written", checked.written),

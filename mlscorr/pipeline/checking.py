@@ -73,7 +73,7 @@ def check(path: str | Path) -> CheckedSurvey:
     with glance():
         survey = first.of("data", read_survey, path)
         if survey is not None:
-            return _checked(survey, first)
+            return checked_survey(survey, first)
         faults = Faults()
         find_faults(path, faults)
     for fault in first.faults:
@@ -82,8 +82,17 @@ def check(path: str | Path) -> CheckedSurvey:
     return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
 
 
-def _checked(survey, faults):
-    """The CheckedSurvey of a survey that can be read."""
+def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -> CheckedSurvey:
+    """What a check says of a survey that can be read.
+
+    Parameters
+    ----------
+    survey : Survey
+    faults : Faults
+        Those that are known; more are added.
+    needs_control : bool
+        Whether nothing is corrected where no target is found.
+    """
     for sentence in _crs_conflicts(survey):
         faults.warnings = [warning for warning in faults.warnings if warning != sentence]
         faults.add("data", sentence)
@@ -102,7 +111,7 @@ def _checked(survey, faults):
     sample = faults.of("data", sample_clouds, survey)
     for sentence in sample.warnings if sample else ():
         faults.warn(sentence)
-    probe, notes, unchecked = _looked(survey, faults)
+    probe, notes, unchecked = _looked(survey, faults, needs_control)
     return CheckedSurvey(
         faults=tuple(faults.faults),
         warnings=tuple(faults.warnings),
@@ -173,14 +182,17 @@ def _uncovered(survey, layouts) -> Iterator[str]:
         )
 
 
-def _looked(survey: Survey, faults: Faults) -> tuple[QuickLook | None, list[str], tuple[str, ...]]:
+def _looked(
+    survey: Survey, faults: Faults, needs_control: bool
+) -> tuple[QuickLook | None, list[str], tuple[str, ...]]:
     """What a look at some targets shows, sentences on it, and on what was not looked at."""
     if not len(survey.surveyed):
         return None, [], ("Targets in the cloud: the survey has no control.",)
     if parts := [file.path.name for file in survey.clouds if read_in_part(file.path)]:
         reason = f"Targets in the cloud: {', '.join(parts)} was read by its first points only."
         return None, [], (reason,)
-    faults.of("data", check_control, survey)
+    if needs_control:
+        faults.of("data", check_control, survey)
     problems = Faults()
     probe = problems.of("data", look_near_control, survey)
     if probe is None:
@@ -188,7 +200,8 @@ def _looked(survey: Survey, faults: Faults) -> tuple[QuickLook | None, list[str]
         return None, [], reasons
     matched = probe.matched
     is_whole = len(probe.points) == len(survey.surveyed)
-    if probe.fault or (probe.doubt and is_whole and not len(matched)):
+    is_none = is_whole and not len(matched) and needs_control
+    if probe.fault or (probe.doubt and is_none):
         faults.add("data", probe.fault or probe.doubt)
     elif probe.doubt:
         faults.warn(probe.doubt)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mlscorr
-from mlscorr.pipeline.project import Options, correct_project, project_status
+from mlscorr.pipeline.project import Options, check_project, correct_project, project_status
 from tests.beds import project_street as bed
 from tests.beds.documents import undocumented
 
@@ -159,6 +159,25 @@ def test_points_of_no_drive_are_refused_with_their_tile(project, tmp_path):
     assert fault["name"] == "tiles/tile-1.laz" and "first: 9" in fault["fault"]
     assert f"50 of the {len(cloud)} points" in fault["fault"]
     assert [path.name for path in (tmp_path / "out" / "tiles").iterdir()] == ["tile-2.laz"]
+
+
+def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
+    "A good project has none; a cut tile, a drive without points near and a far point are named"
+    checked = check_project(project)
+    assert not checked.faults
+    amounts = {amount.what: amount.number for amount in (*checked.read, *checked.needed)}
+    clouds = project.parent.glob("*/*.laz")
+    assert amounts["points"] == sum(len(laspy.read(path)) for path in clouds)
+    assert amounts["control points"] == 4 and amounts["memory"] < 2
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    tile = folder / "second" / "tile-2.laz"
+    tile.write_bytes(tile.read_bytes()[:-2000])
+    with open(folder / "control.csv", "a") as file:
+        file.write("far,533500.0,3374000.0,43.0,0.003,0.003,circle,0.6,control\n")
+    checked = check_project(folder)
+    (fault,) = checked.faults
+    assert "tile-2.laz" in fault.sentence and "cut off" in fault.sentence
+    assert any("(first: far)" in sentence for sentence in checked.warnings)
 
 
 def test_a_project_of_one_drive_is_its_survey(project, tmp_path):

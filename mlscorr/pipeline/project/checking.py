@@ -1,0 +1,139 @@
+"""``check`` of a project: all that is wrong with its drives before they are corrected."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from mlscorr.io.conversion import glance
+from mlscorr.io.project_file import ProjectParts, read_project, read_project_file
+from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
+from mlscorr.pipeline.faults import Fault, Faults
+from mlscorr.pipeline.needs import Amount
+from mlscorr.pipeline.project.file_tasks import read_tile
+from mlscorr.pipeline.project.stages import planned_drive, tile_tasks
+from mlscorr.survey import Survey
+
+NO_CONTROL = (
+    "Drive {} has no surveyed point near its clouds: it is corrected by what it saw together with "
+    "other drives, or not at all."
+)
+
+
+def check_project(path: str | Path) -> CheckedSurvey:
+    """Check all drives of a project, as ``check`` does one survey, without correcting them.
+
+    Parameters
+    ----------
+    path : path
+        project.toml, or the folder that holds it.
+
+    Returns
+    -------
+    CheckedSurvey
+        Of all drives: their faults, with their names, and what they take together.
+    """
+    faults = Faults()
+    with glance():
+        if faults.of("survey.toml", read_project_file, path) is None:
+            return _stopped(faults)
+        project = faults.of("data", read_project, path)
+        if project is None:
+            return _stopped(faults)
+        checked = [_checked(survey) for survey in _surveys(project, faults)]
+    _check_control(project, checked, faults)
+    return CheckedSurvey(
+        faults=(*faults.faults, *(fault for _, each in checked for fault in each.faults)),
+        warnings=(*faults.warnings, *_all("warnings", checked)),
+        notes=_notes(checked),
+        unchecked=(*_all("unchecked", checked), "Which drives ties join: their clouds tell."),
+        read=_with_control(_sums([each.read for _, each in checked]), project),
+        written=_sums([each.written for _, each in checked]),
+        needed=_sums([each.needed for _, each in checked]),
+    )
+
+
+def _stopped(faults):
+    """What can be said of a project that can't be read."""
+    reason = "Clouds and targets: the faults come first."
+    return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
+
+
+def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
+    """Surveys of the drives, with the clouds that can be read."""
+    read = [faults.of("data", read_tile, *task.arguments) or {} for task in tile_tasks(project)]
+    surveys = []
+    for drive in project.drives:
+        own = [tiles[drive.name] for tiles in read if drive.name in tiles]
+        planned = faults.of("data", planned_drive, project, drive, own) if own else None
+        if planned is not None:
+            surveys.append(planned.survey)
+        elif not own:
+            faults.add("data", f"No cloud of drive {drive.name} can be read, or has points of it.")
+    return surveys
+
+
+def _checked(survey: Survey) -> tuple[Survey, CheckedSurvey]:
+    """What a check says of a drive, by its name."""
+    checked, name = checked_survey(survey, Faults(), needs_control=False), survey.name
+    return survey, replace(
+        checked,
+        faults=tuple(Fault(fault.where, f"{name}: {fault.sentence}") for fault in checked.faults),
+        warnings=tuple(f"{name}: {sentence}" for sentence in checked.warnings),
+        unchecked=tuple(f"{name}: {sentence}" for sentence in checked.unchecked),
+    )
+
+
+def _check_control(project, checked, faults):
+    """Say which drives have no surveyed point near, and which points are near no drive."""
+    for survey, _ in checked:
+        if not len(survey.surveyed):
+            faults.warn(NO_CONTROL.format(survey.name))
+    near = {name for survey, _ in checked for name in survey.surveyed.name}
+    names = [*project.control.name, *project.check.name]
+    if far := [name for name in names if name not in near]:
+        faults.warn(
+            f"{len(far)} of the {len(names)} surveyed points of {project.path} lie near no cloud "
+            f"by the headers (first: {far[0]})."
+        )
+
+
+def _all(what: str, checked: Sequence[tuple[Survey, CheckedSurvey]]) -> Iterable[str]:
+    """Sentences on all drives."""
+    return [sentence for _, each in checked for sentence in getattr(each, what)]
+
+
+def _notes(checked):
+    """Notes on the drives, with their names where they are not on all."""
+    count = Counter(_all("notes", checked))
+    return tuple(
+        dict.fromkeys(
+            sentence if count[sentence] == len(checked) else f"{survey.name}: {sentence}"
+            for survey, each in checked
+            for sentence in each.notes
+        )
+    )
+
+
+def _with_control(amounts: Sequence[Amount], project: ProjectParts) -> tuple[Amount, ...]:
+    """Amounts with the surveyed points of the project: some lie near two drives."""
+    numbers = {"control points": len(project.control), "check points": len(project.check)}
+    source = project.layout or "of all drives"
+    return tuple(
+        replace(each, number=numbers[each.what], source=source) if each.what in numbers else each
+        for each in amounts
+    )
+
+
+def _sums(parts: Sequence[Sequence[Amount]]) -> tuple[Amount, ...]:
+    """Amounts of all drives together; of memory, the largest of them: a worker holds one file."""
+    total: dict[tuple[str, str], Amount] = {}
+    for amount in (amount for own in parts for amount in own):
+        key = amount.what, amount.unit
+        before = total[key].number if key in total else 0.0
+        number = max(before, amount.number) if amount.what == "memory" else before + amount.number
+        source = f"{len(parts)} drives" if len(parts) > 1 else amount.source
+        total[key] = replace(amount, number=number, source=source)
+    return tuple(total.values())
