@@ -13,6 +13,7 @@ from mlscorr.cli.terminal import (
     Quiet,
     deafen,
     exit_code,
+    path_or_url,
     say,
     say_statements,
     warn,
@@ -85,7 +86,7 @@ def tell(sentence: str) -> None:
 
 
 def status(
-    out: Annotated[Path, typer.Argument(help="Folder of a project's results.")],
+    out: Annotated[Path, typer.Argument(help="Folder of a project's results.", parser=path_or_url)],
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:

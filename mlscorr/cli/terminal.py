@@ -44,7 +44,6 @@ def is_quiet() -> bool:
     return _voice["quiet"]
 
 
-Out = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
 Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in the folder.")]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Print errors and warnings only.")
@@ -75,6 +74,9 @@ SurveyArgument = Annotated[
         help="survey.toml, or the folder that holds it; a path or a URL.",
         parser=path_or_url,
     ),
+]
+Out = Annotated[
+    Path, typer.Option("-o", "--out", help="Folder for the results.", parser=path_or_url)
 ]
 
 

@@ -111,8 +111,11 @@ def read_bytes(path: str | Path) -> bytes:
     ----------
     path : path
     """
-    with open_file(path) as file:
-        return file.read()
+    if is_remote(path):
+        store: Any = path
+        with asking(store):
+            return store.fs.cat_file(store.path)
+    return Path(path).read_bytes()
 
 
 def read_doubles(path: str | Path, start: int = 0, count: int = -1) -> np.ndarray:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from mlscorr.io.folders import exchange, move_into, remove, take_along
 from mlscorr.io.inputs import check_unchanged
-from mlscorr.io.storage import is_remote
+from mlscorr.io.publishing import publish, scratch_folder, write_text
+from mlscorr.io.storage import as_path, is_remote
 from mlscorr.survey import InputFile
 
 try:
@@ -42,6 +43,11 @@ def check_output(out: str | Path, inputs: Iterable[str | Path], overwrite: bool 
     OSError
         When it can't be written.
     """
+    if is_remote(out):
+        raise ValueError(
+            f"{out} is a URL, and these results go to a folder of a disk. Those of a project.toml "
+            'may go to a store, and two lines make one: [[drive]] and survey = "survey.toml".'
+        )
     out = Path(out)
     for path in (out, *out.parents):
         if path.is_symlink() and not path.exists():
@@ -125,7 +131,12 @@ def output_file(path: str | Path) -> Iterator[Path]:
     Path
         The file to write into.
     """
-    path = Path(path)
+    path = as_path(path)
+    if is_remote(path):
+        with scratch_folder() as folder:
+            yield folder / path.name
+            publish(folder / path.name, path)
+        return
     part = path.with_name(path.name + PART)
     try:
         yield part
@@ -266,4 +277,4 @@ def write_json(path: str | Path, content: dict) -> None:
         Without numbers that are not finite.
     """
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    write_text(as_path(path), text + "\n")

@@ -17,6 +17,8 @@ class Settings:
     largest_chunk: int = 10_000_000  # points; lazrs allocates whole LAZ chunks, aborts if it can't
     sigma_step: float = 1e-4  # m, of a point's sigma in 16 bits: up to 6.5 m
     copied_bytes: int = 1 << 20  # at a time, where bytes are copied as they are
+    uploaded_bytes: int = 1 << 24  # at a time, into a store: 10 000 parts at most, memory for two
+    beat: float = 10.0  # s between two signs of life of a run that works in a store
     identified_bytes: int = 1 << 16  # of head and tail: header, first points, table of LAZ chunks
 
     glanced_points: int = 5_000_000  # of a cloud that is no LAS, by check and init: 3 s

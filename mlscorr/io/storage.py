@@ -121,7 +121,7 @@ def is_there(path: Path) -> bool:
         with asking(path):
             return _info(path)["type"] == "file"
     except FileNotFoundError:
-        _check_bucket(path)
+        check_bucket(path)
         return False
 
 
@@ -164,7 +164,7 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
         path.fs.invalidate_cache()
         names = sorted(path.fs.glob(path.path))
     if not names:
-        _check_bucket(path)
+        check_bucket(path)
     return [as_path(path.fs.unstrip_protocol(name)) for name in names]
 
 
@@ -213,6 +213,8 @@ def asking(path: Any) -> Iterator[None]:
     except Exception as error:
         text = " ".join(str(error).split()) or type(error).__name__
         is_cut = isinstance(error.__cause__, OSError)  # which fsspec takes for a missing file
+        if isinstance(error, FileExistsError):
+            raise
         if isinstance(error, FileNotFoundError) and not is_cut:
             raise FileNotFoundError(f"{path} does not exist.") from error
         if isinstance(error, PermissionError) or "Credentials" in type(error).__name__:
@@ -227,8 +229,17 @@ def asking(path: Any) -> Iterator[None]:
         ) from error
 
 
-def _check_bucket(path):
-    """Refuse a path whose bucket isn't there."""
+def check_bucket(path: Any) -> None:
+    """Refuse a path whose bucket isn't there.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    FileNotFoundError
+    """
     bucket = path.parts[0].rstrip("/")
     if path.protocol not in BUCKETS:
         return

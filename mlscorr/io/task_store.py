@@ -17,7 +17,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.folders import remove
+from mlscorr.io.opening import read_bytes
 from mlscorr.io.output import PART
+from mlscorr.io.publishing import locked_in_store, make_folder, names_in, publish, scratch_folder
 from mlscorr.io.storage import is_remote
 
 try:
@@ -25,6 +27,7 @@ try:
 except ImportError:  # Windows: nothing tells that another run is at work
     fcntl = None
 
+SUFFIX = ".result"
 KINDS = (str, int, float, Path, np.generic)  # of values that are told by what they print
 ROOMS = ("mlscorr", "numpy", "scipy", "pathlib", "upath")  # whose classes results hold
 MAKERS = {  # functions that make values; no other is called while a result is loaded
@@ -120,7 +123,16 @@ class TaskStore:
         key : str
             Digest of what it was made of.
         """
-        return self.folder / kind / f"{key}.result"
+        return self.folder / kind / f"{key}{SUFFIX}"
+
+    def keys(self, kind: str) -> set[str]:
+        """Keys of the results that are there.
+
+        Parameters
+        ----------
+        kind : str
+        """
+        return {name.removesuffix(SUFFIX) for name in names_in(self.folder / kind)}
 
     def put(self, kind: str, key: str, value: object) -> None:
         """Keep a result; a checksum stands before it.
@@ -138,13 +150,13 @@ class TaskStore:
         """
         content = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
         path = self.path(kind, key)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         with self.part() as part:
             with open(part, "wb") as file:
                 file.write(hashlib.sha256(content).digest() + content)
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(part, path)
+            publish(part, path)
 
     def get(self, kind: str, key: str) -> Any:
         """A result.
@@ -157,10 +169,14 @@ class TaskStore:
         ------
         KeyError
             Where there is none, or where it is damaged.
+        OSError
+            Where a store doesn't tell.
         """
         try:
-            content = self.path(kind, key).read_bytes()
-        except OSError:
+            content = read_bytes(self.path(kind, key))
+        except OSError as error:
+            if is_remote(self.folder) and not isinstance(error, FileNotFoundError):
+                raise  # it may well be there
             raise KeyError(key) from None
         size = hashlib.sha256().digest_size
         if hashlib.sha256(content[size:]).digest() != content[:size]:
@@ -174,11 +190,17 @@ class TaskStore:
     def part(self, suffix: str = "") -> Iterator[Path]:
         """A place for what isn't whole yet, on the same disk; what is left there is removed.
 
+        Beside a store it is among temporary files.
+
         Parameters
         ----------
         suffix : str
             Of its name.
         """
+        if is_remote(self.folder):
+            with scratch_folder() as folder:
+                yield folder / f"part{suffix}"
+            return
         folder = self.folder / f"part.{secrets.token_hex(8)}"
         folder.mkdir(parents=True)
         path = folder / f"part{suffix}"
@@ -199,6 +221,10 @@ class TaskStore:
         ValueError
             Where another run is at work.
         """
+        if is_remote(self.folder):
+            with locked_in_store(self.folder / "lock"):
+                yield
+            return
         self.folder.mkdir(parents=True, exist_ok=True)
         with open(self.folder / "lock", "w") as lock:
             try:

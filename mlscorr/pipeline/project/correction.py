@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,8 @@ import numpy as np
 from mlscorr.io.output import check_output, output_file, write_json
 from mlscorr.io.project_file import ProjectParts, read_project
 from mlscorr.io.project_sections import SHARED_TILES
+from mlscorr.io.publishing import check_store_output, make_folder, remove_folder
+from mlscorr.io.storage import as_path, is_folder, is_remote
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.io.trajectory_exports import check_exports
 from mlscorr.pipeline.clouds import WrittenClouds
@@ -97,7 +98,7 @@ def correct_project(
     OSError
         When writing fails.
     """
-    options, out = options or Options(), Path(out).absolute()
+    options, out = options or Options(), as_path(out).absolute()
     project = read_project(path)
     check_exports(options.trajectories, project.crs, is_read=True)
     _check_out(project, out, options)
@@ -112,20 +113,21 @@ def correct_project(
 
 def _check_out(project, out, options):
     """Refuse a folder of other results; an old run's go where nothing is resumed."""
-    is_ours = (out / STORE).is_dir()
+    is_ours = is_folder(out / STORE)
     if is_ours and not (options.resume or options.overwrite):
         raise ValueError(
             f"{out} holds results of a project already. --resume does what is missing or changed "
             "there, --overwrite does all again; or choose another folder."
         )
-    check_output(out, project.files, options.overwrite or (options.resume and is_ours))
+    check = check_store_output if is_remote(out) else check_output
+    check(out, project.files, options.overwrite or (options.resume and is_ours))
     for drive in project.drives:
         for folder in (drive.name, SHARED_TILES):
-            check_output(out / folder, drive.parts.files.clouds, overwrite=True)
+            check(out / folder, drive.parts.files.clouds, overwrite=True)
     if options.overwrite and not options.resume and is_ours:
         with TaskStore(out / STORE).locked():
-            shutil.rmtree(out / STORE)
-    out.mkdir(parents=True, exist_ok=True)
+            remove_folder(out / STORE)
+    make_folder(out)
 
 
 @dataclass(frozen=True)

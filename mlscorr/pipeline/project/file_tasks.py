@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Sequence
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ from mlscorr.io.identity import FileIdentity
 from mlscorr.io.las import count_sources
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box
+from mlscorr.io.publishing import make_folder, publish
 from mlscorr.io.survey_file import cloud_file
 from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.clouds import WrittenClouds, write_counted
@@ -220,8 +220,8 @@ def _moved_into(store, target):
             yield part, outputs
             for path in sorted(path for path in part.rglob("*") if path.is_file()):
                 there = target / path.relative_to(part)
-                there.parent.mkdir(parents=True, exist_ok=True)
-                os.replace(path, there)
+                make_folder(there.parent)
+                publish(path, there)
                 name = there.relative_to(store.parent).as_posix()
                 outputs.append((name, FileIdentity.of(there)))
         finally:

@@ -12,6 +12,7 @@ from time import monotonic
 from typing import TextIO
 
 from mlscorr.io.output import output_file
+from mlscorr.io.publishing import appended
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task
 
@@ -127,7 +128,7 @@ def logged(log: Path, plan: Path, tell: Callable[[str], object]) -> Iterator[Pro
     plan, tell
         As of Progress.
     """
-    with open(log, "a", encoding="utf-8") as stream:
+    with appended(log) as stream:
         progress = Progress(stream, plan, tell)
         try:
             yield progress

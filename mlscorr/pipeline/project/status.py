@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from mlscorr.io.opening import read_bytes
 from mlscorr.io.output import document
+from mlscorr.io.storage import as_path, is_there
 from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.project.correction import STORE
 from mlscorr.pipeline.project.progress import TITLES
@@ -30,23 +32,24 @@ def project_status(out: str | Path) -> dict:
     ValueError
         Where no project was ever corrected into the folder.
     """
-    out = Path(out)
+    out = as_path(out)
     plan = out / STORE / "plan.json"
-    if not plan.is_file():
+    if not is_there(plan):
         raise ValueError(
             f"{out} holds no results of a project, or its run has not begun with any file yet: "
             "mlscorr correct project.toml -o OUT makes them."
         )
-    stages, store = json.loads(plan.read_text(encoding="utf-8")), TaskStore(out / STORE)
+    stages, store = json.loads(read_bytes(plan)), TaskStore(out / STORE)
+    done = {kind: store.keys(kind) for kind in stages}
     tasks = [
-        {**task, "kind": kind, "is_done": store.path(kind, task["key"]).is_file()}
+        {**task, "kind": kind, "is_done": task["key"] in done[kind]}
         for kind in TITLES
         for task in stages.get(kind, ())
     ]
     drives: dict[str, list[dict]] = {}
     for task in tasks:
         drives.setdefault(task["drive"], []).append(task)
-    lines = (out / "log.txt").read_text(encoding="utf-8").splitlines()
+    lines = read_bytes(out / "log.txt").decode().splitlines()
     return document(
         "status",
         {

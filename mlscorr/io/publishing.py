@@ -1,0 +1,268 @@
+"""What is written into a folder of a disk or of a store: whole files or none, and a lock."""
+
+from __future__ import annotations
+
+import io
+import os
+import secrets
+import shutil
+import socket
+import tempfile
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any, TextIO, cast
+
+from mlscorr.io.opening import read_bytes
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.storage import asking, check_bucket, is_remote, is_there
+
+WEB = ("http", "https")
+S3 = ("s3", "s3a")  # schemes of stores that take a file in parts, side by side
+
+
+def names_in(folder: Any) -> list[str]:
+    """Names in a folder, in order; none where there is no folder.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    OSError
+        Where a store doesn't tell, or its bucket is missing.
+    """
+    if not is_remote(folder):
+        return sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    try:
+        with asking(folder):
+            folder.fs.invalidate_cache()
+            paths = folder.fs.ls(folder.path, detail=False)
+    except FileNotFoundError:
+        check_bucket(folder)
+        return []
+    return sorted(path.rstrip("/").rpartition("/")[2] for path in paths)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder; a store has none.
+
+    Parameters
+    ----------
+    folder : Path
+    """
+    if not is_remote(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+
+
+def remove_folder(folder: Any) -> None:
+    """Remove a folder and all that is in it.
+
+    Parameters
+    ----------
+    folder : Path
+    """
+    if not is_remote(folder):
+        shutil.rmtree(folder)
+        return
+    with asking(folder):
+        folder.fs.invalidate_cache()
+        folder.fs.rm(folder.path, recursive=True)
+
+
+def publish(source: Path, target: Any) -> None:
+    """Give a whole file its place; what is there is replaced.
+
+    Parameters
+    ----------
+    source : Path
+        On the disk of the target, or on any where that is in a store.
+    target : Path
+
+    Raises
+    ------
+    OSError
+        When it can't be written: the target is then as it was.
+    """
+    if not is_remote(target):
+        os.replace(source, target)
+        return
+    parts = {"chunksize": SETTINGS.uploaded_bytes, "max_concurrency": 2}
+    with asking(target):
+        how = parts if target.protocol in S3 else {}
+        target.fs.put_file(str(source), target.path, **how)
+        target.fs.invalidate_cache()
+
+
+def write_text(path: Any, text: str) -> None:
+    """Write a text file; in a store it appears whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    text : str
+    """
+    if not is_remote(path):
+        path.write_text(text, encoding="utf-8")
+        return
+    with asking(path):
+        path.fs.pipe_file(path.path, text.encode())
+
+
+def check_store_output(out: Path, inputs: Iterable[Path], overwrite: bool) -> None:
+    """Refuse an output folder in a store that holds an input, or anything that may not be replaced.
+
+    Parameters
+    ----------
+    out, inputs, overwrite
+        As of check_output.
+
+    Raises
+    ------
+    ValueError
+        For a folder that can't be meant.
+    OSError
+        As names_in.
+    """
+    if cast(Any, out).protocol in WEB:
+        raise ValueError(
+            f"{out} is of a web server, which takes no results: name a store or a disk."
+        )
+    present = names_in(out)
+    for path in inputs:
+        if is_remote(path) and path.parent == out:
+            raise ValueError(
+                f"The output folder {out} holds the input {path.name}, which must stay as it is. "
+                "Choose another folder."
+            )
+    if present and not overwrite:
+        raise ValueError(
+            f"The output folder {out} holds {len(present)} entries already (first: {present[0]}). "
+            "Choose another folder, or allow with --overwrite that files of the same name are "
+            "replaced."
+        )
+
+
+class _StoredText(io.StringIO):
+    """Text that is put into a store beat by beat, and in the end."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.path, self.due = path, 0.0
+        if is_there(path):
+            self.write(read_bytes(path).decode())
+
+    def flush(self):
+        if monotonic() >= self.due:
+            self.due = monotonic() + SETTINGS.beat
+            with suppress(OSError):  # what it tells of matters more than the log
+                write_text(self.path, self.getvalue())
+
+    def close(self):
+        self.due = 0.0
+        self.flush()
+        super().close()
+
+
+def appended(path: Path) -> TextIO:
+    """A text file to write on, behind what is there.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    return _StoredText(path) if is_remote(path) else open(path, "a", encoding="utf-8")
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A folder among those for temporary files (which TMPDIR names), gone in the end."""
+    with tempfile.TemporaryDirectory(prefix="mlscorr-") as name:
+        yield Path(name)
+
+
+@contextmanager
+def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
+    """Keep other runs out by an object, rewritten beat by beat, which goes in the end.
+
+    One that stays the same for three beats is of a run that was killed, and is taken over: no clock
+    of another machine is trusted.
+
+    Parameters
+    ----------
+    lock : Path
+        In a store.
+    beat : float
+        Units: s.
+
+    Raises
+    ------
+    ValueError
+        Where another run is at work.
+    """
+    owner = f"{socket.gethostname()}, process {os.getpid()}"
+    ended = threading.Event()
+
+    def sign():
+        return f"{owner}\n{secrets.token_hex(8)}".encode()
+
+    def keep():
+        while not ended.wait(beat):
+            with suppress(OSError), asking(lock):  # the next beat may come through
+                lock.fs.pipe_file(lock.path, sign())
+
+    while not _is_new(lock, sign()):
+        _wait_for_end(lock, beat)
+        _remove(lock)
+    keeper = threading.Thread(target=keep, daemon=True)
+    keeper.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        keeper.join()
+        _remove(lock)
+
+
+def _remove(lock):
+    """Remove a lock, if it is there."""
+    with suppress(OSError), asking(lock):
+        lock.fs.rm_file(lock.path)
+
+
+def _is_new(lock, content):
+    """Whether a lock could be made where none was."""
+    try:
+        with asking(lock):
+            lock.fs.invalidate_cache()
+            lock.fs.pipe_file(lock.path, content, mode="create")
+    except FileExistsError:
+        return False
+    return True
+
+
+def _wait_for_end(lock, beat):
+    """Return once a lock has not changed for three beats, or is gone; refuse one that changes."""
+    first, end = _content(lock), monotonic() + 3 * beat
+    while monotonic() < end:
+        sleep(beat / 4)
+        now = _content(lock)
+        if not now:
+            return
+        if now != first:
+            raise ValueError(
+                f"Another run is at work in {lock.parent.parent} ({now.splitlines()[0]}): wait for "
+                "its end, or end it first. mlscorr status tells how far it has come."
+            )
+
+
+def _content(lock):
+    """Text of a lock, nothing where it is gone."""
+    try:
+        with asking(lock):
+            return lock.fs.cat_file(lock.path).decode()
+    except FileNotFoundError:
+        return ""
