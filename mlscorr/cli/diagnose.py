@@ -49,6 +49,13 @@ def diagnose(
             help="Put what is found into the simulator and look again, until nothing is found.",
         ),
     ] = False,
+    costs: Annotated[
+        str,
+        typer.Option(
+            help="What mistakes cost: careful, default or sensitive; or three numbers, of a false "
+            "alarm, a miss and unknown, where a wrong name costs 1: 4,1,0.9 is the default.",
+        ),
+    ] = "default",
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -61,6 +68,7 @@ def diagnose(
         if effects:
             register_file(effects)
         believed = read_simulator(simulator) if simulator else None
+        chosen = _costs(costs)
         if len(simulated) > 2:
             raise ValueError(
                 f"--simulated is given {len(simulated)} times: give the clouds of one run, and "
@@ -77,16 +85,36 @@ def diagnose(
         if until_none:
             from mlscorr.pipeline.rounds import diagnose_until_none
 
-            diagnosed = diagnose_until_none(recorded, believed, progress=progress)
+            diagnosed = diagnose_until_none(recorded, believed, progress=progress, costs=chosen)
         else:
-            runs = tuple(simulated)
-            diagnosed = mlscorr.diagnose(recorded, believed, progress=progress, simulated=runs)
+            diagnosed = mlscorr.diagnose(
+                recorded, believed, progress=progress, simulated=tuple(simulated), costs=chosen
+            )
         content = diagnosed.write(out, overwrite)
     print_json(content, as_json)
     _tell(content)
     say(f"Page:      {out / 'gap.html'}")
     say(f"Numbers:   {out / 'gap.json'}")
     say(f"Simulator: {out / 'simulator.toml'}")
+
+
+def _costs(text):
+    """Costs by the name of an operating point, or of three numbers."""
+    from mlscorr.gap import Costs
+    from mlscorr.gap.train.report import OPERATING_POINTS
+
+    if text in OPERATING_POINTS:
+        return OPERATING_POINTS[text]
+    try:
+        numbers = [float(number) for number in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3 or not all(0 <= number < float("inf") for number in numbers):
+        raise ValueError(
+            f"--costs {text} is neither {', '.join(OPERATING_POINTS)} nor three numbers from 0 on: "
+            "of a false alarm, a miss and unknown, where a wrong name costs 1, as 4,1,0.9."
+        )
+    return Costs(*numbers)
 
 
 def _tell(content):

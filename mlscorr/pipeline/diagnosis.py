@@ -97,6 +97,7 @@ def diagnose(
     'time_offset'
     """
     rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
+    costs = Costs() if costs is None else costs
     survey.check_one_scanner("a diagnosis")
     library = known_effects() if library is None else library
     progress = progress or silent
@@ -124,7 +125,7 @@ def diagnose(
     step(2)
     return DiagnosedSurvey(
         survey, simulator, effects, part, inference, closure, plan, left_out, compared.notes,
-        absence, signs_of_part,
+        absence, signs_of_part, costs,
     )  # fmt: skip
 
 
@@ -155,6 +156,7 @@ class DiagnosedSurvey(Summary):
     warnings: tuple[str, ...]
     absence: Absence = field(default_factory=Absence)
     signatures: tuple[Signature, ...] = ()
+    costs: Costs = field(default_factory=Costs)
 
     @property
     def document(self) -> dict:
@@ -174,6 +176,7 @@ class DiagnosedSurvey(Summary):
             absence=self.absence,
         )
         agreement = agreements(self.rows, background(self.rows, believed))
+        content["costs"] = vars(self.costs)
         content["agreement"] = [vars(part) for part in agreement]
         return document("gap", gap_screen(content) | content)
 

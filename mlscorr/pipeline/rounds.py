@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from mlscorr.effects import Effect
+from mlscorr.gap import Costs
 from mlscorr.gap.close import LoneEffect, lone_effects
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
 from mlscorr.pipeline.settings import SETTINGS
@@ -56,6 +57,7 @@ class DiagnosedRounds:
                     "round": number,
                     "label": verdict.label,
                     "probability": float(verdict.probability),
+                    "parameters": [asdict(size) for size in each.inference.cause.parameters],
                     "before": closure.before,
                     "after": closure.after,
                     "unit": closure.unit,
@@ -96,12 +98,13 @@ def diagnose_until_none(
     simulator: Simulator | None = None,
     library: Iterable[type[Effect]] | None = None,
     progress: Callable | None = None,
+    costs: Costs | None = None,
 ) -> DiagnosedRounds:
     """Diagnose, put what was named into the simulator, and again, until nothing is left.
 
     Parameters
     ----------
-    survey, simulator, library, progress
+    survey, simulator, library, progress, costs
         As of ``diagnose``.
 
     Raises
@@ -110,7 +113,7 @@ def diagnose_until_none(
         As ``diagnose`` does.
     """
     library = library if library is None else tuple(library)
-    rounds = [diagnose(survey, simulator, library, progress=progress)]
+    rounds = [diagnose(survey, simulator, library, progress=progress, costs=costs)]
     while len(rounds) < SETTINGS.rounds:
         last = rounds[-1]
         if last.inference.verdict.label in ("none", "unknown"):
@@ -119,7 +122,7 @@ def diagnose_until_none(
             improved = last.improved
         except ValueError:  # larger than any survey can have
             break
-        rounds.append(diagnose(survey, improved, library, progress=progress))
+        rounds.append(diagnose(survey, improved, library, progress=progress, costs=costs))
     first = rounds[0]
     lone = lone_effects(
         first.rows, first.signatures, first.inference, np.random.default_rng(SETTINGS.seed)

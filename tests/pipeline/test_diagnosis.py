@@ -12,9 +12,11 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.gap.infer.causes import Cause
+from mlscorr.gap.infer.decision import kind_of
 from mlscorr.gap.infer.error_models import STATED
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.gap.signatures.simulators import as_believed, with_cause
+from mlscorr.gap.train.cases import RANDOM
 from mlscorr.io.las import read_chunks
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator
@@ -26,7 +28,7 @@ KEYS = {
     *("schema", "verdict", "gap", "headline", "advice", "where", "causes", "separability"),
     *("closure", "next_data", "evidence", "innovations", "windows", "map", "channels"),
     *("simulator", "left_out", "warnings", "notes", "name", "absent"),
-    *("rating", "statements", "agreement"),
+    *("rating", "statements", "agreement", "costs"),
 }
 
 
@@ -268,3 +270,22 @@ def test_nothing_wrong_is_not_said_of_what_was_not_seen(sound, tmp_path):
         assert "T05" in found["next_data"][0]["survey"]
         diagnosed.write(tmp_path / "out")
         assert "not everything was seen" in (tmp_path / "out" / "gap.html").read_text()
+
+
+@pytest.mark.parametrize("given", ["cautious", "4,1", "4,1,-1", "4;1;1", "4,1,nan"])
+def test_costs_that_are_none_are_refused_before_anything_is_read(late, tmp_path, given):
+    "A name that there isn't, two numbers, one below zero: exit code 2, with what is meant"
+    command = ["diagnose", str(late), "-o", str(tmp_path / "out"), "--costs", given]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 2
+    assert "careful" in done.output and "4,1,0.9" in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_costs_choose_the_label(late, tmp_path):
+    "Where a false alarm costs a million, no cause is named for a clock that is surely off"
+    command = ["diagnose", str(late), "-o", str(tmp_path / "out"), "--costs", "1e6,1,0.9"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    told = json.loads((tmp_path / "out" / "gap.json").read_text())
+    assert told["costs"] == {"false_alarm": 1e6, "miss": 1.0, "unknown": 0.9}
+    assert kind_of(told["verdict"]["label"], RANDOM) in ("none", "noise")

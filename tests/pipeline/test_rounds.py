@@ -29,16 +29,21 @@ def survey(tmp_path_factory):
 def test_one_command_finds_the_cause_and_then_none(survey, tmp_path):
     "Two rounds: the clock, then nothing; the simulator has 20 ms to 1 ms, the table both"
     out = tmp_path / "out"
-    done = CliRunner().invoke(app, ["diagnose", str(survey), "-o", str(out), "--until-none"])
+    command = ["diagnose", str(survey), "-o", str(out), "--until-none", "--costs", "careful"]
+    done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
     told = json.loads((out / "gap.json").read_text())
     assert not undocumented(told)
+    assert told["costs"]["false_alarm"] == 10.0
     rounds = told["ablation"]["rounds"]
     assert [each["label"] for each in rounds] == ["time_offset", "none"]
     assert rounds[0]["after"] < 0.1 * rounds[0]["before"]
     assert told["ablation"]["alone"][0]["effect"] == "time_offset"
     assert "nothing is left to find" in told["ablation"]["ended"]
     assert "time_offset alone" in done.output and "round 2: none" in done.output
+    page = " ".join((out / "gap.html").read_text().split())
+    assert "1. Scanner clock offset" in page and "2. Nothing" in page
+    assert rounds[0]["parameters"][0]["estimate"] == pytest.approx(0.02, abs=1e-3)
     (effect,) = read_simulator(out / "simulator.toml").effects
     assert effect.magnitude == pytest.approx(0.02, abs=1e-3)
 

@@ -11,7 +11,9 @@ from mlscorr.report.gap.rows import (
     bin_rows,
     cause_rows,
     detectable_rows,
+    lone_rows,
     meanings,
+    round_rows,
     split_title,
     worst_rows,
 )
@@ -36,6 +38,7 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "causes": "Causes in numbers",
     "separability": "What can be told apart",
     "closure": "How far it shrinks",
+    "rounds": "Round by round",
     "map": "Map",
     "next": "What to measure next",
     "used": "What was compared",
@@ -70,6 +73,8 @@ def diagnosis_page(document: dict, name: str) -> Page:
     is_empty = {key: key not in figures for key in ("where", "innovations", "evidence", "map")}
     is_empty["separability"] = not separability["correlation"]["names"]
     is_empty |= {"closure": not is_judged(document), "causes": not document["causes"]}
+    ablation = document.get("ablation") or {"rounds": [], "alone": []}
+    is_empty["rounds"] = not ablation["rounds"]
     content = {
         "figures": figures,
         "verdict": verdict(document),
@@ -85,6 +90,8 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "meanings": meanings(document),
         "smallest_rows": detectable_rows(detectable),
         "closed": shrunk(closure) if is_closed(document) else "",
+        "rounds": round_rows(ablation["rounds"]),
+        "alone": lone_rows(ablation["alone"]),
         "tested": lowered(title(closure["effect"] or "none")),
         "compared": bool(document["map"]["rows"]),
         "channels": [(channel_style(key).words, n) for key, n in document["channels"].items()],

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from mlscorr.effects.wording import DASH, known
-from mlscorr.report.gap.labels import meaning, title
-from mlscorr.report.gap.numbers import column, plain
+from mlscorr.report.gap.labels import meaning, sentences_of, title
+from mlscorr.report.gap.numbers import column, percent, plain, signed
 
 COVARIATES = {
     "time": "Time since the start",
@@ -70,6 +70,50 @@ class DetectableRow:
     typical: str
     ratio: float | None
     visible: str
+
+
+@dataclass(frozen=True)
+class RoundRow:
+    """What was put into the simulator, its size in a sentence, and the gap; texts."""
+
+    title: str
+    size: str
+    before: str
+    after: str
+    gone: str
+
+
+def round_rows(rounds: list[dict]) -> list[RoundRow]:
+    """Rows of the table of rounds.
+
+    Parameters
+    ----------
+    rounds : list of dict
+        Of ``ablation`` in gap.json.
+    """
+    rows = []
+    for each in rounds:
+        label, gap = each["label"], [signed(each[k], each["unit"]) for k in ("before", "after")]
+        sizes = " ".join(sentences_of(label, each["parameters"], lambda _: ""))
+        gone = DASH if label == "none" else percent(each["shrink"])
+        rows.append(RoundRow(f"{each['round']}. {title(label)}", sizes, *gap, gone))
+    return rows
+
+
+def lone_rows(effects: list[dict]) -> list[RoundRow]:
+    """Rows of the table of effects by themselves, in the first round.
+
+    Parameters
+    ----------
+    effects : list of dict
+        ``alone`` of ``ablation`` in gap.json.
+    """
+    return [
+        RoundRow(
+            title(r["effect"]), "", *(signed(r[k], r["unit"]) for k in ("before", "after")), ""
+        )
+        for r in effects
+    ]
 
 
 def split_title(split: dict) -> str:
