@@ -28,7 +28,7 @@ GAP_FLOORS = (  # of the rooms within gap, likewise
     ("observe",),
     ("signatures",),
     ("infer",),
-    ("close", "plan", "train"),
+    ("close", "plan", "train", "contrast"),
     ("document",),  # and the door, __init__, which opens on all of them
 )
 GAP_FLOOR = {room: number for number, rooms in enumerate(GAP_FLOORS) for room in rooms}
@@ -120,8 +120,8 @@ def test_imports_within_a_project_point_downward(path):
 
 
 def test_the_gap_is_a_story_of_few_rooms():
-    "At most eight rooms on five floors"
-    assert len(GAP_FLOOR) + 1 <= 8
+    "At most nine rooms on five floors"
+    assert len(GAP_FLOOR) + 1 <= 9
     assert len(GAP_FLOORS) <= 5
 
 

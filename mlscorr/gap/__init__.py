@@ -3,6 +3,7 @@
 The story, a room each:
 
 - observe: rows of observed minus simulated, from targets, surfaces and planes that passes share
+- contrast: channels beside geometry, of a real and a simulated cloud
 - signatures: what each effect does to these rows, and the simulator as it is believed
 - infer: the verdict, causes with their parameters, where the gap lies, what can be told apart
 - close: the simulator with the cause in it, on data that were not used to find it

@@ -22,6 +22,14 @@ from mlscorr.gap import (
     find_absence,
     without_effects,
 )
+from mlscorr.gap.contrast import (
+    Contrast,
+    DistributionDistance,
+    SampleCollector,
+    cloud_distances,
+    contrast_clouds,
+    contrast_returns,
+)
 from mlscorr.gap.observe import (
     Pairing,
     Patches,
@@ -59,6 +67,10 @@ class ComparedRows:
         What they add to the rows in the simulator; or what its next run changed.
     absence : Absence
     notes : tuple of str
+    contrasts : tuple of Contrast
+        Of the channels beside geometry.
+    distances : tuple of DistributionDistance
+        Between the clouds, where there are simulated ones.
     """
 
     rows: Rows
@@ -66,6 +78,8 @@ class ComparedRows:
     simulated: Callable | np.ndarray
     absence: Absence
     notes: tuple[str, ...]
+    contrasts: tuple[Contrast, ...] = ()
+    distances: tuple[DistributionDistance, ...] = ()
 
 
 def compare_with_belief(
@@ -96,11 +110,18 @@ def compare_with_belief(
     ValueError
         When there is too little to say anything.
     """
-    pairing, rows, beams, absence = _observed(survey, believed, library, progress)
+    pairing, rows, beams, absence, patches = _observed(survey, believed, library, progress)
     simulator = BeamSimulator(rows, believed, beams, effects, seed)
     used = np.arange(len(rows)) < len(pairing.rows)
     observed = without_effects(rows, believed, effects)
-    return ComparedRows(observed, used, simulator.added, absence, pairing.notes)
+    contrasts = contrast_returns(believed, patches, _loss(effects))
+    return ComparedRows(observed, used, simulator.added, absence, pairing.notes, contrasts)
+
+
+def _loss(effects):
+    """Share of returns that a simulator with these effects loses; None where it has no dropout."""
+    lost = [effect.magnitude for effect in effects if effect.name == "dropout"]
+    return 1.0 - float(np.prod(1.0 - np.array(lost))) if lost else None
 
 
 def compare_with_clouds(
@@ -127,13 +148,16 @@ def compare_with_clouds(
         For clouds that can't be read or paired, or too little to say anything.
     """
     opened = [simulated_survey(folder, believed) for folder in folders]
-    finding, patches, _, notes = _read(believed, progress)
+    sampler = SampleCollector(believed)
+    finding, patches, _, notes = _read(believed, progress, sampler)
+    samples = [sampler.sample(patches)]
     absence = find_absence(believed, finding.matches)
     matched = _with_moved(finding, believed).matches.matched
     patches = None if patches is None else spread_patches(patches)
     compared = []
     for simulated in opened:
-        clouds = _simulated_clouds(simulated, patches, progress)
+        clouds, sample = _simulated_clouds(simulated, patches, progress)
+        samples.append(sample)
         rows, sentence = rows_against(believed, matched, finding.candidates, patches, clouds)
         compared.append(rows)
         notes = (*notes, sentence)
@@ -148,24 +172,27 @@ def compare_with_clouds(
         )
     is_check = np.isin(first.targets.name, survey.check.name)
     used = (first.survey_item < 0) | ~is_check[first.survey_item]
+    channels = contrast_clouds(believed, *samples[:2]), cloud_distances(*samples)
     if following:
-        return ComparedRows(first, used, first.residual - following[0].residual, absence, notes)
+        change = first.residual - following[0].residual
+        return ComparedRows(first, used, change, absence, notes, *channels)
 
     def to_first_order(effects):
         return expected(first, believed, effects).shift
 
-    return ComparedRows(first, used, to_first_order, absence, (*notes, LINEAR))
+    return ComparedRows(first, used, to_first_order, absence, (*notes, LINEAR), *channels)
 
 
 def _simulated_clouds(simulated, patches, progress):
-    """SimulatedClouds of a simulated survey, read once."""
-    collector, beams = PatchCollector(simulated), None
+    """SimulatedClouds and ChannelSample of a simulated survey, read once."""
+    collector, sampler, beams = PatchCollector(simulated), SampleCollector(simulated), None
     if patches is not None:
         beams = SimulatedBeams(patches)
 
     def read(file):
         for chunk in read_chunks(file):
             collector.add(file, chunk)
+            sampler.add(chunk)
             if beams is not None:
                 beams.add(chunk)
             yield chunk
@@ -178,7 +205,9 @@ def _simulated_clouds(simulated, patches, progress):
             f"{simulated.path} was simulated with other beams than the survey's. "
             f"{finding.warnings[0]}"
         )
-    return SimulatedClouds(simulated.name, finding.matches.matched, collector.patches(), beams)
+    flat = collector.patches()
+    clouds = SimulatedClouds(simulated.name, finding.matches.matched, flat, beams)
+    return clouds, sampler.sample(flat)
 
 
 def _with_moved(finding: Finding, survey: Survey) -> Finding:
@@ -195,11 +224,13 @@ def _with_moved(finding: Finding, survey: Survey) -> Finding:
     return replace(finding, matches=matches)
 
 
-def _read(believed, progress) -> tuple[Finding, Patches | None, Surroundings, tuple[str, ...]]:
+def _read(
+    believed, progress, sampler=None
+) -> tuple[Finding, Patches | None, Surroundings, tuple[str, ...]]:
     """The Finding, Patches, Surroundings and notes.
 
-    The clouds are read once: targets, patches and what lies about targets are taken from each
-    chunk as it comes.
+    The clouds are read once: targets, patches, what lies about targets and, where there is a
+    SampleCollector, its sample are taken from each chunk as it comes.
     """
     collector, surroundings = PatchCollector(believed), Surroundings(believed)
 
@@ -207,14 +238,20 @@ def _read(believed, progress) -> tuple[Finding, Patches | None, Surroundings, tu
         for chunk in read_chunks(file):
             collector.add(file, chunk)
             surroundings.add(chunk)
+            if sampler is not None:
+                sampler.add(chunk)
             yield chunk
 
     finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
     return finding, collector.patches(), surroundings, notes
 
 
-def _observed(survey, believed, library, progress) -> tuple[Pairing, Rows, Beams, Absence]:
-    """The Pairing, all its rows, check points last, the Beams on which they stand, the Absence."""
+def _observed(
+    survey, believed, library, progress
+) -> tuple[Pairing, Rows, Beams, Absence, Patches | None]:
+    """The Pairing, all its rows, check points last, the Beams on which they stand, the Absence, the
+    Patches.
+    """
     finding, patches, surroundings, notes = _read(believed, progress)
     absence = find_absence(believed, finding.matches)
     finding = _with_moved(finding, believed)
@@ -225,4 +262,4 @@ def _observed(survey, believed, library, progress) -> tuple[Pairing, Rows, Beams
     pairing = replace(pairing, notes=(*notes, *pairing.notes))
     rows = Rows.concatenate([pairing.rows, pairing.check])
     beams = collect_beams(believed, rows, finding, patches, surroundings)
-    return pairing, rows, beams, absence
+    return pairing, rows, beams, absence, patches

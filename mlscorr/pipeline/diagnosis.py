@@ -28,6 +28,12 @@ from mlscorr.gap import (
     next_data,
     with_cause,
 )
+from mlscorr.gap.contrast import (
+    Contrast,
+    DistributionDistance,
+    innovation_distances,
+    replica_innovations,
+)
 from mlscorr.gap.signatures import Signature, select, signatures
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
@@ -112,8 +118,9 @@ def diagnose(
     step = progress("Weighing the causes", STEPS)
     signs, left_out = signatures(observed, believed, library, rng)
     part, signs_of_part = observed.select(used), select(signs, used)
+    errors = background(part, believed)
     inference = infer_causes(
-        part, background(part, believed), believed, signs_of_part, rng, absence=absence, costs=costs
+        part, errors, believed, signs_of_part, rng, absence=absence, costs=costs
     )
     step(2)
     cause, change = cause_for_simulator(part, signs_of_part, inference), compared.simulated
@@ -125,8 +132,15 @@ def diagnose(
     step(2)
     return DiagnosedSurvey(
         survey, simulator, effects, part, inference, closure, plan, left_out, compared.notes,
-        absence, signs_of_part, costs,
+        absence, signs_of_part, costs, compared.contrasts,
+        (*compared.distances, *_of_innovations(part, errors, inference)),
     )  # fmt: skip
+
+
+def _of_innovations(rows, errors, inference):
+    """DistributionDistances of innovations from those of replicas, by channel of rows."""
+    where, replicas = inference.where, replica_innovations(rows, errors, inference)
+    return innovation_distances(rows.channel[where.row], where.innovation, replicas)
 
 
 def _looks_again(absence):
@@ -157,6 +171,8 @@ class DiagnosedSurvey(Summary):
     absence: Absence = field(default_factory=Absence)
     signatures: tuple[Signature, ...] = ()
     costs: Costs = field(default_factory=Costs)
+    contrasts: tuple[Contrast, ...] = ()
+    distances: tuple[DistributionDistance, ...] = ()
 
     @property
     def document(self) -> dict:
@@ -177,6 +193,8 @@ class DiagnosedSurvey(Summary):
         )
         agreement = agreements(self.rows, background(self.rows, believed))
         content["costs"] = vars(self.costs)
+        content["contrasts"] = [contrast.document() for contrast in self.contrasts]
+        content["distances"] = [distance.document() for distance in self.distances]
         content["agreement"] = [vars(part) for part in agreement]
         return document("gap", gap_screen(content) | content)
 
@@ -201,8 +219,8 @@ class DiagnosedSurvey(Summary):
         Parameters
         ----------
         name : str
-            ``where``, ``innovations`` (over time), ``evidence``, ``separability``, ``closure`` or
-            ``map``.
+            ``where``, ``innovations`` (over time), ``evidence``, ``separability``, ``closure``,
+            ``channels`` or ``map``.
 
         Raises
         ------

@@ -118,10 +118,44 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
         "map": plan_of(rng, rows),
         "channels": {"target": 48, "surface": 1000, "roughness": 961},
         "simulator": {"effects": []},
+        "contrasts": contrasts(),
+        "distances": [
+            {
+                "channel": channel,
+                "figure": figure,
+                "unit": "m",
+                "before": 0.0821,
+                "after": None,
+                "floor": -0.0003,
+                "floor_high": 0.0114,
+                "drawn": 500,
+                "halves": 40,
+                "seed": 0,
+            }
+            for channel, figure in (("points", "chamfer"), ("surface", "energy_distance"))
+        ],
         "left_out": {"beam_divergence": "No row of this survey depends on it."},
         "warnings": ["No plane was seen twice."],
     }
     return document | changes
+
+
+def contrasts():
+    "Intensity that falls off beyond 20 m, of all 3 bins one unknown; nothing of the others"
+    table = {
+        "by": "range", "edges": [0, 10, 20, 40], "real": [8660.0, 8101.6, None],
+        "simulated": [8669.5, 11342.0, None], "value": [0.9989, 0.7143, None],
+        "sigma": [0.0021, 0.0052, None], "blocks": [20.1, 17.3, 2.0],
+        "differs": [False, True, False],
+    }  # fmt: skip
+    common = {"unit": "counts", "whole": None, "confidence": 0.99, "replicas": 400, "seed": 0}
+    said = "Real returns are 1.40 ± 0.01 times weaker than simulated ones beyond 10 m."
+    return [
+        {"channel": "intensity", "figure": "ratio", "silent": "", "tables": [table],
+         "sentences": [said], **common},
+        {"channel": "edge_width", "figure": "difference", "silent": "Too few depth edges.",
+         "tables": [], "sentences": [], **common},
+    ]  # fmt: skip
 
 
 def splits(rng):

@@ -12,6 +12,7 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.io.simulated_clouds import simulated_survey
 from mlscorr.simulate import Scenario, simulate
+from tests.beds.documents import undocumented
 
 OFFSET = 0.02  # s
 
@@ -53,6 +54,22 @@ def test_the_effect_that_their_simulator_lacks_is_named(compared):
     (offset,) = compared["causes"][0]["parameters"]
     assert offset["estimate"] == pytest.approx(OFFSET, abs=5e-4)
     assert {"target", "surface"} <= set(compared["channels"])
+
+
+def test_channels_and_distances_are_compared_with_their_clouds(compared):
+    "All channels have figures and differ in nothing; distances before and after, with floors"
+    assert not undocumented(compared)
+    assert not any(
+        each["silent"] for each in compared["contrasts"] if each["channel"] != "edge_width"
+    )
+    assert [text for each in compared["contrasts"] for text in each["sentences"]] == []
+    assert {"points", "intensity", "density", "target"} <= {
+        r["channel"] for r in compared["distances"]
+    }
+    targets = [row for row in compared["distances"] if row["channel"] == "target"]
+    assert all(row["before"] > row["floor_high"] for row in targets)
+    (chamfer,) = [row for row in compared["distances"] if row["figure"] == "chamfer"]
+    assert chamfer["after"] < chamfer["before"]
 
 
 def test_their_next_run_tells_how_far_the_gap_shrinks(compared):

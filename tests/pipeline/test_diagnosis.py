@@ -28,7 +28,7 @@ KEYS = {
     *("schema", "verdict", "gap", "headline", "advice", "where", "causes", "separability"),
     *("closure", "next_data", "evidence", "innovations", "windows", "map", "channels"),
     *("simulator", "left_out", "warnings", "notes", "name", "absent"),
-    *("rating", "statements", "agreement", "costs"),
+    *("rating", "statements", "agreement", "costs", "contrasts", "distances"),
 }
 
 

@@ -24,9 +24,7 @@ def fit_patches(
     share : float
         Of the blocks of the ground, that are looked at.
     """
-    block = _chance(
-        *np.floor(chunk.xyz[:, :2] / (SETTINGS.block_cells * SETTINGS.cell)).T.astype(np.int64)
-    )
+    block = block_chance(chunk.xyz)
     rows = np.flatnonzero(inside & (block < share))
     key = place_key(chunk.xyz[rows], chunk.gps_time[rows])
     order = np.argsort(key, kind="stable")
@@ -39,6 +37,18 @@ def fit_patches(
     rows = rows[np.repeat(keep, count)]
     count = count[keep]
     return _fit(survey, chunk, rows, count, block)
+
+
+def block_chance(xyz: np.ndarray) -> np.ndarray:
+    """A number from 0 to 1 (n,) for the block of the ground of points, the same in all clouds.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    """
+    cells = np.floor(xyz[:, :2] / (SETTINGS.block_cells * SETTINGS.cell))
+    return chance(*cells.T.astype(np.int64))
 
 
 def place_key(xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
@@ -69,7 +79,7 @@ def _mix(*numbers):
     return mixed
 
 
-def _chance(*numbers):
+def chance(*numbers: np.ndarray) -> np.ndarray:
     """A number from 0 to 1 (n,) that depends on integers (n,) alone."""
     return (_mix(*numbers) >> np.uint64(11)) / float(1 << 53)
 

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from mlscorr.effects.wording import known
 from mlscorr.report.gap.accuracy import accuracy_figure
+from mlscorr.report.gap.channels import channels_figure
 from mlscorr.report.gap.innovations import innovations_figure
 from mlscorr.report.gap.ladder import ladder, ladder_figure
 from mlscorr.report.gap.rows import detectable_rows, worst_rows
@@ -32,6 +33,7 @@ def diagnosis_figures(document: dict) -> Figures:
         "evidence": (ladder_figure, ladder(document)),
         "closure": (closure_figure, is_closed(document)),
         "map": (site_map, document["map"]["trajectory"]),
+        "channels": (channels_figure, any(c["tables"] for c in document.get("contrasts", ()))),
     }
     drawn = {name: partial(draw, document) for name, (draw, content) in figures.items() if content}
     return drawn | _separability(document["separability"])

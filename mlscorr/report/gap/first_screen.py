@@ -8,6 +8,7 @@ from itertools import groupby
 from mlscorr.effects.wording import joined
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.signatures.signatures import NO_MOUNTING
+from mlscorr.report.gap.channels import channel_statements
 from mlscorr.report.gap.labels import lowered, title
 from mlscorr.report.gap.verdict import facts, is_named, verdict
 from mlscorr.report.headline import Statement, statements_section, warning_statements
@@ -37,7 +38,8 @@ def gap_screen(document: dict) -> dict[str, object]:
     ]
     answer = Statement("Unmodelled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
     warnings = warning_statements(document["warnings"])
-    return statements_section([*accuracy(document), answer, *unjudged(document), *warnings])
+    beside = (*channel_statements(document), *unjudged(document))
+    return statements_section([*accuracy(document), answer, *beside, *warnings])
 
 
 def accuracy(document: dict) -> Iterator[Statement]:

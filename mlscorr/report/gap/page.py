@@ -2,11 +2,17 @@
 
 from mlscorr.effects.wording import DASH, joined
 from mlscorr.report.gap.accuracy import accuracy_sentence
+from mlscorr.report.gap.channels import (
+    WORDS,
+    channel_rows,
+    channel_statements,
+    distance_rows,
+)
 from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
 from mlscorr.report.gap.first_screen import accuracy, unjudged
 from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.labels import family, lowered, title, titles
-from mlscorr.report.gap.numbers import percent
+from mlscorr.report.gap.numbers import percent, signed
 from mlscorr.report.gap.rows import (
     bin_rows,
     cause_rows,
@@ -18,7 +24,7 @@ from mlscorr.report.gap.rows import (
     worst_rows,
 )
 from mlscorr.report.gap.settings import SETTINGS
-from mlscorr.report.gap.shrinking import is_closed, shrunk
+from mlscorr.report.gap.shrinking import is_closed, shrunk, span
 from mlscorr.report.gap.verdict import (
     VerdictBox,
     advice,
@@ -39,6 +45,8 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "separability": "What can be told apart",
     "closure": "How far it shrinks",
     "rounds": "Round by round",
+    "channels": "Other channels",
+    "distances": "Other distances",
     "map": "Map",
     "next": "What to measure next",
     "used": "What was compared",
@@ -74,12 +82,13 @@ def diagnosis_page(document: dict, name: str) -> Page:
     is_empty["separability"] = not separability["correlation"]["names"]
     is_empty |= {"closure": not is_judged(document), "causes": not document["causes"]}
     ablation = document.get("ablation") or {"rounds": [], "alone": []}
-    is_empty["rounds"] = not ablation["rounds"]
+    is_empty |= {"rounds": not ablation["rounds"], "distances": not document.get("distances")}
+    is_empty["channels"] = not document.get("contrasts")
     content = {
         "figures": figures,
         "verdict": verdict(document),
         "facts": facts(document),
-        "others": [fact.document() for fact in (*accuracy(document), *unjudged(document))],
+        "others": [fact.document() for fact in _statements(document)],
         "smallest": smallest(detectable) if is_clean else [],
         "splits_in_words": joined(lowered(split_title(split)) for split in document["where"]),
         "bin_rows": bin_rows(document),
@@ -92,6 +101,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "closed": shrunk(closure) if is_closed(document) else "",
         "rounds": round_rows(ablation["rounds"]),
         "alone": lone_rows(ablation["alone"]),
+        **_channels(document),
         "tested": lowered(title(closure["effect"] or "none")),
         "compared": bool(document["map"]["rows"]),
         "channels": [(channel_style(key).words, n) for key, n in document["channels"].items()],
@@ -156,6 +166,26 @@ def _page(document, name, headline, summary, sections, separability, content):
 def _drawn(figures):
     """Figures by name, each as the address of an image."""
     return {name: data_uri(svg(draw())) for name, draw in figures.items()}
+
+
+def _statements(document):
+    """What stands on the first screen beside the verdict."""
+    return *accuracy(document), *channel_statements(document), *unjudged(document)
+
+
+def _channels(document):
+    """What is shown of channels beside geometry, and of distances."""
+    contrasts, gap = document.get("contrasts", ()), document["gap"]
+    sides = (signed(gap[when], gap["unit"]) for when in ("before", "after"))
+    return {
+        "channel_sentences": [text for each in contrasts for text in each["sentences"]],
+        "channels_silent": [
+            (WORDS[c["channel"]][0], c["silent"]) for c in contrasts if c["silent"]
+        ],
+        "channel_rows": channel_rows(document),
+        "distance_rows": distance_rows(document),
+        "gap_words": f"{' before, '.join(sides)} after ({span(gap)} when nothing is wrong)",
+    }
 
 
 def _by_probability(rows):

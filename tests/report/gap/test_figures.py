@@ -9,7 +9,7 @@ from tests.beds.gap_documents import gap_document, plan_document
 def test_each_figure_has_a_name():
     "Those of a page, and nothing where a document has nothing to show"
     document = gap_document()
-    names = ["where", "innovations", "evidence", "closure", "map", "separability"]
+    names = ["where", "innovations", "evidence", "closure", "map", "channels", "separability"]
     assert list(diagnosis_figures(document)) == names
     assert list(plan_figures(plan_document())) == ["detectable", "accuracy", "map", "separability"]
     assert "where" not in diagnosis_figures(document | {"where": []})

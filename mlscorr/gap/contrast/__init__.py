@@ -1,0 +1,11 @@
+"""Channels beside geometry: intensity, density, lost returns and edges, real against simulated."""
+
+from mlscorr.gap.contrast.channels import contrast_clouds, contrast_returns
+from mlscorr.gap.contrast.distances import (
+    DistributionDistance,
+    cloud_distances,
+    innovation_distances,
+)
+from mlscorr.gap.contrast.replicas import replica_innovations
+from mlscorr.gap.contrast.sample import ChannelSample, SampleCollector
+from mlscorr.gap.contrast.tables import Contrast

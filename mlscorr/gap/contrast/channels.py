@@ -1,0 +1,239 @@
+"""Channels of a real cloud beside those of a simulated one, by range, incidence and reflectance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mlscorr.gap.contrast.blocks import block_of, weights_of
+from mlscorr.gap.contrast.edges import Edges
+from mlscorr.gap.contrast.pairs import PairedCells, paired_cells
+from mlscorr.gap.contrast.sample import ChannelSample
+from mlscorr.gap.contrast.settings import SETTINGS
+from mlscorr.gap.contrast.tables import Binning, Contrast, Measure
+from mlscorr.gap.contrast.words import SILENT, sentence
+from mlscorr.gap.observe.covariates import scanner_origin
+from mlscorr.gap.observe.patches import Patches
+from mlscorr.survey import Survey
+
+CLASSES = ("dark", "medium", "bright")
+
+
+def contrast_clouds(
+    survey: Survey, real: ChannelSample, simulated: ChannelSample
+) -> tuple[Contrast, ...]:
+    """A Contrast of each channel of two clouds.
+
+    Parameters
+    ----------
+    survey : Survey
+    real, simulated : ChannelSample
+    """
+    pairs = paired_cells(survey, real, simulated)
+    return _judged([
+        _intensity(pairs, real, simulated),
+        _density(pairs),
+        _dropout(survey, real.patches, simulated.patches),
+        _edge_width(real, simulated),
+    ])  # fmt: skip
+
+
+def contrast_returns(
+    survey: Survey, patches: Patches | None, loss: float | None
+) -> tuple[Contrast, ...]:
+    """The same of a cloud and of what is believed: lost returns alone can be compared.
+
+    Parameters
+    ----------
+    survey : Survey
+    patches : Patches or None
+    loss : float or None
+        Share of returns that the simulator loses; None where it says nothing of it.
+    """
+    silent = [Contrast(name, SILENT[name]) for name in ("intensity", "density", "edge_width")]
+    return _judged([silent[0], silent[1], _dropout(survey, patches, None, loss), silent[2]])
+
+
+def _judged(channels: Sequence[Contrast | Measure]) -> tuple[Contrast, ...]:
+    """Contrasts with what differs by more than chance, however much is looked at."""
+    tables = [
+        [measure.table(split) for split in measure.splits] if isinstance(measure, Measure) else []
+        for measure in channels
+    ]
+    tests = sum(int(np.isfinite(table.value).sum()) + 1 for part in tables for table, _ in part)
+    return tuple(
+        _contrast(each, part, tests) if isinstance(each, Measure) else each
+        for each, part in zip(channels, tables, strict=True)
+    )
+
+
+def _contrast(measure, tables, tests):
+    """The Contrast of a Measure: its clearest table speaks first, the others of what that leaves.
+
+    Things that are far are often seen at a slant, too: a difference by range shows by incidence.
+    """
+    judged = [table.judged(tests, measure.least) for table, _ in tables]
+    clear = [_explained(table, sums) for table, (_, sums) in zip(judged, tables, strict=True)]
+    whole, sums_of_all = measure.whole()
+    whole = whole.judged(tests, measure.least)
+    sentences = []
+    if max(clear) == 0.0:  # too few blocks in each bin, and enough in all
+        sentences.append(sentence(measure, whole, sums_of_all))
+    else:
+        best = int(np.argmax(clear))
+        first, split = judged[best], measure.splits[best]
+        sentences.append(sentence(measure, first, tables[best][1]))
+        number = split.number(first.edges)
+        change = np.where(number >= 0, np.nan_to_num(first.value)[number], 0.0)
+        rest = measure.without(change)
+        for other in measure.splits:
+            if other is not split:
+                table, sums = rest.table(other)
+                text = sentence(rest, table.judged(tests, rest.least), sums)
+                sentences.append(f"Beyond that, {text[:1].lower()}{text[1:]}" if text else "")
+    return Contrast(measure.channel, "", whole, tuple(judged), tuple(filter(None, sentences)))
+
+
+def _explained(table, sums):
+    """Mean square of the values that differ, by the weight of their bins."""
+    weight = sums[..., -1].sum(axis=0)
+    squares = np.where(table.differs, np.nan_to_num(table.value) ** 2, 0.0)
+    return float((weight * squares).sum() / max(weight.sum(), 1e-300))
+
+
+def _weights(block):
+    return weights_of(int(block.max()) + 1, np.random.default_rng(SETTINGS.seed))
+
+
+def _by_sight(away, incidence):
+    """Splits by range (n,) in m and angle of incidence (n,) in deg."""
+    return (
+        Binning("range", away, SETTINGS.ranges),
+        Binning("incidence", incidence, SETTINGS.incidences),
+    )
+
+
+def _intensity(
+    pairs: PairedCells, real: ChannelSample, simulated: ChannelSample
+) -> Contrast | Measure:
+    """The ratio of intensities beside the median one, which units make."""
+    for name, cloud in (("survey's", real), ("simulated", simulated)):
+        if not cloud.has_intensity:
+            return Contrast("intensity", f"The {name} cloud has no intensity: all are the same.")
+    known = pairs[np.isfinite(pairs.brightness).all(axis=1)]
+    if len(known) == 0:
+        return Contrast("intensity", SILENT["apart"])
+    ratio = np.log(10.0) * (known.brightness[:, 0] - known.brightness[:, 1])
+    classes = Binning("reflectance", _classes(known), bins=CLASSES)
+    splits = (*_by_sight(known.range, known.incidence), classes)
+    return _of_ratio(known, ratio, _weights(known.block), splits)
+
+
+def _of_ratio(pairs, ratio, weights, splits):
+    """Measure of the intensity by log ratios (n,)."""
+    medians = _medians(ratio, pairs.block, weights)
+
+    def figure(sums):
+        is_replica = sums.ndim > 2  # not of bins and columns alone
+        return sums[..., 0] / sums[..., 3] - (medians[1:, None] if is_replica else medians[0])
+
+    return Measure(
+        "intensity", pairs.block, [ratio, *pairs.brightness.T, np.ones(len(pairs))], figure,
+        lambda s: (10 ** (s[:, 1] / s[:, 3]), 10 ** (s[:, 2] / s[:, 3])), weights,
+        lambda change: _of_ratio(pairs, ratio - change, weights, splits), splits,
+    )  # fmt: skip
+
+
+def _medians(ratio, block, weights):
+    """Median of ratios (n,), and of each replica of the blocks."""
+    order = np.argsort(ratio)
+    medians = [np.median(ratio)]
+    for each in weights:
+        total = np.cumsum(each[block[order]])
+        medians.append(ratio[order][np.searchsorted(total, 0.5 * total[-1])])
+    return np.array(medians)
+
+
+def _classes(pairs):
+    """Third (n,) of brightness beside things of the same range and incidence; -1 unknown."""
+    brightness = pairs.brightness.mean(axis=1)
+    splits = _by_sight(pairs.range, pairs.incidence)
+    bins = np.column_stack([split.number(split.edges) for split in splits])
+    group = np.unique(bins, axis=0, return_inverse=True)[1].reshape(len(pairs))
+    excess = np.full(len(pairs), np.nan)
+    for number in np.unique(group[(bins >= 0).all(axis=1)]):
+        rows = np.flatnonzero(group == number)
+        excess[rows] = brightness[rows] - np.median(brightness[rows])
+    if not np.isfinite(excess).any():
+        return np.full(len(pairs), -1)
+    thirds = np.nanquantile(excess, [1 / 3, 2 / 3])
+    return np.where(np.isfinite(excess), np.searchsorted(thirds, excess), -1)
+
+
+def _density(pairs: PairedCells) -> Contrast | Measure:
+    """Points of the real cloud over those of the simulated one."""
+    if len(pairs) == 0 or not pairs.points.any(axis=0).all():
+        return Contrast("density", SILENT["apart"])
+    splits = _by_sight(pairs.range, pairs.incidence)
+    return _of_points(pairs.block, *pairs.points.T, _weights(pairs.block), splits)
+
+
+def _of_points(block, real, simulated, weights, splits):
+    """Measure of the density by numbers of points (n,)."""
+    return Measure(
+        "density", block, [real, simulated, real + simulated],
+        lambda sums: np.log(sums[..., 0] / sums[..., 1]), lambda s: (s[:, 0], s[:, 1]), weights,
+        lambda change: _of_points(block, real, simulated * np.exp(change), weights, splits), splits,
+    )  # fmt: skip
+
+
+def _of_means(channel, block, real, simulated, splits, weights=None):
+    """Measure of the difference of two means, of pairs of sums and numbers (n,) of things."""
+    weights = _weights(block) if weights is None else weights
+    (a, m), (b, n) = real, simulated
+
+    def without(change):
+        return _of_means(channel, block, real, (b + n * change, n), splits, weights)
+
+    return Measure(
+        channel, block, [a, m, b, n, m + n],
+        lambda sums: sums[..., 0] / sums[..., 1] - sums[..., 2] / sums[..., 3],
+        lambda s: (s[:, 0] / s[:, 1], s[:, 2] / s[:, 3]), weights, without, splits,
+    )  # fmt: skip
+
+
+def _dropout(
+    survey: Survey, patches: Patches | None, simulated: Patches | None, loss: float | None = None
+) -> Contrast | Measure:
+    """Beams without a return, between those of a scan line that have one."""
+    if patches is None or not patches.fired.any():
+        return Contrast("dropout", SILENT["pulses"])
+    if simulated is None and loss is None:
+        return Contrast("dropout", SILENT["dropout"])
+    if simulated is not None and not simulated.fired.any():
+        return Contrast("dropout", SILENT["pulses"])
+    joined = Patches.concatenate([part for part in (patches, simulated) if part is not None])
+    sight = joined.centre - scanner_origin(survey, joined.gps_time)
+    away = np.linalg.norm(sight, axis=1)
+    slant = np.abs(np.einsum("pi,pi->p", sight, joined.normal)) / away
+    fired, is_real = joined.fired.astype(float), np.arange(len(joined)) < len(patches)
+    lost = fired - joined.returned
+    real, other = (lost * is_real, fired * is_real), (lost * ~is_real, fired * ~is_real)
+    if simulated is None:
+        other = loss * fired, fired
+    splits = _by_sight(away, np.degrees(np.arccos(np.clip(slant, 0.0, 1.0))))
+    return _of_means("dropout", block_of(joined.centre), real, other, splits)
+
+
+def _edge_width(real: ChannelSample, simulated: ChannelSample) -> Contrast | Measure:
+    """Over which angle depth edges are smeared. Units: mrad."""
+    share = min(real.edge_share, simulated.edge_share)
+    sides = [each.edges[each.edges.chance < share] for each in (real, simulated)]
+    if min(map(len, sides)) < SETTINGS.least_blocks:
+        return Contrast("edge_width", SILENT["edges"])
+    joined = Edges.concatenate(sides)
+    is_real, width = np.arange(len(joined)) < len(sides[0]), 1e3 * joined.width
+    sums = [(width * which, which.astype(float)) for which in (is_real, ~is_real)]
+    splits = (Binning("range", joined.range, SETTINGS.ranges),)
+    return _of_means("edge_width", block_of(joined.place), *sums, splits)

@@ -1,0 +1,251 @@
+"""Distances between distributions, as other fields state a gap: energy, MMD and Chamfer distance.
+
+Each stands beside what it is between two halves of one simulation: zero looks like that. The
+estimators of energy distance and MMD have no bias, so that they may be negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from mlscorr.gap.contrast.cells import sampled
+from mlscorr.gap.contrast.sample import ChannelSample
+from mlscorr.gap.contrast.settings import SETTINGS
+from mlscorr.gap.observe.plane_fit import chance
+
+UNITS = {"points": "m", "intensity": "decades", "density": "decades"}  # of clouds; else sigmas
+
+
+@dataclass(frozen=True)
+class DistributionDistance:
+    """A distance between a real and a simulated sample.
+
+    Parameters
+    ----------
+    channel : str
+        What the samples are of.
+    figure : str
+        energy_distance, mmd or chamfer.
+    unit : str
+    before, after : float
+        With the simulator as it was, and with the cause in it; NaN where it didn't run again. Mean
+        over draws of halves.
+    floor, floor_high : float
+        Between halves of the simulation: mean over draws, and what 95 % of these are below.
+    drawn : int
+        Size of each sample, at most.
+    """
+
+    channel: str
+    figure: str
+    unit: str
+    before: float
+    after: float
+    floor: float
+    floor_high: float
+    drawn: int
+
+    def document(self) -> dict:
+        """A row of ``distances`` in gap.json."""
+        return vars(self) | {"halves": SETTINGS.halves, "seed": SETTINGS.seed}
+
+
+def energy_distance(x: np.ndarray, y: np.ndarray) -> float:
+    """2 E|X - Y| - E|X - X'| - E|Y - Y'| (Szekely and Rizzo 2013), without bias.
+
+    Parameters
+    ----------
+    x, y : (n, d) and (m, d) array
+        At least two rows each.
+
+    >>> energy_distance(np.array([[0.0], [2.0]]), np.array([[5.0], [7.0]]))
+    6.0
+    """
+    return float(2 * cdist(x, y).mean() - _mean_of_pairs(cdist(x, x)) - _mean_of_pairs(cdist(y, y)))
+
+
+def maximum_mean_discrepancy(x: np.ndarray, y: np.ndarray, bandwidth: float) -> float:
+    """Square of the maximum mean discrepancy (Gretton et al. 2012, Eq. 3), without bias.
+
+    Parameters
+    ----------
+    x, y : (n, d) and (m, d) array
+        At least two rows each.
+    bandwidth : float
+        One sigma of the Gaussian kernel.
+
+    >>> maximum_mean_discrepancy(np.zeros((3, 1)), np.full((3, 1), 9.0), 1.0)
+    2.0
+    """
+
+    def kernel(a, b):
+        return np.exp(-0.5 * cdist(a, b, "sqeuclidean") / bandwidth**2)
+
+    own = _mean_of_pairs(kernel(x, x)) + _mean_of_pairs(kernel(y, y))
+    return float(own - 2 * kernel(x, y).mean())
+
+
+def chamfer_distance(x: np.ndarray, y: np.ndarray) -> float:
+    """Mean distance to the nearest point of the other cloud, both ways.
+
+    Parameters
+    ----------
+    x, y : (n, d) and (m, d) array
+
+    >>> chamfer_distance(np.array([[0.0], [1.0]]), np.array([[0.0]]))
+    0.25
+    """
+    there, back = cKDTree(y).query(x)[0], cKDTree(x).query(y)[0]
+    return float(0.5 * (there.mean() + back.mean()))
+
+
+def _mean_of_pairs(table):
+    """Mean of a table (n, n) without its diagonal."""
+    n = len(table)
+    return (table.sum() - np.trace(table)) / (n * (n - 1))
+
+
+def cloud_distances(
+    real: ChannelSample, simulated: ChannelSample, following: ChannelSample | None = None
+) -> tuple[DistributionDistance, ...]:
+    """Distances of a cloud from the simulator's, and from those of its next run.
+
+    Real pulses of one half are compared with simulated ones of the other, as the simulated halves
+    are with each other: two clouds of the same beams lie on each other point by point.
+
+    Parameters
+    ----------
+    real, simulated : ChannelSample
+    following : ChannelSample, optional
+    """
+    clouds = [cloud for cloud in (real, simulated, following) if cloud is not None]
+    share = min(cloud.point_share for cloud in clouds)
+    points = [sampled(cloud.points, share) for cloud in clouds]
+    origin = points[0].xyz.mean(axis=0) if len(points[0]) else np.zeros(3)
+    pulses = [part.gps_time.view(np.int64) for part in points]
+    places = [_Sample(part.xyz - origin, pulse) for part, pulse in zip(points, pulses, strict=True)]
+    distances = [*_of_samples("points", places, {"chamfer": chamfer_distance})]
+    distances += _of_samples("points", places)
+    if all(cloud.has_intensity for cloud in clouds):
+        counts = [np.log10(np.maximum(part.intensity.astype(float), 1.0)) for part in points]
+        distances += _of_samples("intensity", [
+            _Sample(c[:, None], pulse) for c, pulse in zip(counts, pulses, strict=True)
+        ])  # fmt: skip
+    ground = min(cloud.share for cloud in clouds)
+    cells = [cloud.cells[cloud.cells.chance < ground] for cloud in clouds]
+    density = [_Sample(np.log10(part.points)[:, None], part.key.view(np.int64)) for part in cells]
+    return (*distances, *_of_samples("density", density))
+
+
+def innovation_distances(
+    channel: np.ndarray, innovation: np.ndarray, replicas: np.ndarray
+) -> tuple[DistributionDistance, ...]:
+    """Distances of innovations from those of replicas of the survey in which nothing acts.
+
+    Both are over their own scatter, that after the cause: a noise that is stated too large is no
+    gap, and of what is left the shape alone counts.
+
+    Parameters
+    ----------
+    channel : (n,) str array
+    innovation : (n, 2) array
+        Before and after the cause is in the simulator.
+    replicas : (n, r) array
+    """
+    distances: list[DistributionDistance] = []
+    for name in dict.fromkeys(channel.tolist()):
+        here = channel == name
+        values = innovation[here] / max(innovation[here, 1].std(), 1e-300)
+        others = replicas[here] / np.maximum(replicas[here].std(axis=0), 1e-300)
+        number = min(int(here.sum()), SETTINGS.drawn)
+        pairs = {
+            "before": _against_replicas(values[:, :1], others),
+            "after": _against_replicas(values[:, 1:], others),
+            "floor": _against_replicas(others, others[:, ::-1]),
+        }
+        figures = _pairwise(others[:, :1])
+        distances += _of_draws(name, figures, pairs, dict.fromkeys(figures, number))
+    return tuple(distances)
+
+
+def _against_replicas(values, replicas):
+    """A function that draws a column of values (n, k), and another replica, in random order."""
+
+    def draw(number, rng):
+        columns = values[:, number % values.shape[1]], replicas[:, number % replicas.shape[1]]
+        return tuple(rng.permutation(column)[:, None] for column in columns)
+
+    return draw
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """Values (n, d), and which pulse or cell (n,) each is of: the same in all clouds."""
+
+    values: np.ndarray
+    identity: np.ndarray
+
+    def half(self, salt, is_first, rng):
+        """Values of one half in random order."""
+        in_first = chance(self.identity, np.full(len(self.values), salt)) < 0.5
+        rows = np.flatnonzero(in_first == is_first)
+        return self.values[rng.permutation(rows)]
+
+
+def _of_samples(channel, samples, figures=None):
+    """DistributionDistances of real things from those of one simulation or two."""
+    real, simulated, *following = samples
+    figures = _pairwise(simulated.values) if figures is None else figures
+    smallest = min(len(sample.values) for sample in samples)
+    half = smallest // 2 - smallest // 8  # halves are not quite alike
+    number = {
+        name: min(half, SETTINGS.points if name == "chamfer" else SETTINGS.drawn)
+        for name in figures
+    }
+
+    def draws(x, y):
+        def draw(salt, rng):
+            return x.half(salt, True, rng), y.half(salt, False, rng)
+
+        return draw
+
+    pairs = {"before": draws(real, simulated), "floor": draws(simulated, simulated)}
+    if following:
+        pairs["after"] = draws(real, following[0])
+    return _of_draws(channel, figures, pairs, number)
+
+
+def _of_draws(channel, figures, pairs, number):
+    """A DistributionDistance of each figure, where there are things enough."""
+    for name, figure in figures.items():
+        size = number[name]
+        if size < SETTINGS.least_blocks:
+            continue
+        values = {}
+        for when, draw in pairs.items():
+            rng = np.random.default_rng(SETTINGS.seed)
+            samples = (draw(salt, rng) for salt in range(SETTINGS.halves))
+            values[when] = [figure(x[:size], y[:size]) for x, y in samples]
+        mean = {when: float(np.mean(drawn)) for when, drawn in values.items()}
+        yield DistributionDistance(
+            channel, name, "" if name == "mmd" else UNITS.get(channel, "sigmas"),
+            mean["before"], mean.get("after", np.nan), mean["floor"],
+            float(np.percentile(values["floor"], 95)), size,
+        )  # fmt: skip
+
+
+def _pairwise(simulated) -> dict[str, Callable]:
+    """Energy distance and MMD, whose bandwidth is the median distance in the simulation."""
+    some = simulated[:: max(1, len(simulated) // SETTINGS.drawn)]
+    apart = cdist(some, some)
+    apart = apart[apart > 0]
+    bandwidth = float(np.median(apart)) if len(apart) else 1.0
+    return {
+        "energy_distance": energy_distance,
+        "mmd": lambda x, y: maximum_mean_discrepancy(x, y, bandwidth),
+    }

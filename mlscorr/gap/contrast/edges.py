@@ -1,0 +1,156 @@
+"""Depth edges along scan lines: over which angle a line passes from a surface to one behind it.
+
+A thin beam steps from the near surface to the far one. A wide one measures pulses between, or
+both surfaces with one pulse, as long as its footprint lies on both: their number times the angle
+between pulses is the width of the edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.gap.contrast.settings import SETTINGS
+from mlscorr.gap.observe.plane_fit import chance
+from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.simulate.scan import recorded_platform
+from mlscorr.survey import PointCloud, Survey
+from mlscorr.survey.columns import Columns
+
+
+@dataclass(frozen=True, repr=False)
+class Edges(Columns):
+    """Depth edges.
+
+    Parameters
+    ----------
+    gps_time : (e,) array
+        Units: s.
+    place : (e, 3) array
+        On the near surface. Units: m.
+    range : (e,) array
+        Of the near surface. Units: m.
+    width : (e,) array
+        Units: rad.
+    """
+
+    gps_time: np.ndarray
+    place: np.ndarray
+    range: np.ndarray
+    width: np.ndarray
+
+    @property
+    def chance(self) -> np.ndarray:
+        """A number from 0 to 1 (e,) of the moment, the same in all clouds."""
+        return chance(np.floor(self.gps_time / OBSERVE.moment).astype(np.int64))
+
+
+class EdgeCollector:
+    """Keeps about `limit` depth edges of the chunks that it is given.
+
+    Parameters
+    ----------
+    survey : Survey
+    limit : int, optional
+    """
+
+    def __init__(self, survey: Survey, limit: int | None = None):
+        self._survey, self._limit = survey, SETTINGS.kept if limit is None else limit
+        self._origin = survey.trajectory.position.mean(axis=0)
+        self._platform = recorded_platform(survey, self._origin)
+        self._parts, self.share = [_edges(np.empty((0, 3)), np.empty(0), *[np.empty(0)] * 2)], 1.0
+
+    def add(self, chunk: PointCloud) -> None:
+        """Take the edges of a chunk."""
+        inside = chunk[self._survey.trajectory.segment(chunk.gps_time) >= 0]
+        if len(inside) == 0:
+            return
+        if (np.diff(inside.gps_time) < 0).any():
+            inside = inside[np.argsort(inside.gps_time, kind="stable")]
+        level = np.zeros(len(inside))
+        sight = inside.xyz - self._origin
+        sight -= self._platform.place(inside.gps_time, level, level, level, np.zeros(3))
+        rough = max(OBSERVE.roughest, 6 * np.sqrt(6) * self._survey.scanner.range_noise)
+        edges = edges_of(inside, sight, rough)
+        self._parts.append(edges[edges.chance < self.share])
+        while sum(map(len, self._parts)) > self._limit:
+            self.share /= 2
+            self._parts = [part[part.chance < self.share] for part in self._parts]
+
+    def edges(self) -> Edges:
+        """Edges of all chunks so far."""
+        return Edges.concatenate(self._parts)
+
+
+def _edges(place, gps_time, away, width):
+    return Edges(gps_time, place, away, width)
+
+
+def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
+    """Depth edges of points in order of time.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    sight : (n, 3) array
+        From the scanner to each. Units: m.
+    rough : float
+        Second difference of ranges below which points lie on one surface. Units: m.
+    """
+    away = np.linalg.norm(sight, axis=1)
+    beam = sight / np.maximum(away, 1e-9)[:, None]
+    turn = np.append(np.inf, np.linalg.norm(np.diff(beam, axis=0), axis=1))
+    across = turn * np.minimum(away, np.append(np.inf, away[:-1]))
+    is_more = (np.diff(cloud.gps_time, prepend=-np.inf) == 0) & (across < SETTINGS.same_pulse)
+    first = np.flatnonzero(~is_more)
+    near, far = np.minimum.reduceat(away, first), np.maximum.reduceat(away, first)
+    time, step = cloud.gps_time[first], np.append(turn[first][1:], np.inf)
+    pause = np.append(np.diff(time), np.inf)
+    follows = pause <= 1.5 * np.median(pause)
+    bend = np.full(len(first), np.inf)
+    bend[1:-1] = np.abs(near[2:] - 2 * near[1:-1] + near[:-2])
+    is_smooth = (bend <= rough) & follows & np.append(False, follows[:-1])
+    begin, end = _between_plateaus(is_smooth, follows)
+    if len(begin) == 0:
+        return _edges(np.empty((0, 3)), np.empty(0), np.empty(0), np.empty(0))
+    ahead, back = 2 * near[begin] - near[begin - 1], 2 * near[end] - near[end + 1]
+    low, high = np.minimum(ahead, back), np.maximum(ahead, back)
+    is_edge = (high - low >= SETTINGS.jump) & (end - begin - 1 >= 2)
+    mixed = np.maximum(end - begin - 3, 0)  # but the last on the one and the first on the other
+    last, is_double = len(first), far - near >= SETTINGS.jump
+    is_near = near[begin] <= near[end]  # pulses that measure both surfaces end the near one
+    both = np.where(is_near, _run(is_double)[begin + 1], _run(is_double[::-1])[::-1][end - 1])
+    for offset in range(2, SETTINGS.widest + 2):  # a pulse between is on neither surface
+        k = np.minimum(begin + offset, last - 1)
+        is_inside = offset < end - begin - 1
+        is_edge &= ~is_inside | ((near[k] > low + rough) & (near[k] < high - rough))
+    here = np.where(is_near, begin, end)[is_edge]
+    angle = step[begin[is_edge]]
+    return Edges(
+        gps_time=time[here],
+        place=cloud.xyz[first[here]],
+        range=near[here],
+        width=(mixed + np.minimum(both, SETTINGS.widest))[is_edge] * angle,
+    )
+
+
+def _run(is_double):
+    """How many pulses (n,) up to each, it among them, follow each other without a break."""
+    number = np.arange(len(is_double))
+    return number - np.maximum.accumulate(np.where(is_double, -1, number))
+
+
+def _between_plateaus(is_smooth, follows):
+    """Last pulse of a plateau (e,) and first of the next (e,), with few pulses between them."""
+    change = np.flatnonzero(np.diff(is_smooth.astype(np.int8)))
+    starts, ends = np.append(0, change + 1), np.append(change, len(is_smooth) - 1)
+    length, smooth = ends - starts + 1, is_smooth[starts]
+    middle = np.arange(1, len(starts) - 1)
+    gaps = np.append(0, np.cumsum(~follows))
+    least = SETTINGS.plateau - 2  # a smooth pulse has its neighbours on the surface
+    good = ~smooth[middle] & (length[middle] <= SETTINGS.widest + 2)
+    good &= (length[middle - 1] >= least) & (length[middle + 1] >= least)
+    begin, end = ends[middle - 1], starts[middle + 1]
+    good &= (gaps[end] == gaps[begin]) & (begin >= 1) & (end < len(is_smooth) - 1)
+    return begin[good], end[good]

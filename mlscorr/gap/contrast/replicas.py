@@ -1,0 +1,28 @@
+"""Innovations of replicas of a survey: what they are like when the simulator is right."""
+
+import numpy as np
+
+from mlscorr.gap.contrast.settings import SETTINGS
+from mlscorr.gap.infer.causes import Inference
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.observe.rows import Background, Rows
+
+
+def replica_innovations(rows: Rows, background: Background, inference: Inference) -> np.ndarray:
+    """Innovations (n, replicas) of surveys in which nothing acts.
+
+    Their POS errs, and their noise has tails, as this one's do once its cause is taken off.
+
+    Parameters
+    ----------
+    rows : Rows
+    background : Background
+        Of these.
+    inference : Inference
+        Of these; n is the number of its innovations.
+    """
+    observed = Observations.of(rows, background)
+    model = inference.evidence.likely_model(inference.verdict.label)
+    rng = np.random.default_rng(SETTINGS.seed)
+    drawn = observed.whitener(model).draw(rng, SETTINGS.halves, inference.where.innovation[:, 1])
+    return observed.whitener().innovations(drawn)[0][observed.second]

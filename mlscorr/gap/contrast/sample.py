@@ -1,0 +1,74 @@
+"""What is kept of a cloud while it is read, so that its channels can be compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.gap.contrast.cells import CellCollector, Cells
+from mlscorr.gap.contrast.edges import EdgeCollector, Edges
+from mlscorr.gap.observe.patches import Patches
+from mlscorr.survey import PointCloud, Survey
+
+
+@dataclass(frozen=True)
+class ChannelSample:
+    """A bounded part of a cloud.
+
+    Parameters
+    ----------
+    cells : Cells
+    share : float
+        Of the ground, of which all cells are there.
+    edges : Edges
+    edge_share : float
+        Of the moments, of which all edges are there.
+    points : PointCloud
+        Of whole cells.
+    point_share : float
+        Of all cells, whose points are there.
+    patches : Patches or None
+    """
+
+    cells: Cells
+    share: float
+    edges: Edges
+    edge_share: float
+    points: PointCloud
+    point_share: float
+    patches: Patches | None = None
+
+    @property
+    def has_intensity(self) -> bool:
+        """Whether its intensities tell anything: some differ."""
+        return len(self.points) > 0 and bool(np.ptp(self.points.intensity) > 0)
+
+
+class SampleCollector:
+    """Keeps a ChannelSample of the chunks that it is given.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+
+    def __init__(self, survey: Survey):
+        self._cells, self._edges = CellCollector(survey), EdgeCollector(survey)
+
+    def add(self, chunk: PointCloud) -> None:
+        """Take what it needs of a chunk."""
+        self._cells.add(chunk)
+        self._edges.add(chunk)
+
+    def sample(self, patches: Patches | None) -> ChannelSample:
+        """The ChannelSample of all chunks so far.
+
+        Parameters
+        ----------
+        patches : Patches or None
+            Of the same chunks.
+        """
+        cells, edges = self._cells, self._edges
+        return ChannelSample(cells.cells(), cells.share, edges.edges(), edges.share,
+                           cells.points(), cells.point_share, patches)  # fmt: skip
