@@ -3,7 +3,8 @@
     python benchmarks/assets.py [NAME ...] [--write]
 
 Without names those are drawn that need nothing from elsewhere, some minutes; the others can be
-named: the paper's take hours, the real ones the data that their scripts name. The same code draws
+named: the paper's and what costs of mistakes
+do take hours, the real ones the data that their scripts name. The same code draws
 the same file, byte for byte, on one machine; letters and the last figure of a sum may differ on
 another. So a picture has changed where its size has, or where more than 1 % of its pixels differ
 by more than 16 of 255 in a channel: a moved letter is less, a moved curve more. --write keeps the
@@ -27,6 +28,7 @@ SCRIPTS = {  # picture: (script, whether it is drawn without being named)
     "render_before_after": ("render_before_after.py", True),
     "calibrate_mounting": ("calibrate_mounting.py", True),
     "diagnose": ("diagnose_gap.py", True),
+    "decision_costs": ("decision_costs.py", False),
     "pos_error": ("pos_error.py", False),
     "paper_car": ("paper/car.py", False),
     "paper_boat": ("paper/boat.py", False),

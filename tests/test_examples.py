@@ -1,9 +1,11 @@
 """The example scripts run as they stand."""
 
+import json
 import os
 import subprocess
 import sys
 
+from tests.beds.joint_scores import records
 from tests.beds.places import EXAMPLES
 
 
@@ -22,4 +24,24 @@ def test_pos_error_makes_its_picture(tmp_path):
     script = [sys.executable, EXAMPLES / "pos_error.py", "--drives", "1", "--picture", picture]
     elsewhere = {**os.environ, "MLSCORR_SHARED": str(tmp_path)}
     subprocess.check_output(script, text=True, env=elsewhere)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_decision_costs_makes_its_picture(tmp_path):
+    "Of records that are there no world is made anew: a picture, and a line each operating point"
+    for world in range(2):
+        part = [
+            json.dumps(vars(r) | {"joint": vars(r.joint), "world": 1000 + world})
+            for r in records(240, seed=world)
+        ]
+        (tmp_path / f"{1000 + world}.json").write_text(f"[{','.join(part)}]")
+    picture = tmp_path / "picture.png"
+    script = [sys.executable, EXAMPLES / "decision_costs.py", "--records", tmp_path]
+    command = [*script, "--worlds", "2", "--picture", picture]
+    printed = subprocess.check_output(command, text=True)
+    assert [line.split(":")[0] for line in printed.splitlines()] == [
+        "sensitive",
+        "default",
+        "careful",
+    ]
     assert picture.read_bytes().startswith(b"\x89PNG")
