@@ -38,9 +38,9 @@ def work(
         See progress_bars.
     """
     with exit_code(Exit.USAGE):
-        from mlscorr.io.conversion import announced
         from mlscorr.io.inputs import check_unchanged, input_file
         from mlscorr.io.output import check_output
+        from mlscorr.io.preparation import announced
         from mlscorr.io.survey_file import input_files
 
         files = input_files(survey, planned) if survey is not None else []

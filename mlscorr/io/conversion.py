@@ -6,17 +6,13 @@ What is corrected is written as LAZ.
 
 from __future__ import annotations
 
-import atexit
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +21,7 @@ from mlscorr.io.e57 import open_e57
 from mlscorr.io.las_writer import INTEGER_LIMIT, cloud_writer
 from mlscorr.io.opening import open_file
 from mlscorr.io.ply_clouds import open_ply
+from mlscorr.io.preparation import looked_points, progress_of, temporary_folder
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import file_state, is_remote
 from mlscorr.io.time_systems import ADJUSTMENT, WEEK
@@ -33,8 +30,6 @@ from mlscorr.survey import CloudFile, PointCloud
 OPENERS: dict[str, Callable[[Path], CloudSource]] = {".e57": open_e57, ".ply": open_ply}
 RESOLUTION = 1e-4  # m, of coordinates: a tenth of what scanners resolve, and 214 km in 32 bits
 LARGEST = np.iinfo(np.uint16).max  # of an intensity or a colour
-_limit: ContextVar[int | None] = ContextVar("limit", default=None)
-_progress: ContextVar[Any] = ContextVar("progress", default=None)
 
 
 @dataclass(frozen=True)
@@ -85,32 +80,6 @@ def written_name(path: Path) -> str:
     return path.with_suffix(".laz").name if is_foreign(path) else path.name
 
 
-@contextmanager
-def glance() -> Iterator[None]:
-    """Take the first points of large files only, for what must be done in seconds."""
-    token = _limit.set(SETTINGS.glanced_points)
-    try:
-        yield
-    finally:
-        _limit.reset(token)
-
-
-@contextmanager
-def announced(progress: Any) -> Iterator[None]:
-    """Say how far conversions have come.
-
-    Parameters
-    ----------
-    progress : function
-        progress(title, total) gives a function of the number of points just done.
-    """
-    token = _progress.set(progress)
-    try:
-        yield
-    finally:
-        _progress.reset(token)
-
-
 def converted(path: Path) -> Converted:
     """The LAZ of an E57 or PLY, made when it is first asked for.
 
@@ -125,7 +94,7 @@ def converted(path: Path) -> Converted:
     OSError
         When the disk refuses.
     """
-    return _converted(path.absolute(), *file_state(path), _limit.get())
+    return _converted(path.absolute(), *file_state(path), looked_points())
 
 
 def conversion_notes(paths: Iterable[Path]) -> list[str]:
@@ -163,7 +132,7 @@ def _converted(path, size, changed, limit):
     source = OPENERS[path.suffix.lower()](_on_disk(path))
     if limit is not None and source.points <= limit:
         return _converted(path, size, changed, None)
-    target = Path(tempfile.mkdtemp(dir=_folder())) / written_name(path)
+    target = Path(tempfile.mkdtemp(dir=temporary_folder())) / written_name(path)
     return _convert(source, target, limit)
 
 
@@ -171,18 +140,10 @@ def _on_disk(path):
     """A file, or the copy of one in a store: what reads it needs a disk."""
     if not is_remote(path):
         return path
-    copy = Path(tempfile.mkdtemp(dir=_folder())) / path.name
+    copy = Path(tempfile.mkdtemp(dir=temporary_folder())) / path.name
     with open_file(path) as source, open(copy, "wb") as target:
         shutil.copyfileobj(source, target, SETTINGS.copied_bytes)
     return copy
-
-
-@cache
-def _folder():
-    """A folder that goes when the program ends."""
-    folder = tempfile.mkdtemp(prefix="mlscorr-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
 
 
 def _convert(source, target, limit):
@@ -195,8 +156,7 @@ def _convert(source, target, limit):
         raise ValueError(f"{source.path} holds no valid points.")
     is_standard, taken = _time_system(source.path, first.gps_time)
     crs, crs_note = _known_crs(source.crs)
-    progress = _progress.get() or (lambda *_: lambda _: None)
-    done, count = progress(f"Reading {source.path.name}", end), 0
+    done, count = progress_of(f"Reading {source.path.name}", end), 0
     has_colours = first.colours is not None
     with cloud_writer(target, first.xyz[0], crs, RESOLUTION, None, is_standard, has_colours) as laz:
         for block in chain([first], blocks):

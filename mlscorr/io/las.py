@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_layout import LasLayout, decoding
+from mlscorr.io.las_layout import LasLayout
+from mlscorr.io.las_points import decoding
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.time_order import in_time_order
 from mlscorr.survey import CloudFile, PointCloud
 
 
@@ -86,7 +88,8 @@ def read_chunks(
 ) -> Iterator[PointCloud]:
     """Points of a cloud file by chunks, in file order, withheld points among them.
 
-    Points whose gps_time is not a number are left out: nothing places them on the trajectory.
+    Those of a COPC come in order of time. Points whose gps_time is not a number are left out:
+    nothing places them on the trajectory.
 
     Parameters
     ----------
@@ -106,7 +109,7 @@ def read_chunks(
     ValueError
         For a file that is cut off or damaged.
     """
-    layout = read_layout(cloud_file.path)
+    layout = in_time_order(read_layout(cloud_file.path))
     scale, offset = layout.scale, layout.offset
     for whole in read_records(layout, chunk_size, first, end):
         records = whole[cloud_file.rows(whole["point_source_id"])]

@@ -8,12 +8,15 @@ import numpy as np
 from laspy import PointFormat, supported_point_formats
 
 from mlscorr.io.conversion import converted, is_foreign
-from mlscorr.io.las_layout import LasLayout, decoding
+from mlscorr.io.copc import check_hierarchy
+from mlscorr.io.las_layout import LasLayout
+from mlscorr.io.las_points import decoding
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import as_path, file_state, is_there
 
 HEADER_SIZES = (227, 227, 227, 235, 375)  # bytes, of LAS 1.0 to 1.4
+COPC_FORMATS = (6, 7, 8)  # COPC 1.0
 EVLR_HEADER = struct.Struct("<2x16sHQ32s")  # owner, record, length of data, description
 
 
@@ -99,10 +102,10 @@ def _check_header(layout):
         )
     if layout.points == 0:
         raise ValueError(f"{path} holds 0 points; perhaps its writing was interrupted.")
-    if layout.vlrs and layout.owner(layout.vlrs[0][0])[0] == b"copc":
+    if layout.is_copc and number not in COPC_FORMATS:
         raise ValueError(
-            f"{path} is a COPC file, whose index would be wrong once points have moved. Use the "
-            "original file, or convert it: pdal translate IN.copc.laz OUT.laz."
+            f"{path} is damaged: a COPC file has points of formats 6 to 8, not {number}. Write it "
+            "anew: pdal translate IN.copc.laz OUT.laz."
         )
 
 
@@ -145,6 +148,8 @@ def _check_chunks(layout, file):
         file.seek(start)
         chunks = lazrs.read_chunk_table(file, lazrs.LazVlr(layout.laszip))
         layout.decoder(file, threads=False)
+    while len(chunks) > 1 and chunks[-1] == (0, 0):  # which lazrs adds where chunks differ in size
+        chunks.pop()
     if (used := sum(length for _, length in chunks)) > table - start:
         raise ValueError(
             f"{path} is damaged: LAZ chunks of {used} bytes do not lie in {table - start} bytes. "
@@ -157,6 +162,8 @@ def _check_chunks(layout, file):
         whole += int.from_bytes(file.read(4), "little")
         if whole != layout.points:
             raise ValueError(_other_count(layout, whole))
+    if layout.is_copc:
+        check_hierarchy(layout, file, chunks)
     return table
 
 

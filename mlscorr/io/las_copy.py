@@ -1,31 +1,27 @@
 """Corrected copies of LAS and LAZ files, in which only what a correction changes is new."""
 
-import io
-import os
-import shutil
-import struct
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-import lazrs
 import numpy as np
 
 from mlscorr.correction.point_sigma import PointSigma
+from mlscorr.io.copc_writer import CopcWriter
 from mlscorr.io.extra_bytes import add_sigma_fields, with_sigmas
 from mlscorr.io.las import read_records, times_at
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_layout import LASZIP, LasLayout
+from mlscorr.io.las_layout import LasLayout
+from mlscorr.io.las_output import LasOutput, PlainWriter
 from mlscorr.io.opening import open_file
 from mlscorr.io.output import PART, output_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import is_remote
 from mlscorr.survey import CloudFile, PointCloud
 
-LASZIP_RECORD = 22204  # of the VLR that says how points are compressed
 INTEGER_LIMIT = np.iinfo(np.int32).max  # of the coordinates in a file
 
 
@@ -144,32 +140,62 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
     """
     layout, target = read_layout(parts[0].file.path), Path(target)
     _check_target(layout.path, target)
-    has_sigmas = parts[0].sigma is not None
+    corrected = _Corrected(layout, target, parts)
     with output_file(target) as copy:
-        with _Output(copy) as output, open_file(layout.path) as file:
-            written = add_sigma_fields(layout) if has_sigmas else layout
-            head, encoder = _start(written, output, target.suffix.lower() == ".laz")
-            outside, untimed = np.zeros(len(parts), int), 0
-            low, high = np.full(3, np.inf), np.full(3, -np.inf)
-            for records in read_records(layout, SETTINGS.chunk_points):
-                _check_channels(layout, target, records)
-                sigmas = np.full((len(records), 3), np.nan) if has_sigmas else None
-                outside += [part.move(layout, records, sigmas) for part in parts]
-                untimed += np.count_nonzero(~np.isfinite(records["gps_time"]))
-                low = np.minimum(low, [records[name].min() for name in "XYZ"])
-                high = np.maximum(high, [records[name].max() for name in "XYZ"])
-                raw = records.view(np.uint8) if sigmas is None else with_sigmas(records, sigmas)
-                output.encode(encoder.compress_many, raw)
-            output.encode(encoder.done)
-            _finish(written, head, np.stack([high, low]), file, output)
+        with LasOutput(copy) as output, open_file(layout.path) as file:
+            if layout.is_copc and corrected.is_laz:
+                writer = CopcWriter(corrected.written, output, copy.parent)
+            else:
+                writer = PlainWriter(corrected.written, output, corrected.is_laz)
+            writer.write(corrected.blocks, file)
+            output.complete(writer.head, corrected.bounds * layout.scale + layout.offset)
         _check_copy(layout, copy)
-    if untimed:
+    if corrected.untimed:
         warnings.warn(
-            f"{untimed} of {layout.points} points of {layout.path} have a gps_time that is not a "
-            "number. They can't be placed on the trajectory and were left as they were.",
+            f"{corrected.untimed} of {layout.points} points of {layout.path} have a gps_time that "
+            "is not a number. They can't be placed on the trajectory and were left as they were.",
             stacklevel=3,
         )
-    return outside.tolist()
+    return corrected.outside.tolist()
+
+
+class _Corrected:
+    """The records of a file after their correction, and what was counted while they passed.
+
+    Attributes
+    ----------
+    written : LasLayout
+        Of the corrected records.
+    outside : (k,) int array
+        Number of points of each part outside the trajectory.
+    untimed : int
+        Number of points without a time.
+    bounds : (2, 3) array
+        Largest and smallest integers of the coordinates.
+    """
+
+    def __init__(self, layout, target, parts):
+        self._layout, self._target, self._parts = layout, target, parts
+        self.is_laz = target.suffix.lower() == ".laz"
+        self._has_sigmas = parts[0].sigma is not None
+        self.written = add_sigma_fields(layout) if self._has_sigmas else layout
+
+    def blocks(self, is_final):
+        """All records, (n,) at a time, as bytes of each; those who watch are told the last time."""
+        layout, has_sigmas = self._layout, self._has_sigmas
+        parts = self._parts if is_final else [replace(part, watch=None) for part in self._parts]
+        self.outside, self.untimed = np.zeros(len(parts), int), 0
+        self.bounds = np.array([np.full(3, -np.inf), np.full(3, np.inf)])
+        for records in read_records(layout, SETTINGS.chunk_points):
+            _check_channels(layout, self._target, records)
+            sigmas = np.full((len(records), 3), np.nan) if has_sigmas else None
+            self.outside += [part.move(layout, records, sigmas) for part in parts]
+            self.untimed += np.count_nonzero(~np.isfinite(records["gps_time"]))
+            xyz = [records[name] for name in "XYZ"]
+            self.bounds[0] = np.maximum(self.bounds[0], [values.max() for values in xyz])
+            self.bounds[1] = np.minimum(self.bounds[1], [values.min() for values in xyz])
+            raw = records.view(np.uint8) if sigmas is None else with_sigmas(records, sigmas)
+            yield raw.view(f"V{self.written.record_length}")
 
 
 def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
@@ -203,38 +229,6 @@ def _check_channels(layout, target, records):
         )
 
 
-class _Output(io.BufferedWriter):
-    """A new file that keeps what interrupts its writing; lazrs hides it behind its own error."""
-
-    def __init__(self, path):
-        super().__init__(io.FileIO(path, "wb"), SETTINGS.copied_bytes)
-        self.interruption = None
-
-    def write(self, data):
-        try:
-            return super().write(data)
-        except BaseException as error:
-            self.interruption = error
-            raise
-
-    def encode(self, function, *arguments):
-        """Let lazrs write here; raises what the system raised."""
-        try:
-            function(*arguments)
-        except lazrs.LazrsError as error:
-            raise self.interruption or OSError(f"{self.name}: {error}") from error
-
-
-class _PlainEncoder:
-    """Writes points uncompressed, with the interface of lazrs."""
-
-    def __init__(self, output):
-        self.compress_many = output.write
-
-    def done(self):
-        pass
-
-
 def _check_target(source, target):
     if target.suffix.lower() not in (".las", ".laz"):
         raise ValueError(f"The corrected file {target} must end in .las or .laz.")
@@ -244,36 +238,6 @@ def _check_target(source, target):
                 f"The corrected file {path} is the input itself, which would be lost. Choose "
                 "another output folder."
             )
-
-
-def _start(layout, output, compress):
-    """Write header and VLRs; returns them, to be completed, and what encodes the points."""
-    laszip = lazrs.LazVlr.new_for_compression(layout.point_format, layout.extra_bytes)
-    data = bytes(laszip.record_data()) if compress else None
-    head = bytearray(layout.head_with(LASZIP, LASZIP_RECORD, data, b"http://laszip.org"))
-    head[104] = layout.point_format | (0x80 if compress else 0)
-    output.write(head)
-    encoder = lazrs.ParLasZipCompressor(output, laszip) if compress else _PlainEncoder(output)
-    return head, encoder
-
-
-def _finish(layout, head, bounds, file, output):
-    """Copy what follows the points; write the header again with bounds (2, 3) and positions."""
-    output.seek(0, io.SEEK_END)
-    moved = output.tell() - layout.tail
-    file.seek(layout.tail)
-    shutil.copyfileobj(file, output, SETTINGS.copied_bytes)
-    positions = {(1, 3): (227,), (1, 4): (227, 235)}.get(layout.version, ())  # waveforms, EVLRs
-    for position in positions:
-        value = layout.field("Q", position)[0]
-        if value >= layout.tail:
-            struct.pack_into("<Q", head, position, value + moved)
-    corners = bounds * layout.scale + layout.offset
-    struct.pack_into("<6d", head, 179, *corners.T.ravel())  # max x, min x, max y, ...
-    output.seek(0)
-    output.write(head)
-    output.flush()
-    os.fsync(output.fileno())
 
 
 def _check_copy(layout, part):

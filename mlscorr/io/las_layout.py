@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,32 +21,11 @@ import lazrs
 import numpy as np
 from laspy import PointFormat
 
+from mlscorr.io.las_points import ChunkedPoints, PlainPoints
+
 VLR_HEADER = struct.Struct("<2x16sHH32s")  # owner, record, length of data, description
-LASZIP = b"laszip encoded"
-
-
-@contextmanager
-def decoding(message: str) -> Iterator[None]:
-    """Where lazrs works: its errors, and what it aborts with, become a sentence.
-
-    Parameters
-    ----------
-    message : str
-        What can't be read. It ends where lazrs' own words follow in brackets.
-
-    Raises
-    ------
-    ValueError
-    """
-    try:
-        yield
-    except BaseException as error:
-        # a Rust panic derives from BaseException, and has no name that could be imported
-        if not isinstance(error, lazrs.LazrsError) and type(error).__name__ != "PanicException":
-            raise
-        raise ValueError(
-            f"{message} ({error}). The file is cut off or damaged; copy it anew."
-        ) from error
+LASZIP, LASZIP_RECORD = b"laszip encoded", 22204  # of the VLR that says how points are compressed
+COPC, HIERARCHY = (b"copc", 1), (b"copc", 1000)  # of the VLR and the EVLR that tell an octree
 
 
 @dataclass(frozen=True)
@@ -236,6 +214,11 @@ class LasLayout:
         struct.pack_into("<H", head, 105, length)
         return replace(self, head=bytes(head))
 
+    @property
+    def is_copc(self) -> bool:
+        """Whether the points lie in the chunks of an octree, in no order of time (COPC 1.0)."""
+        return bool(self.vlrs) and self.owner(self.vlrs[0][0]) == COPC and self.is_compressed
+
     @cached_property
     def laszip(self) -> bytes:
         """Data of the LASzip VLR, which says how the points are compressed."""
@@ -275,22 +258,11 @@ class LasLayout:
         """
         file.seek(len(self.head))
         if not self.is_compressed:
-            return _PlainPoints(file, len(self.head), self.record_length)
+            return PlainPoints(file, len(self.head), self.record_length)
         brief = lazrs.SELECTIVE_DECOMPRESS_GPS_TIME | lazrs.SELECTIVE_DECOMPRESS_POINT_SOURCE_ID
         fields = brief if is_brief else lazrs.SELECTIVE_DECOMPRESS_ALL
+        selection = lazrs.DecompressionSelection(fields)
+        if lazrs.LazVlr(self.laszip).uses_variable_size_chunks():
+            return ChunkedPoints(file, self.laszip, selection)
         kind = lazrs.ParLasZipDecompressor if threads else lazrs.LasZipDecompressor
-        return kind(file, self.laszip, lazrs.DecompressionSelection(fields))
-
-
-class _PlainPoints:
-    """Uncompressed points, read as lazrs reads the compressed ones."""
-
-    def __init__(self, file, start, record_length):
-        self.file, self.start, self.record_length = file, start, record_length
-
-    def seek(self, point):
-        self.file.seek(self.start + point * self.record_length)
-
-    def decompress_many(self, buffer):
-        if self.file.readinto(buffer) != len(buffer):
-            raise lazrs.LazrsError("the file ends")
+        return kind(file, self.laszip, selection)

@@ -8,6 +8,7 @@ from mlscorr.io.las import read_chunks, spread_times, times_at
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.time_order import in_time_order
 from mlscorr.survey import CloudFile, PointCloud
 
 
@@ -36,7 +37,7 @@ def read_windows(
     ValueError
         Where points of a long file are not in order of time, or can't be decoded.
     """
-    layout = read_layout(file.path)
+    layout = in_time_order(read_layout(file.path))
     if layout.points <= limit:
         yield from read_chunks(file)
         return

@@ -87,6 +87,11 @@ def match_times(
     times = times[np.isfinite(times)]
     if not len(times):
         raise ValueError(f"{name} has no points with a gps_time.")
+    if not times.any():
+        raise ValueError(
+            f"The points of {name} have gps_time 0 throughout: it was written without times. "
+            "Export it anew with gps_time, which places points on the trajectory."
+        )
     span = trajectory.gps_time[[0, -1]]
     flagged = "standard" if is_standard else "week"
     candidates = _candidates(times, span)

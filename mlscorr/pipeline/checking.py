@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.evaluate.datum import datum_warnings
-from mlscorr.io.conversion import glance, read_in_part
+from mlscorr.io.conversion import read_in_part
 from mlscorr.io.las import spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
 from mlscorr.io.nearness import far_cloud
+from mlscorr.io.preparation import glance
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
 from mlscorr.pipeline.finding import check_control

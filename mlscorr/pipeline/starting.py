@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.conversion import glance, is_foreign, recorded_points
+from mlscorr.io.conversion import is_foreign, recorded_points
 from mlscorr.io.folder_roles import FileRole, sort_files
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.output import output_file
+from mlscorr.io.preparation import glance
 from mlscorr.io.survey_file import FILE_NAME, read_survey
 from mlscorr.io.survey_sections import PlannedSurveyFile
 from mlscorr.io.toml_file import validate

@@ -13,9 +13,10 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.conversion import converted, glance, recorded_points
+from mlscorr.io.conversion import converted, recorded_points
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
+from mlscorr.io.preparation import glance
 from mlscorr.io.settings import Settings
 from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.survey import CloudFile, PointCloud
@@ -205,9 +206,9 @@ def test_intensities_come_into_16_bits_and_their_scale_is_said(intensity, stored
 
 def test_a_large_cloud_is_looked_at_by_its_first_points(tmp_path, monkeypatch):
     "Within a glance; its number of points is that of its header, and it is said"
-    monkeypatch.setattr(
-        "mlscorr.io.conversion.SETTINGS", Settings(glanced_points=100, chunk_points=60)
-    )
+    small = Settings(glanced_points=100, chunk_points=60)
+    for module in ("conversion", "preparation"):
+        monkeypatch.setattr(f"mlscorr.io.{module}.SETTINGS", small)
     path = write_ply(tmp_path / "a.ply", few())
     with glance():
         cloud, layout = read(path)

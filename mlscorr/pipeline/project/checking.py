@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mlscorr.io.conversion import glance
+from mlscorr.io.preparation import glance
 from mlscorr.io.project_file import ProjectParts, read_project, read_project_file
 from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
 from mlscorr.pipeline.faults import Fault, Faults
