@@ -14,7 +14,7 @@ from mlscorr.io.inputs import input_file
 from mlscorr.io.nearness import check_together
 from mlscorr.io.project_sections import ProjectFile
 from mlscorr.io.projection import check_crs
-from mlscorr.io.storage import as_path, beside, is_folder, is_there
+from mlscorr.io.storage import as_path, beside, is_folder, is_there, resolved
 from mlscorr.io.survey_file import SurveyParts, read_parts, read_survey_file, survey_toml
 from mlscorr.io.survey_paths import check_distinct, existing, matching
 from mlscorr.io.survey_sections import CloudSection, SurveyFile
@@ -200,7 +200,7 @@ def _check_tiles(path, settings, drives):
     owners: dict[Path, list[DriveParts]] = {}
     for drive in drives:
         for file in drive.parts.files.clouds:
-            owners.setdefault(file.resolve(), []).append(drive)
+            owners.setdefault(resolved(file), []).append(drive)
     shared = {file: own for file, own in owners.items() if len(own) > 1}
     if doubtful := [file for file, own in shared.items() if any(d.ids is None for d in own)]:
         names = " and ".join(drive.name for drive in shared[doubtful[0]])
@@ -220,7 +220,7 @@ def _check_tiles(path, settings, drives):
     if shared:
         check_distinct(path, [*shared])
     named = [f for name in settings.cloud.files or () for f in matching(path, "cloud.files", name)]
-    if orphans := [file for file in named if file.resolve() not in owners]:
+    if orphans := [file for file in named if resolved(file) not in owners]:
         raise ValueError(
             f"{len(orphans)} of {len(named)} files under [cloud] in {path} are of no drive (first: "
             f"{orphans[0]}). Name them in files of the [[drive]] whose trajectory covers them."

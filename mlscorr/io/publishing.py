@@ -17,9 +17,8 @@ from typing import Any, TextIO, cast
 
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.storage import asking, check_bucket, is_remote, is_there
+from mlscorr.io.storage import WEB, asking, check_bucket, is_remote, is_there
 
-WEB = ("http", "https")
 S3 = ("s3", "s3a")  # schemes of stores that take a file in parts, side by side
 
 

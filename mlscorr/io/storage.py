@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import glob
 import os
+import posixpath
 import re
 import sys
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from typing import Any, cast
 ETAG = "ETag"  # begins what a store tells contents apart by
 URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")  # a drive of Windows has a single letter
 BUCKETS = ("s3", "s3a", "gs", "gcs")  # schemes of stores that have them
+WEB = ("http", "https")  # schemes of servers that list nothing and take nothing
 EXTRA = "pip install 'mlscorr[remote]'"
 
 
@@ -100,7 +102,24 @@ def beside(path: Path, name: str) -> Path:
     if is_url(name):
         return as_path(name)
     there = path.parent / name
-    return there.resolve() if is_remote(there) else there  # a store knows no ..
+    return resolved(there) if is_remote(there) else there
+
+
+def resolved(path: Path) -> Path:
+    """A path that is the same for the same file: links followed on a disk, ``..`` in a URL.
+
+    No store is asked: a redirection is none of its names.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    if not is_remote(path):
+        return path.resolve()
+    scheme, _, rest = str(path).partition("://")
+    if not {".", ".."} & set(rest.split("/")):
+        return path  # a name may hold // in a store
+    return as_path(f"{scheme}://{posixpath.normpath(rest)}")
 
 
 def is_there(path: Path) -> bool:
@@ -154,12 +173,18 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
 
     Raises
     ------
+    ValueError
+        For a pattern of a web server.
     OSError
         As is_there.
     """
     if not is_url(pattern) and not is_remote(folder):
         return sorted(folder / m for m in glob.glob(pattern, root_dir=folder, recursive=True))
-    path: Any = as_path(pattern) if is_url(pattern) else (folder / pattern).resolve()
+    path: Any = as_path(pattern) if is_url(pattern) else resolved(folder / pattern)
+    if path.protocol in WEB:
+        raise ValueError(
+            f"{path} is a pattern of a web server, which lists nothing: name each file."
+        )
     with asking(path):
         path.fs.invalidate_cache()
         names = sorted(path.fs.glob(path.path))

@@ -10,7 +10,7 @@ import tomlkit
 
 from mlscorr.io.conversion import written_name
 from mlscorr.io.opening import read_bytes
-from mlscorr.io.storage import as_path, is_remote, is_url
+from mlscorr.io.storage import as_path, is_remote, is_url, resolved
 from mlscorr.io.survey_paths import matching
 from mlscorr.io.text_files import ENCODING
 from mlscorr.survey import Mounting
@@ -149,7 +149,7 @@ def _moved(there, name, folder=None):
     if is_url(name):
         return name
     if is_remote(there):
-        return str((there / name).resolve())
+        return str(resolved(there / name))
     if folder is not None and glob.has_magic(name) and not (folder / name).exists():
         there = PurePath(glob.escape(str(there)))
     return (there / name).as_posix()

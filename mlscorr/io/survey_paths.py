@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mlscorr.io.conversion import written_name
-from mlscorr.io.storage import beside, files_like, is_there
+from mlscorr.io.storage import beside, files_like, is_there, resolved
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
 from mlscorr.io.trajectory_sessions import SessionFile
 from mlscorr.survey import CloudFile
@@ -103,7 +103,7 @@ def check_sessions(path: Path, sessions: Sequence[SessionFile]) -> None:
     ------
     ValueError
     """
-    file, count = Counter(session.path.resolve() for session in sessions).most_common(1)[0]
+    file, count = Counter(resolved(session.path) for session in sessions).most_common(1)[0]
     if count > 1:
         raise ValueError(f"{count} of the [[trajectory]] of {path} name the file {file}.")
 
@@ -162,8 +162,8 @@ def own_clouds(
     """
     own = [] if patterns is not None else [*clouds]
     for pattern in patterns or ():
-        there = {file.resolve() for file in matching(path, key, pattern)}
-        named = [cloud for cloud in clouds if cloud.path.resolve() in there]
+        there = {resolved(file) for file in matching(path, key, pattern)}
+        named = [cloud for cloud in clouds if resolved(cloud.path) in there]
         if not named:
             raise ValueError(
                 f"{key} of {path}: {pattern}{owner} is none of the {len(clouds)} files of [cloud]."
@@ -213,7 +213,7 @@ def check_distinct(path: Path, clouds: list[Path]) -> None:
     ValueError
     """
     for kind, values in (
-        ("names the file", [str(cloud.resolve()) for cloud in clouds]),
+        ("names the file", [str(resolved(cloud)) for cloud in clouds]),
         (
             "has files whose results would have the same name:",
             [written_name(cloud).casefold() for cloud in clouds],

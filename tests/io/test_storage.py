@@ -18,9 +18,11 @@ from mlscorr.io.las_windows import read_windows
 from mlscorr.io.las_writer import cloud_writer
 from mlscorr.io.opening import open_file
 from mlscorr.io.storage import as_path, beside, files_like, is_remote, is_there
+from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.io.survey_file import read_survey
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.survey import CloudFile, PointCloud
+from tests.beds.foreign_clouds import points_of, write_ply
 from tests.beds.object_store import object_store
 
 CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # m
@@ -66,6 +68,36 @@ def test_a_survey_here_may_name_files_there(store, street, tmp_path):
     survey = read_survey(tmp_path)
     assert all(is_remote(file.path) for file in survey.inputs[1:] if file.what != "reference")
     assert digest(survey.trajectory) == digest(read_survey(street).trajectory)
+
+
+def test_a_web_server_is_read_too(store, street):
+    "Files of https:// have no patterns; named one by one they are the same as on a disk"
+    address = f"{store.url}/streets/monday"
+    for name in store.files.find("streets/monday"):
+        store.files.chmod(name, acl="public-read")
+    there = read_survey(f"{address}/survey.toml")
+    assert digest(there.trajectory) == digest(read_survey(street).trajectory)
+    assert FileIdentity.of(there.cloud_paths[0]).size == (street / "pass-1.laz").stat().st_size
+    with pytest.raises(ValueError, match=r"pass-\*\.laz is a pattern of a web server"):
+        files_like(there.path.parent, "pass-*.laz")
+
+
+def test_a_survey_elsewhere_names_its_files_by_url(store, tmp_path):
+    "A survey.toml written anew on a disk, as calibrate does, reads what that in a store did"
+    path = as_path("s3://streets/monday/survey.toml")
+    write_survey_copy(path, tmp_path / "survey.toml", tmp_path)
+    there, copy = read_survey(path), read_survey(tmp_path)
+    assert copy.cloud_paths == there.cloud_paths
+    assert digest(copy.trajectory, copy.control) == digest(there.trajectory, there.control)
+
+
+def test_clouds_of_other_formats_are_copied_first(store, street, tmp_path):
+    "A PLY in a store has the points of the LAZ that it was made of"
+    write_ply(tmp_path / "street.ply", points_of(street / "pass-1.laz"))
+    store.files.put(str(tmp_path / "street.ply"), "streets/street.ply")
+    layout = read_layout(as_path("s3://streets/street.ply"))
+    assert layout.points == read_layout(street / "pass-1.laz").points
+    assert str(layout.cloud) == "s3://streets/street.ply"
 
 
 def test_a_header_and_a_window_are_read_by_ranges(store):

@@ -11,6 +11,7 @@ import numpy as np
 from mlscorr.io.identity import FileIdentity
 from mlscorr.io.project_file import DriveParts, ProjectParts
 from mlscorr.io.project_sections import SHARED_TILES
+from mlscorr.io.storage import resolved
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.project.file_tasks import (
@@ -42,7 +43,7 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
         ends = Trajectory(whole.gps_time[[0, -1]], whole.position[[0, -1]], whole.attitude[[0, -1]])
         owner = TileOwner(drive.name, ends, parts.system, parts.settings.crs, drive.ids)
         for path in parts.files.clouds:
-            tiles.setdefault(path.resolve(), (path, []))[1].append(owner)
+            tiles.setdefault(resolved(path), (path, []))[1].append(owner)
     tasks = []
     for path, own in tiles.values():
         key, folder = digest(VERSION, FileIdentity.of(path), path, own), _folder(own)
