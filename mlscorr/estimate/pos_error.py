@@ -226,8 +226,8 @@ def previewed_correction(
         As of with_ties.
     """
     before, rows = _tie_equations(estimate.equations, ties, mountings)
-    tied, parameters = robust_ties(before, estimate.parameters, rows)
-    pose = predict_under(tied, parameters)
+    weighed = robust_ties(before, estimate.parameters, rows)
+    pose = predict_under(weighed.equations, weighed.parameters, solved=weighed.solved)
     return Correction.by_pose_error(estimate.correction.recorded, *pose)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from mlscorr.collocation import Collocation
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Posterior
 from mlscorr.estimate.settings import SETTINGS
@@ -102,7 +103,10 @@ def _interpolated(gps_time, rows, values):
 
 
 def predict_under(
-    equations: Equations, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
+    equations: Equations,
+    parameters: SignalParameters,
+    rows: slice | np.ndarray = slice(None),
+    solved: Collocation | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pose error (k, 6) and covariance (k, 6, 6) at some epochs under given parameters.
 
@@ -112,6 +116,8 @@ def predict_under(
     parameters : SignalParameters
     rows : slice or (k,) int array
         Of the trajectory's epochs; all by default.
+    solved : Collocation, optional
+        Of the equations under these parameters, where it is known.
     """
     gps_time = equations.trajectory.gps_time[rows]
     partials = np.broadcast_to(np.eye(6), (len(gps_time), 6, 6))
@@ -119,4 +125,5 @@ def predict_under(
     mixings = [signal.mixing for signal in signals]
     clocks = [signal.clock for signal in signals]
     design = equations.pose_design(gps_time)
-    return equations.solve(parameters).predict(gps_time, design, mixings, clocks)
+    solved = equations.solve(parameters) if solved is None else solved
+    return solved.predict(gps_time, design, mixings, clocks)

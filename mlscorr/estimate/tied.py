@@ -8,13 +8,13 @@ Black and Rangarajan 1996), then Student's t in turn with the restricted likelih
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
 
-from mlscorr.collocation import reweight
+from mlscorr.collocation import Collocation, reweight
 from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.correction import Correction
 from mlscorr.estimate.equations import Equations
@@ -106,12 +106,13 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
         That these chose.
     ties : TieEquations
     """
-    tied, parameters = robust_ties(equations, parameters, ties)
+    weighed = robust_ties(equations, parameters, ties)
+    tied, parameters = weighed.equations, weighed.parameters
     tied = tied.with_starts(with_likely_starts(sample(tied))[0].stated.starts)
     rows = tied.ties
     parameters = _most_probable(tied, parameters)
-    tied = _weighted(tied, parameters, (_student,))
-    ratio = np.abs(_ratio(tied, parameters))
+    weighed = _solved(tied, parameters).graded((_student,))
+    tied, ratio = weighed.equations, np.abs(_ratio(weighed))
     factor = float(np.clip(np.median(ratio) / MEDIAN, 1.0, SETTINGS.tie_cut))
     used = ratio <= SETTINGS.tie_cut * factor
     kept = replace(rows, variance=factor**2 * rows.variance, weight=np.ones(len(rows)))
@@ -193,18 +194,62 @@ def sample(tied: Equations) -> Equations:
     return replace(tied, ties=tied.ties.select(slice(None, None, step)))
 
 
-def _ratio(tied, parameters, solved=None):
+def _ratio(weighed):
     """Residuals (n,) of the ties over their sigmas."""
-    solved = tied.solve(parameters) if solved is None else solved
-    variance = tied.ties.variance / tied.ties.weight
-    residual = variance * solved.weights[-len(tied.ties) :]  # N V^-1 (l - A x)
-    return residual / np.sqrt(tied.ties.variance)
+    ties = weighed.equations.ties
+    variance = ties.variance / ties.weight
+    residual = variance * weighed.solved.weights[-len(ties) :]  # N V^-1 (l - A x)
+    return residual / np.sqrt(ties.variance)
+
+
+@dataclass(frozen=True)
+class WeighedTies:
+    """Equations with robust weights of ties, solved.
+
+    Parameters
+    ----------
+    equations : Equations
+        With ties.
+    parameters : SignalParameters
+    solved : Collocation
+        By both.
+    first : (n,) array
+        Weights of the ties when the equations were solved first; others are put beside these.
+    """
+
+    equations: Equations
+    parameters: SignalParameters
+    solved: Collocation
+    first: np.ndarray
+
+    @property
+    def ties(self) -> TieEquations:
+        """The ties with their weights."""
+        ties = self.equations.ties
+        assert ties is not None
+        return ties
+
+    def graded(self, functions: Iterable[Callable]) -> WeighedTies:
+        """With weights by each function of the residuals in turn.
+
+        Parameters
+        ----------
+        functions : iterable of function
+            Of residuals over their sigmas (n,).
+        """
+        tied, solved = self.equations, self.solved
+        for function in functions:
+            ratio = _ratio(WeighedTies(tied, self.parameters, solved, self.first))
+            weight = np.maximum(function(ratio), SETTINGS.resolution)
+            tied = replace(tied, ties=replace(tied.ties, weight=weight))
+            solved = reweight(solved, [np.ones(len(tied.gps_time)), weight / self.first])
+        return WeighedTies(tied, self.parameters, solved, self.first)
 
 
 def robust_ties(
     equations: Equations, parameters: SignalParameters, ties: TieEquations
-) -> tuple[Equations, SignalParameters]:
-    """The equations with graduated weights of ties, and the parameters under which more hold.
+) -> WeighedTies:
+    """The equations with graduated weights of ties, under those parameters by which more hold.
 
     Few control points may choose drift that is too slow or too small; then ties that agree with
     each other contradict it. So they are also weighed by what is believed without control.
@@ -217,20 +262,23 @@ def robust_ties(
         That these chose.
     ties : TieEquations
     """
-    least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)  # of a tie that holds
-    tied = graduated(equations, parameters, ties)
-    held = np.count_nonzero(tied.ties.weight > least)
-    if held == len(ties):
-        return tied, parameters
-    prior = Objective((), tied.prior(tied))
-    believed = prior.parameters(INTEGRATED, prior.initial)
-    other = graduated(equations, believed, ties)
-    if np.count_nonzero(other.ties.weight > least) > held:
-        return other, believed
-    return tied, parameters
+    weighed = graduated(equations, parameters, ties)
+    if (held := _held(weighed)) == len(ties):
+        return weighed
+    prior = Objective((), weighed.equations.prior(weighed.equations))
+    other = graduated(equations, prior.parameters(INTEGRATED, prior.initial), ties)
+    return other if _held(other) > held else weighed
 
 
-def graduated(equations: Equations, parameters: SignalParameters, ties: TieEquations) -> Equations:
+def _held(weighed):
+    """Number of ties that hold."""
+    least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)
+    return np.count_nonzero(weighed.ties.weight > least)
+
+
+def graduated(
+    equations: Equations, parameters: SignalParameters, ties: TieEquations
+) -> WeighedTies:
     """The equations with ties, whose weights' scale has shrunk from all to the honest ones.
 
     Parameters
@@ -240,11 +288,15 @@ def graduated(equations: Equations, parameters: SignalParameters, ties: TieEquat
     parameters : SignalParameters
     ties : TieEquations
     """
-    tied = replace(equations, ties=ties)
-    largest = float(np.abs(_ratio(tied, parameters)).max(initial=0.0))
+    weighed = _solved(replace(equations, ties=ties), parameters)
+    largest = float(np.abs(_ratio(weighed)).max(initial=0.0))
     steps = max(int(np.ceil(np.log2(max(largest, 1.0) / SETTINGS.tie_cut))), 1)
     scales = SETTINGS.tie_cut * 2.0 ** np.arange(steps)[::-1]
-    return _weighted(tied, parameters, [_geman_mcclure(scale) for scale in scales])
+    return weighed.graded(_geman_mcclure(scale) for scale in scales)
+
+
+def _solved(tied, parameters):
+    return WeighedTies(tied, parameters, tied.solve(parameters), tied.ties.weight)
 
 
 def _geman_mcclure(scale: float) -> Callable:
@@ -254,13 +306,3 @@ def _geman_mcclure(scale: float) -> Callable:
 def _student(ratio):
     freedom = SETTINGS.tie_freedom
     return (freedom + 1.0) / (freedom + ratio**2)
-
-
-def _weighted(tied, parameters, functions):
-    """The equations with weights by each function of the residuals in turn."""
-    solved = tied.solve(parameters)
-    for function in functions:
-        weight = np.maximum(function(_ratio(tied, parameters, solved)), SETTINGS.resolution)
-        tied = replace(tied, ties=replace(tied.ties, weight=weight))
-        solved = reweight(solved, [np.ones(len(tied.gps_time)), weight])
-    return tied

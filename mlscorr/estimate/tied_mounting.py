@@ -25,7 +25,7 @@ from mlscorr.estimate.mounting import (
 from mlscorr.estimate.prediction import predict_under
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tied import TieResiduals, graduated, screen_with_ties
+from mlscorr.estimate.tied import TieResiduals, WeighedTies, graduated, screen_with_ties
 from mlscorr.survey import Matched, Mounting, Ties
 
 
@@ -47,7 +47,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     parameters = calibration.parameters[0][0]
     tied, correction = _converged(calibration, matched, ties, parameters)
     rows = replace(tied.ties, weight=np.ones(len(ties)))  # without those of robust estimation
-    bare = replace(tied, ties=None)
+    bare = replace(tied.equations, ties=None)
     kept, screening, is_used = screen_with_ties(bare, calibration.screening, rows)
     if not is_used.any():
         residuals = TieResiduals.of(ties, is_used, calibration.correction_with_drift)
@@ -82,11 +82,11 @@ def previewed_mounting(calibration: Calibration, matched: Matched, ties: Ties) -
     parameters = calibration.parameters[0][0]
     tied, correction = _converged(calibration, matched, ties, parameters)
     mounting = corrected_mounting(calibration.recorded, correction)
-    pose = predict_under(tied, parameters)
+    pose = predict_under(tied.equations, parameters, solved=tied.solved)
     return Correction.by_pose_error(calibration.trajectory, *pose, calibration.recorded, mounting)
 
 
-def _converged(calibration, matched, ties, parameters) -> tuple[Equations, np.ndarray]:
+def _converged(calibration, matched, ties, parameters) -> tuple[WeighedTies, np.ndarray]:
     """Equations with robust weights about the mounting that they give, and its correction (6,)."""
     recorded, targets = calibration.recorded, matched[calibration.used]
     correction, equations = calibration.lsc.correction, calibration.equations
@@ -94,7 +94,7 @@ def _converged(calibration, matched, ties, parameters) -> tuple[Equations, np.nd
         mounting, about = linearized(equations, targets, recorded, correction)
         moved = georeferenced_ties(about, (recorded, mounting), ties)
         tied = graduated(about, parameters, moved)
-        step = combined_correction(correction, tied.solve(parameters).trend) - correction
+        step = combined_correction(correction, tied.solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
             break
         correction = correction + step

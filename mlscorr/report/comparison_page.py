@@ -31,7 +31,7 @@ SECTIONS = {  # in their order; one without anything to show is left out
 KINDS = {  # colour, mark and words
     "none": (GREY, "x", "as recorded"),
     "one move": (VERMILLION, "s", "one move of the whole cloud, blind to time"),
-    "over time": (GREEN, "^", "polynomials of time"),
+    "over time": (GREEN, "^", "polynomials and interpolation over time"),
     "collocation": (BLUE, "o", "collocation: polynomials and the POS's own error over time"),
 }
 

@@ -20,7 +20,7 @@ from mlscorr.report.settings import SETTINGS
 COLLOCATION = "lsc"
 OTHERS = {
     "one move": "Best of those that move the whole cloud as one",
-    "over time": "Best of the polynomials of time alone",
+    "over time": "Best of polynomials and interpolation over time",
 }
 
 
