@@ -15,13 +15,13 @@ from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import as_path, file_state, is_there
 
-HEADER_SIZES = (227, 227, 227, 235, 375)  # bytes, of LAS 1.0 to 1.4
+HEADER_SIZES = (227, 227, 227, 235, 375, 393)  # bytes, of LAS 1.0 to 1.5
 COPC_FORMATS = (6, 7, 8)  # COPC 1.0
 EVLR_HEADER = struct.Struct("<2x16sHQ32s")  # owner, record, length of data, description
 
 
 def read_layout(path: str | Path) -> LasLayout:
-    """LasLayout of a LAS 1.0-1.4 or LAZ file with gps_time, checked; of an E57 or PLY its LAZ's.
+    """LasLayout of a LAS 1.0-1.5 or LAZ file with gps_time, checked; of an E57 or PLY its LAZ's.
 
     Nothing is allocated by a number that was not checked.
 
@@ -69,7 +69,7 @@ def _cut_off(path, evidence):
 def _check_header(layout):
     path, (major, minor) = layout.path, layout.version
     if major != 1 or minor >= len(HEADER_SIZES):
-        raise ValueError(f"{path} is LAS {major}.{minor}; LAS 1.0 to 1.4 can be read.")
+        raise ValueError(f"{path} is LAS {major}.{minor}; LAS 1.0 to 1.5 can be read.")
     if not HEADER_SIZES[minor] <= layout.field("H", 94)[0] <= len(layout.head):
         raise ValueError(
             f"{path} is damaged: its header has {layout.field('H', 94)[0]} bytes and its points "
@@ -102,6 +102,21 @@ def _check_header(layout):
         )
     if layout.points == 0:
         raise ValueError(f"{path} holds 0 points; perhaps its writing was interrupted.")
+    _check_kind(layout)
+
+
+def _check_kind(layout):
+    """That a LAS 1.5 or COPC file is what these may be."""
+    path, number = layout.path, layout.point_format
+    if layout.version >= (1, 5) and number < 6:
+        raise ValueError(
+            f"{path} is damaged: LAS 1.5 has point formats 6 to 10, not {number}. Export it anew."
+        )
+    if layout.has_time_offset and not layout.is_standard:
+        raise ValueError(
+            f"{path} states a time offset, and times in seconds of the week, which have none "
+            "(bits 6 and 0 of its global encoding). Export it anew."
+        )
     if layout.is_copc and number not in COPC_FORMATS:
         raise ValueError(
             f"{path} is damaged: a COPC file has points of formats 6 to 8, not {number}. Write it "

@@ -5,7 +5,7 @@ VLRs are kept as bytes, not read and written anew by laspy, which cannot leave a
 changes: it refuses LAS 1.0, decodes every VLR that it knows (one bad one would stop the file) and
 writes reserved fields, bytes behind the end of a text and the signature of a VLR its own way; and
 it believes counts before they are checked (2^31-1 VLRs keep it busy for good).
-Byte positions are those of the ASPRS LAS 1.4 R15 specification.
+Byte positions are those of the ASPRS LAS 1.4 R15 specification, and of 1.5 R00.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 from laspy import PointFormat
 
 from mlscorr.io.las_points import ChunkedPoints, PlainPoints
+from mlscorr.io.time_systems import ADJUSTMENT
 
 VLR_HEADER = struct.Struct("<2x16sHH32s")  # owner, record, length of data, description
 LASZIP, LASZIP_RECORD = b"laszip encoded", 22204  # of the VLR that says how points are compressed
@@ -71,7 +72,7 @@ class LasLayout:
 
     @property
     def version(self) -> tuple[int, int]:
-        """1.0 to 1.4, as (major, minor)."""
+        """1.0 to 1.5, as (major, minor)."""
         major, minor = self.field("BB", 24)
         return major, minor
 
@@ -79,6 +80,19 @@ class LasLayout:
     def is_standard(self) -> bool:
         """Whether gps_time is adjusted standard GPS time, not seconds of week."""
         return bool(self.head[6] & 1)
+
+    @property
+    def has_time_offset(self) -> bool:
+        """Whether gps_time is standard GPS time less an offset that the header states."""
+        return self.version >= (1, 5) and bool(self.head[6] & 64)
+
+    @property
+    def time_offset(self) -> float:
+        """What makes gps_time adjusted standard GPS time where another offset is stated. Units: s.
+
+        Source: ASPRS LAS 1.5 R00, Time Offset, in units of 1e6 s.
+        """
+        return 1e6 * self.field("H", 391)[0] - ADJUSTMENT if self.has_time_offset else 0.0
 
     @property
     def point_format(self) -> int:

@@ -18,7 +18,7 @@ from mlscorr.io.storage import as_path, is_folder, is_there
 from mlscorr.io.survey_paths import SurveyPaths, files_of
 from mlscorr.io.survey_scanners import clouds_of, mounted_scanners, scanner_notes
 from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
-from mlscorr.io.time_systems import match_times
+from mlscorr.io.time_systems import ADJUSTMENT, match_times
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory_sessions import Sessions, read_sessions
 from mlscorr.survey import CloudFile, ControlPoints, InputFile, Pos, Scanner, Survey, Trajectory
@@ -280,13 +280,15 @@ def cloud_file(
         Where the file states another CRS.
     """
     layout = read_layout(path)
-    file = CloudFile(path, layout.points, 0.0, "", ids)
+    file = CloudFile(path, layout.points, layout.time_offset, "", ids)
     records = spread_records(layout)[1]
-    times = records["gps_time"][file.rows(records["point_source_id"])]
+    times = records["gps_time"][file.rows(records["point_source_id"])] + layout.time_offset
     if not len(times) and (chunk := next(read_chunks(file), None)) is not None:  # too few of them
         times = chunk.gps_time
     match = match_times(path.name, times, layout.is_standard, trajectory, setting)
     if crs is not None and (conflict := crs_conflict(layout, crs)):
         warnings.warn(conflict, stacklevel=3)
-    file = replace(file, time_constant=match.constant, time_system=match.cloud_system)
-    return file, f"gps_time of {path.name}: {match}."
+    constant = match.constant + layout.time_offset
+    file = replace(file, time_constant=constant, time_system=match.cloud_system)
+    taken = f"; written less {ADJUSTMENT + layout.time_offset:.0f} s, as its header states"
+    return file, f"gps_time of {path.name}: {match}{taken if layout.time_offset else ''}."

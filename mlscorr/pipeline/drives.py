@@ -52,8 +52,8 @@ class Cloud:
 
     @property
     def times(self) -> np.ndarray:
-        """Times spread over the file, as they stand in it. Units: s."""
-        return self.records["gps_time"]
+        """Times spread over the file, without an offset of its own. Units: s."""
+        return self.records["gps_time"] + self.layout.time_offset
 
     @property
     def takes_turns(self) -> bool:
@@ -63,6 +63,7 @@ class Cloud:
 
     def file(self, constant: float = 0.0) -> CloudFile:
         """Its CloudFile, with what makes its times those of the trajectory (s)."""
+        constant += self.layout.time_offset
         return CloudFile(self.layout.cloud, self.layout.points, constant, "")
 
     def match(self, trajectory: Trajectory, setting: str = "auto") -> TimeMatch:

@@ -1,12 +1,16 @@
 """Windows of a file by time hold all points of their spans, and few others."""
 
+import struct
+
 import laspy
 import numpy as np
 import pytest
 
+from mlscorr.io.las import read_chunks, spread_times, times_at
+from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_windows import read_windows
 from mlscorr.io.settings import SETTINGS
-from mlscorr.survey import CloudFile
+from mlscorr.survey import CloudFile, PointCloud
 
 POINTS, RATE = 400_000, 50_000.0  # and points a second
 
@@ -52,3 +56,34 @@ def test_a_short_file_is_read_whole_and_a_long_one_only_in_order(file, tmp_path)
     las.write(tmp_path / "b.laz")
     with pytest.raises(ValueError, match="not in order of time"):
         times(CloudFile(tmp_path / "b.laz", POINTS, 100.0, "week"), [[1101.0, 1102.0]])
+
+
+def test_a_file_of_more_than_2_to_the_32_points(tmp_path):
+    "Numbers of points and bytes beyond 32 bits are sought and read; the file is a sparse one"
+    points, late = 5_000_000_000, 1_000
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = np.full(3, 0.001), [532_000.0, 3_374_000.0, 40.0]
+    las = laspy.LasData(header)
+    las.points = laspy.ScaleAwarePointRecord.zeros(late, header=header)
+    las.gps_time, las.X = 357_900.0 + np.arange(late) * 1e-3, np.arange(late)
+    las.write(tmp_path / "big.las")
+    data = bytearray((tmp_path / "big.las").read_bytes())
+    start = len(data) - 30 * late
+    struct.pack_into("<Q", data, 247, points)
+    struct.pack_into("<I", data, 107, 0)
+    with (tmp_path / "big.las").open("wb") as file:
+        file.write(data[:start])
+        file.seek(start + 30 * (points - late))
+        file.write(data[-30 * late :])
+    layout = read_layout(tmp_path / "big.las")
+    assert layout.points == points
+    places = points - late + np.array([0, 7, late - 1])
+    assert np.allclose(times_at(layout, places), 357_900.0 + np.array([0.0, 0.007, 0.999]))
+    assert spread_times(layout)[0][-1] == points - 1
+    spans = np.array([[357_900.4, 357_900.5]])
+    windows = list(read_windows(CloudFile(layout.path, points, 0.0, "week"), spans))
+    read = PointCloud.concatenate(windows)
+    assert {400, 499} <= set(np.rint((read.xyz[:, 0] - 532_000.0) * 1e3).astype(int).tolist())
+    assert len(read) <= 2 * SETTINGS.close_places
+    last = list(read_chunks(CloudFile(layout.path, points, 0.0, "week"), first=points - 3))
+    assert len(last[0]) == 3
