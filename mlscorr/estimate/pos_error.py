@@ -33,7 +33,8 @@ from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import Support, find_support
 from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tied import TieResiduals, robust_ties, screen_with_ties
+from mlscorr.estimate.tie_weights import robust_ties
+from mlscorr.estimate.tied import TieResiduals, screen_with_ties
 from mlscorr.survey import Matched, Mounting, Pos, Ties, Trajectory
 from mlscorr.survey.summary import Summary
 

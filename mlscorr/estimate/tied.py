@@ -8,14 +8,11 @@ Black and Rangarajan 1996), then Student's t in turn with the restricted likelih
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
 
-from mlscorr.collocation import Collocation, reweight
-from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.correction import Correction
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.outages import with_likely_starts
@@ -25,6 +22,7 @@ from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import all_tests
 from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.estimate.tie_weights import robust_ties, solved_ties, student
 from mlscorr.survey import Ties
 
 WRONG_BUT_USED = "It is used, as too few are left to tell which point is wrong"
@@ -111,8 +109,8 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
     tied = tied.with_starts(with_likely_starts(sample(tied))[0].stated.starts)
     rows = tied.ties
     parameters = _most_probable(tied, parameters)
-    weighed = _solved(tied, parameters).graded((_student,))
-    tied, ratio = weighed.equations, np.abs(_ratio(weighed))
+    weighed = solved_ties(tied, parameters).graded((student,))
+    tied, ratio = weighed.equations, np.abs(weighed.ratio)
     factor = float(np.clip(np.median(ratio) / MEDIAN, 1.0, SETTINGS.tie_cut))
     used = ratio <= SETTINGS.tie_cut * factor
     kept = replace(rows, variance=factor**2 * rows.variance, weight=np.ones(len(rows)))
@@ -192,117 +190,3 @@ def sample(tied: Equations) -> Equations:
     """
     step = -(-len(tied.ties) // SETTINGS.tie_sample)
     return replace(tied, ties=tied.ties.select(slice(None, None, step)))
-
-
-def _ratio(weighed):
-    """Residuals (n,) of the ties over their sigmas."""
-    ties = weighed.equations.ties
-    variance = ties.variance / ties.weight
-    residual = variance * weighed.solved.weights[-len(ties) :]  # N V^-1 (l - A x)
-    return residual / np.sqrt(ties.variance)
-
-
-@dataclass(frozen=True)
-class WeighedTies:
-    """Equations with robust weights of ties, solved.
-
-    Parameters
-    ----------
-    equations : Equations
-        With ties.
-    parameters : SignalParameters
-    solved : Collocation
-        By both.
-    first : (n,) array
-        Weights of the ties when the equations were solved first; others are put beside these.
-    """
-
-    equations: Equations
-    parameters: SignalParameters
-    solved: Collocation
-    first: np.ndarray
-
-    @property
-    def ties(self) -> TieEquations:
-        """The ties with their weights."""
-        ties = self.equations.ties
-        assert ties is not None
-        return ties
-
-    def graded(self, functions: Iterable[Callable]) -> WeighedTies:
-        """With weights by each function of the residuals in turn.
-
-        Parameters
-        ----------
-        functions : iterable of function
-            Of residuals over their sigmas (n,).
-        """
-        tied, solved = self.equations, self.solved
-        for function in functions:
-            ratio = _ratio(WeighedTies(tied, self.parameters, solved, self.first))
-            weight = np.maximum(function(ratio), SETTINGS.resolution)
-            tied = replace(tied, ties=replace(tied.ties, weight=weight))
-            solved = reweight(solved, [np.ones(len(tied.gps_time)), weight / self.first])
-        return WeighedTies(tied, self.parameters, solved, self.first)
-
-
-def robust_ties(
-    equations: Equations, parameters: SignalParameters, ties: TieEquations
-) -> WeighedTies:
-    """The equations with graduated weights of ties, under those parameters by which more hold.
-
-    Few control points may choose drift that is too slow or too small; then ties that agree with
-    each other contradict it. So they are also weighed by what is believed without control.
-
-    Parameters
-    ----------
-    equations : Equations
-        Of the control points.
-    parameters : SignalParameters
-        That these chose.
-    ties : TieEquations
-    """
-    weighed = graduated(equations, parameters, ties)
-    if (held := _held(weighed)) == len(ties):
-        return weighed
-    prior = Objective((), weighed.equations.prior(weighed.equations))
-    other = graduated(equations, prior.parameters(INTEGRATED, prior.initial), ties)
-    return other if _held(other) > held else weighed
-
-
-def _held(weighed):
-    """Number of ties that hold."""
-    least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)
-    return np.count_nonzero(weighed.ties.weight > least)
-
-
-def graduated(
-    equations: Equations, parameters: SignalParameters, ties: TieEquations
-) -> WeighedTies:
-    """The equations with ties, whose weights' scale has shrunk from all to the honest ones.
-
-    Parameters
-    ----------
-    equations : Equations
-        Without ties.
-    parameters : SignalParameters
-    ties : TieEquations
-    """
-    weighed = _solved(replace(equations, ties=ties), parameters)
-    largest = float(np.abs(_ratio(weighed)).max(initial=0.0))
-    steps = max(int(np.ceil(np.log2(max(largest, 1.0) / SETTINGS.tie_cut))), 1)
-    scales = SETTINGS.tie_cut * 2.0 ** np.arange(steps)[::-1]
-    return weighed.graded(_geman_mcclure(scale) for scale in scales)
-
-
-def _solved(tied, parameters):
-    return WeighedTies(tied, parameters, tied.solve(parameters), tied.ties.weight)
-
-
-def _geman_mcclure(scale: float) -> Callable:
-    return lambda ratio: (1.0 + (ratio / scale) ** 2) ** -2.0
-
-
-def _student(ratio):
-    freedom = SETTINGS.tie_freedom
-    return (freedom + 1.0) / (freedom + ratio**2)

@@ -25,7 +25,8 @@ from mlscorr.estimate.mounting import (
 from mlscorr.estimate.prediction import predict_under
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tied import TieResiduals, WeighedTies, graduated, screen_with_ties
+from mlscorr.estimate.tie_weights import WeighedTies, graduated
+from mlscorr.estimate.tied import TieResiduals, screen_with_ties
 from mlscorr.survey import Matched, Mounting, Ties
 
 

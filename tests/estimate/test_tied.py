@@ -1,7 +1,5 @@
 """Ties beside control points: what they add, which of them hold, and what they can't tell."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,7 @@ from mlscorr.estimate import (
     previewed_correction,
     with_ties,
 )
-from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tied import TieResiduals, graduated, robust_ties
+from mlscorr.estimate.tied import TieResiduals
 from mlscorr.ties import weigh_by_time
 from tests.beds.tied_passes import tied_passes
 
@@ -141,19 +138,3 @@ def test_order_of_ties_does_not_matter(clean):
     shuffled = survey.ties[np.random.default_rng(0).permutation(len(survey.ties))]
     other = with_ties(alone, shuffled).correction.corrected.position
     assert np.abs(other - tied.correction.corrected.position).max() < 2e-3  # m
-
-
-def test_control_that_believes_in_hardly_any_drift_does_not_outweigh_the_ties(clean):
-    "A centimetre that changes in ten minutes, where ties tell of decimetres: they are believed"
-    survey, alone, _ = clean
-    none = dict.fromkeys(("jitter_scale", "bias_scale", "attitude_scale"), 0.01)
-    stiff = replace(alone.parameters, family="matern52", drift_scale=0.02, drift_time=600.0, **none)
-    equations = alone.equations
-    rows = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
-    lost = graduated(equations, stiff, rows).ties.weight < 0.25  # beyond the cut of 4 sigmas
-    assert lost.mean() > 0.05
-    weighed = robust_ties(equations, stiff, rows)
-    assert (weighed.ties.weight < 0.25).mean() < 0.01
-    assert weighed.parameters.drift_scale > 0.5
-    weighed = robust_ties(equations, alone.parameters, rows)
-    assert weighed.parameters == alone.parameters and (weighed.ties.weight < 0.25).mean() < 0.01

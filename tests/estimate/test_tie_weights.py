@@ -1,0 +1,46 @@
+"""Robust weights of ties: the same by steps and at once, and by what more of them hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.estimate.tie_weights import graduated, robust_ties, solved_ties, student
+from tests.beds.tied_passes import tied_passes
+
+
+@pytest.fixture(scope="module")
+def tied():
+    "The estimate by control alone, its equations, and those of ties"
+    survey = tied_passes(1)
+    alone = estimate_correction(survey.trajectory, survey.matched)
+    equations = alone.equations
+    rows = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
+    return alone, equations, rows
+
+
+def test_weights_put_beside_others_are_those_of_a_new_solution(tied):
+    "After graduated weights Student's t is solved to 1e-6 as if from the start"
+    alone, equations, rows = tied
+    weighed = graduated(equations, alone.parameters, rows)
+    again = solved_ties(weighed.equations, weighed.parameters)
+    np.testing.assert_allclose(again.ratio, weighed.ratio, atol=1e-6)
+    student_weighed = again.graded((student,))
+    fresh = solved_ties(student_weighed.equations, student_weighed.parameters)
+    np.testing.assert_allclose(fresh.ratio, student_weighed.ratio, atol=1e-6)
+
+
+def test_control_that_believes_in_hardly_any_drift_does_not_outweigh_the_ties(tied):
+    "A centimetre that changes in ten minutes, where ties tell of decimetres: they are believed"
+    alone, equations, rows = tied
+    none = dict.fromkeys(("jitter_scale", "bias_scale", "attitude_scale"), 0.01)
+    stiff = replace(alone.parameters, family="matern52", drift_scale=0.02, drift_time=600.0, **none)
+    lost = graduated(equations, stiff, rows).ties.weight < 0.25  # beyond the cut of 4 sigmas
+    assert lost.mean() > 0.05
+    weighed = robust_ties(equations, stiff, rows)
+    assert (weighed.ties.weight < 0.25).mean() < 0.01
+    assert weighed.parameters.drift_scale > 0.5
+    weighed = robust_ties(equations, alone.parameters, rows)
+    assert weighed.parameters == alone.parameters and (weighed.ties.weight < 0.25).mean() < 0.01
