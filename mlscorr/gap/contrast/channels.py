@@ -9,7 +9,7 @@ import numpy as np
 from mlscorr.gap.contrast.blocks import block_of, weights_of
 from mlscorr.gap.contrast.edges import Edges
 from mlscorr.gap.contrast.pairs import PairedCells, paired_cells
-from mlscorr.gap.contrast.sample import ChannelSample
+from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
 from mlscorr.gap.contrast.settings import SETTINGS
 from mlscorr.gap.contrast.tables import Binning, Contrast, Measure
 from mlscorr.gap.contrast.words import SILENT, sentence
@@ -30,6 +30,7 @@ def contrast_clouds(
     survey : Survey
     real, simulated : ChannelSample
     """
+    real, simulated = of_shared_moments((real, simulated))
     pairs = paired_cells(survey, real, simulated)
     return _judged([
         _intensity(pairs, real, simulated),

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from mlscorr.gap.contrast.cells import sampled
-from mlscorr.gap.contrast.sample import ChannelSample
+from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
 from mlscorr.gap.contrast.settings import SETTINGS
 from mlscorr.gap.observe.plane_fit import chance
 
@@ -123,7 +123,7 @@ def cloud_distances(
     real, simulated : ChannelSample
     following : ChannelSample, optional
     """
-    clouds = [cloud for cloud in (real, simulated, following) if cloud is not None]
+    clouds = of_shared_moments([c for c in (real, simulated, following) if c is not None])
     share = min(cloud.point_share for cloud in clouds)
     points = [sampled(cloud.points, share) for cloud in clouds]
     origin = points[0].xyz.mean(axis=0) if len(points[0]) else np.zeros(3)

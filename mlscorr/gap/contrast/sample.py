@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
 from mlscorr.gap.contrast.cells import CellCollector, Cells
 from mlscorr.gap.contrast.edges import EdgeCollector, Edges
 from mlscorr.gap.observe.patches import Patches
+from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
 from mlscorr.survey import PointCloud, Survey
 
 
@@ -43,6 +46,29 @@ class ChannelSample:
     def has_intensity(self) -> bool:
         """Whether its intensities tell anything: some differ."""
         return len(self.points) > 0 and bool(np.ptp(self.points.intensity) > 0)
+
+
+def of_shared_moments(samples: Sequence[ChannelSample]) -> list[ChannelSample]:
+    """The samples at moments in which all of them have points: a cloud may be of a part of a drive.
+
+    Parameters
+    ----------
+    samples : sequence of ChannelSample
+    """
+    moments = reduce(np.intersect1d, (sample.cells.moment for sample in samples))
+
+    def has(time):
+        return np.isin(np.floor(time / OBSERVE.moment) * OBSERVE.moment, moments)
+
+    return [
+        replace(
+            sample,
+            cells=sample.cells[has(sample.cells.moment)],
+            edges=sample.edges[has(sample.edges.gps_time)],
+            points=sample.points[has(sample.points.gps_time)],
+        )
+        for sample in samples
+    ]
 
 
 class SampleCollector:

@@ -58,6 +58,16 @@ def test_returns_that_are_lost_far_away_are_measured_and_named(pair):
     assert not lossy["intensity"].sentences
 
 
+def test_a_simulation_of_half_of_the_drive_says_nothing_of_the_rest(pair):
+    "Where the simulated cloud ends after half of the time, the other half is no missing density"
+    survey, real, simulated = pair
+    half = np.median(simulated.cells.moment)
+    cells = simulated.cells[simulated.cells.moment < half]
+    density = by_channel(contrast_clouds(survey, real, replace(simulated, cells=cells)))["density"]
+    assert abs(density.whole.value[0]) < 0.01
+    assert not density.sentences
+
+
 @pytest.mark.parametrize("seed", [11, 12])
 def test_twins_differ_in_nothing(tmp_path, seed):
     "Another POS error and other noise: no channel says anything, with beams wide and thin"
