@@ -30,6 +30,7 @@ from mlscorr.simulate import Scenario, simulate
 TILES = 4  # of a drive
 SCANNER = {"lines_per_second": 150, "points_per_line": 2000}
 COMMAND = [sys.executable, "-m", "mlscorr", "correct"]
+SINGLE = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # as in each of more workers
 
 
 def write_drive(folder, number, seconds=12.0):
@@ -64,7 +65,8 @@ def timed(*arguments):
     """Seconds of a run of correct without pages, by the clock and of all processors (2,)."""
     start, worked = perf_counter(), processor_seconds()
     command = [*COMMAND, *map(str, arguments), "--no-report", "--quiet"]
-    subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+    alone = os.environ | SINGLE
+    subprocess.run(command, check=True, stderr=subprocess.DEVNULL, env=alone)
     return np.array([perf_counter() - start, processor_seconds() - worked])
 
 
