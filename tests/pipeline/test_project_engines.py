@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -17,11 +18,12 @@ from tests.beds.places import ROOT
 
 CLUSTER = """
 from distributed import LocalCluster
-from tests.pipeline.test_project_engines import lose_a_worker, squares
+from tests.pipeline.test_project_engines import lose_a_call, lose_a_worker, squares
 if __name__ == "__main__":
     with LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
         squares({folder!r}, scheduler=cluster.scheduler_address)
         lose_a_worker({folder!r}, cluster.scheduler_address)
+        lose_a_call(cluster.scheduler_address)
 """
 
 
@@ -70,6 +72,17 @@ def lose_a_worker(folder, scheduler):
         mark = Path(folder) / "mark"
         assert run.results([task(7, end_at_first, mark)]) == {"end_at_first-7": 49}
         assert chosen.lost == 1
+
+
+def lose_a_call(scheduler):
+    "A call that the scheduler knows no more, as when it ended, is said in a sentence"
+    with (
+        pytest.raises(ConnectionError, match="--resume goes on"),
+        engine(scheduler=scheduler) as chosen,
+    ):
+        call = chosen.submit(time.sleep, 60.0)
+        call.cancel()
+        call.result()
 
 
 @pytest.mark.parametrize("workers", [1, 2])

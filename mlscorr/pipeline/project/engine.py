@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Protocol
@@ -197,6 +197,8 @@ def engine(workers: int = 1, scheduler: str | None = None) -> Iterator[Engine]:
     ------
     ValueError
         Where both are given, and as of Cluster.
+    ConnectionError
+        When the scheduler ends before its calls.
     """
     check_engine(workers, scheduler)
     if scheduler is None and workers == 1:
@@ -207,6 +209,11 @@ def engine(workers: int = 1, scheduler: str | None = None) -> Iterator[Engine]:
     os.environ.update(dict.fromkeys(THREADS, "1"))  # of the processes that are started from here
     try:
         yield chosen
+    except CancelledError:  # of calls that no scheduler knows any more
+        raise ConnectionError(
+            f"The scheduler at {scheduler} ended, and with it what its workers were at. Start it "
+            "again; --resume goes on where it ended."
+        ) from None
     finally:
         chosen.close()
         for name, value in before.items():

@@ -1,0 +1,243 @@
+"""A city at the level of small values: what planning, joining and solving of many drives costs.
+
+    python benchmarks/city_study.py [DRIVES ...] [--tiles TILES]
+
+Vehicles wander a grid of streets, 200 s each, at 10 Hz. What each saw of walls, road and poles, and
+the control points of one drive in ten, is made up; no point of a cloud is. Each size runs in a
+process of its own, which tells its memory; seconds are of the processor.
+"""
+
+import argparse
+import itertools
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+from threadpoolctl import threadpool_limits
+
+from mlscorr.frames import attitude_from_angles
+from mlscorr.io.control import NO_POINTS
+from mlscorr.matching import Matches
+from mlscorr.pipeline.file_finding import DriveFinding
+from mlscorr.pipeline.finding import Finding
+from mlscorr.pipeline.project.corrected import corrected_drives, motion_of
+from mlscorr.pipeline.project.joint import FoundDrive
+from mlscorr.pipeline.project.joint_estimate import estimate_drives
+from mlscorr.survey import (
+    ControlPoints,
+    Matched,
+    Mounting,
+    Pos,
+    Scanner,
+    Survey,
+    TargetObservations,
+    TieFeatures,
+    Trajectory,
+)
+from mlscorr.targets import NO_POINTS as NO_CLOUD
+from mlscorr.targets import Candidates
+
+BLOCK = 100.0  # m between crossings
+SPEED = 10.0  # m/s
+DURATION = 200.0  # s of a drive
+RATE = 10.0  # epochs a second
+ORIGIN = np.array([532_000.0, 3_374_000.0, 40.0])
+START = 1_357_700_000.0  # s, GPS
+SIGMA = 0.5  # m, that the POS states
+PLACES_PER_BLOCK = 300  # planes and poles along a block that a drive sees
+NOISE = 0.005  # m, of a plane's place
+CONTROL_SHARE = 0.1  # of the drives
+
+
+class City:
+    "Streets, drives that wander over them, and what these saw"
+
+    def __init__(self, drives, tiles, seed=0):
+        self.rng = np.random.default_rng(seed)
+        self.edge = max(int(np.sqrt(drives * DURATION * SPEED / BLOCK / 6)), 3)  # seen 3 times
+        self.tiles, self.blocks, self.errors = tiles, {}, {}
+        self.drives = [self.drive(number) for number in range(drives)]
+
+    def crossings(self):
+        "A way (k, 2) over the grid that never turns round at once"
+        place, ahead = self.rng.integers(0, self.edge, 2), None
+        way = [place]
+        while len(way) <= DURATION * SPEED / BLOCK:
+            steps = [np.array(step) for step in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+            steps = [s for s in steps if ahead is None or not np.array_equal(s, -ahead)]
+            steps = [s for s in steps if ((place + s >= 0) & (place + s < self.edge)).all()]
+            ahead = steps[self.rng.integers(len(steps))]
+            place = place + ahead
+            way.append(place)
+        return np.array(way)
+
+    def block(self, first, second):
+        "Places, directions and kinds along the block between two crossings, always the same"
+        key = tuple(map(tuple, sorted((first.tolist(), second.tolist()))))
+        if key not in self.blocks:
+            low, high = np.array(key, float) * BLOCK
+            along = (high - low) / BLOCK
+            across = np.array([-along[1], along[0]])
+            rng, n = np.random.default_rng([*key[0], *key[1]]), PLACES_PER_BLOCK
+            at, part = rng.uniform(0, BLOCK, n), rng.choice(4, n, p=[0.35, 0.3, 0.3, 0.05])
+            side = np.select([part == 1, part == 2], [10.0, -10.0], rng.uniform(-6, 6, n))
+            plan = low + at[:, None] * along + side[:, None] * across
+            height = np.where(part == 0, 0.0, rng.uniform(1, 8, n))
+            lean = rng.normal(scale=0.03, size=(n, 3))
+            lean[:, :2] += np.where(rng.uniform(size=n) < 0.2, 0.5, 0.0)[:, None] * along
+            facing = np.column_stack([*np.outer(across, -np.sign(side)), np.zeros(n)])
+            upright = (part == 0) | (part == 3)
+            direction = np.where(upright[:, None], [0.0, 0.0, 1.0], facing) + lean
+            direction[part == 3] = [0.0, 0.0, 1.0]
+            direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+            kind = np.where(part == 3, "pole", "plane")
+            self.blocks[key] = ORIGIN + np.column_stack([plan, height]), direction, kind
+        return self.blocks[key]
+
+    def drive(self, number):
+        "FoundDrive of a way"
+        rng, way = self.rng, self.crossings()
+        start = START + 86_400.0 * (number // 50) + 400.0 * (number % 50)
+        times = start + np.arange(0.0, DURATION + 1e-9, 1 / RATE)
+        passed = start + np.arange(len(way)) * BLOCK / SPEED
+        plan = np.column_stack([np.interp(times, passed, BLOCK * xy) for xy in way.T])
+        knots = np.arange(start - 30.0, start + DURATION + 60.0, 30.0)
+        error = CubicSpline(knots, rng.normal(scale=SIGMA, size=(len(knots), 3)))
+        recorded = ORIGIN + np.column_stack([plan, np.full(len(plan), 2.5)]) + error(times)
+        level = attitude_from_angles(
+            np.zeros(len(times)), np.zeros(len(times)), np.zeros(len(times))
+        )
+        sigmas = np.full((len(times), 3), SIGMA), np.full((len(times), 3), 1e-4)
+        trajectory = Trajectory(times, recorded, level, *sigmas)
+        survey = Survey(
+            name=f"drive-{number}", path=Path("project.toml"), crs=None, clouds=(),
+            trajectory=trajectory, mounting=Mounting(np.zeros(3), Rotation.identity()),
+            control=NO_POINTS, check=NO_POINTS, scanner=Scanner(), pos=Pos(),
+        )  # fmt: skip
+        self.errors[survey.name] = error
+        features = self.seen(way, passed, error)
+        passes = {(tile, 0): tile + 1 for tile in range(self.tiles)}
+        candidates = Candidates(NO_CLOUD, np.empty(0, int), NO_CLOUD, passes, {})
+        control = self.control(way, passed, error, number)
+        nothing = TargetObservations.concatenate([control.observations])[[]]
+        finding = Finding(Matches(nothing, nothing, (), np.empty(0), ()), candidates, {})
+        return FoundDrive(survey, DriveFinding(finding, features), control, control[[]])
+
+    def left(self, name, correction):
+        "3D RMS of what a correction leaves of a drive's error. Units: m"
+        recorded, corrected = correction.recorded, correction.corrected
+        added = corrected.position - recorded.position
+        return np.sqrt(
+            (np.linalg.norm(added + self.errors[name](recorded.gps_time), axis=1) ** 2).mean()
+        )
+
+    def seen(self, way, passed, error):
+        "TieFeatures of a drive"
+        parts = [self.block(*ends) for ends in itertools.pairwise(way)]
+        place, direction, kind = (np.concatenate(each) for each in zip(*parts, strict=True))
+        number = np.repeat(np.arange(len(parts)), PLACES_PER_BLOCK)
+        along = (way[1:] - way[:-1])[number]
+        ahead = np.einsum("ni,ni->n", place[:, :2] - ORIGIN[:2] - BLOCK * way[number], along)
+        times = passed[number] + ahead / SPEED
+        n = len(place)
+        centre = place + error(times) + self.rng.normal(scale=NOISE, size=(n, 3))
+        tile = np.minimum((times - passed[0]) / DURATION * self.tiles, self.tiles - 1).astype(int)
+        features = TieFeatures(
+            tile + 1, np.zeros(n, int), kind, times, centre, direction, np.full(n, NOISE**2),
+            np.full(n, 1e-5), np.full(n, 0.3), np.full(n, 100), np.zeros(n), np.zeros((n, 3)),
+        )  # fmt: skip
+        return features[np.argsort(times)]
+
+    def control(self, way, passed, error, number):
+        "Matched control of every tenth drive: a point each 20 s"
+        count = 10 if number % round(1 / CONTROL_SHARE) == 0 else 0
+        at = np.linspace(passed[0] + 5.0, passed[-1] - 5.0, count)
+        plan = np.column_stack([np.interp(at, passed, BLOCK * xy) for xy in way.T])
+        true = ORIGIN + np.column_stack([plan, np.full(count, 2.0)]) + [0.0, 5.0, 0.0]
+        name, kind, size = tuple(f"{number}-{k}" for k in range(count)), ("circle",) * count, 0.2
+        normal = np.tile([0.0, -1.0, 0.0], (count, 1))
+        seen = true + error(at) + self.rng.normal(scale=NOISE, size=(count, 3))
+        covariance = np.tile(NOISE**2 * np.eye(3), (count, 1, 1))
+        observed = TargetObservations(
+            name, np.full(count, self.tiles), at, seen, covariance,
+            normal, kind, np.full(count, size), np.full(count, 200),
+        )  # fmt: skip
+        sigma = np.full((count, 3), NOISE)
+        points = ControlPoints(name, true, sigma, kind, np.full(count, size), normal)
+        return Matched(observed, points)
+
+
+def run(number, tiles):
+    "Print what a city of so many drives costs"
+    begin = process_time()
+    city = City(number, tiles)
+    made, memory_before = process_time() - begin, memory()
+    with threadpool_limits(1):
+        parts = estimate_drives(city.drives, 1, ORIGIN, True)
+        joined = process_time() - begin - made
+        left, states = [], []
+        for part in parts:
+            for corrected, state in corrected_drives(part):
+                motion_of(corrected, False)
+                states.append(state.state)
+                left.append(city.left(state.name, corrected.estimate.correction))
+    parted = process_time() - begin - made - joined
+    features = sum(len(drive.contents.features) for drive in city.drives)
+    held = sum(state in ("controlled", "tied") for state in states)
+    print(
+        number,
+        features,
+        made,
+        joined,
+        parted,
+        memory_before,
+        memory(),
+        held,
+        *np.percentile(left, [50, 95]),
+    )
+
+
+def memory():
+    "Largest memory of this process so far in MB"
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
+
+
+def main():
+    """Each size in a process of its own."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("drives", type=int, nargs="*", default=[1, 2])
+    parser.add_argument("--tiles", type=int, default=4, help="Of each drive.")
+    parser.add_argument("--run", action="store_true")
+    given = parser.parse_args()
+    if given.run:
+        run(given.drives[0], given.tiles)
+        return
+    heads = (
+        "drives",
+        "planes, poles",
+        "making, s",
+        "joining, s",
+        "parting, s",
+        "MB before",
+        "MB",
+        "held",
+        "left of 0.87 m",
+        "95 %",
+    )
+    table = Table(*heads, title=f"{given.tiles} tiles a drive; what is left: 3D RMS of a drive")
+    for number in given.drives:
+        command = [sys.executable, __file__, str(number), "--tiles", str(given.tiles), "--run"]
+        words = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
+        table.add_row(*(f"{float(word):.4g}" for word in words))
+    Console(width=120).print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,227 @@
+"""What is left of a project that is killed at a random moment, and what a resumed run makes of it.
+
+    python benchmarks/kill_study.py [KILLS]
+
+A project of two drives in four files each is corrected without a disturbance. Then, KILLS times (60
+by default) in turn: a worker, the command itself, the scheduler of a cluster is ended by SIGKILL,
+or the disk is full (a file system in memory, which only root may mount). What stands in the folder
+then must be whole, and ``--resume`` must end with the same bytes, without doing again what had
+ended. Times don't count: it may run beside other work.
+"""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from time import monotonic, sleep
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+from tests.beds import project_street as bed  # noqa: E402
+
+TILES = 4  # of a drive
+WORKERS = 2
+WORKERS_START = 6.0  # s until a cluster has them
+DASK = str(Path(sys.executable).with_name("dask"))
+COMMAND = [sys.executable, "-m", "mlscorr", "correct"]
+ENDED = re.compile(r" (tiles|findings|clouds|reports): (.+) in [\d.]+ s$")
+DISK = 400_000_000  # bytes of the file system, more than the results take
+
+
+class Case:
+    "A run that is disturbed, and resumed"
+
+    def __init__(self, project, out, expected):
+        self.project, self.out, self.expected = project, out, expected
+        self.process = None
+
+    def start(self, *arguments):
+        "Begin a run"
+        command = [*COMMAND, str(self.project), "-o", str(self.out), "--no-report", *arguments]
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
+        )
+
+    def wait(self, seconds):
+        "Until a moment after the start, unless the run ends before"
+        due = monotonic() + seconds
+        while monotonic() < due and self.process.poll() is None:
+            sleep(0.02)
+
+    def end(self):
+        "Exit code of the run, once it has ended"
+        self.process.communicate()
+        return self.process.returncode
+
+    def done(self, line=0):
+        "Counts of the tasks that ended, from a line of the log on"
+        log = self.out / "log.txt"
+        lines = log.read_text().splitlines()[line:] if log.is_file() else []
+        return Counter(match.groups() for match in map(ENDED.search, lines) if match)
+
+    def resumed(self):
+        "What is wrong after --resume: sentences"
+        left = contents(self.out)
+        left.pop("project.json", None)  # which counts the workers that were lost
+        wrong = [f"{n} is half" for n, content in left.items() if content != self.expected.get(n)]
+        before = self.done()
+        log = self.out / "log.txt"
+        line = len(log.read_text().splitlines()) if log.is_file() else 0
+        again = ["--resume"] if (self.out / "tasks").is_dir() else []
+        self.start("--workers", str(WORKERS), *again)
+        if code := self.end():
+            wrong.append(f"--resume ended with {code}")
+        wrong += [f"{' '.join(name)} was done again" for name in before if name in self.done(line)]
+        if contents(self.out) != self.expected:
+            wrong.append("bytes are not the same")
+        return wrong, sum(self.done(line).values())
+
+
+def contents(out):
+    "Bytes of all results but those that say when they were made, and of tasks"
+    names = [path for path in out.rglob("*") if path.is_file()] if out.is_dir() else []
+    return {
+        str(path.relative_to(out)): path.read_bytes()
+        for path in names
+        if path.relative_to(out).parts[0] != "tasks" and path.suffix not in (".html", ".txt")
+    }
+
+
+def children(number):
+    "Numbers of the processes that a process started, of these and so on"
+    tasks = Path(f"/proc/{number}/task")
+    own = [int(n) for path in tasks.glob("*/children") for n in path.read_text().split()]
+    return own + [n for child in own for n in children(child)]
+
+
+def lose_worker(case, moment, rng):
+    "One of the workers is ended; the run goes on"
+    case.start("--workers", str(WORKERS))
+    case.wait(moment)
+    if workers := [n for n in children(case.process.pid) if is_worker(n)]:
+        os.kill(int(rng.choice(workers)), signal.SIGKILL)
+    return case.end()
+
+
+def is_worker(number):
+    "Whether a process works on tasks"
+    try:
+        return b"spawn_main" in Path(f"/proc/{number}/cmdline").read_bytes()
+    except OSError:
+        return False
+
+
+def lose_command(case, moment, rng):
+    "The command itself is ended"
+    case.start("--workers", str(WORKERS))
+    case.wait(moment)
+    case.process.kill()
+    return case.end()
+
+
+def lose_scheduler(case, moment, rng):
+    "The scheduler of a cluster of two workers is ended"
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scheduler.json"
+        shared = ["--scheduler-file", str(file)]
+        alone = [DASK, "scheduler", *shared, "--port", "0", "--dashboard-address", ":0"]
+        scheduler = subprocess.Popen(alone, **silent)
+        while not file.is_file():
+            sleep(0.1)
+        several = ["--nworkers", str(WORKERS), "--nthreads", "1", "--death-timeout", "20"]
+        workers = subprocess.Popen(
+            [DASK, "worker", *shared, *several, "--no-dashboard"], **silent, start_new_session=True
+        )
+        try:
+            sleep(WORKERS_START)
+            case.start("--scheduler", json.loads(file.read_text())["address"])
+            case.wait(moment)
+            scheduler.kill()
+            return case.end()
+        finally:
+            scheduler.kill()
+            os.killpg(workers.pid, signal.SIGKILL)
+
+
+def fill_disk(case, moment, rng):
+    "No byte can be written from a moment on"
+    case.out.mkdir(parents=True)
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", str(case.out)]
+    subprocess.run(mount, check=True)
+    case.start("--workers", str(WORKERS))
+    case.wait(moment)
+    filler = case.out / "filler.txt"
+    try:
+        with open(filler, "wb", buffering=0) as file:
+            while file.write(bytes(1 << 20)):
+                pass
+    except OSError:
+        pass
+    code = case.end()
+    filler.unlink()
+    return code
+
+
+DISTURBANCES = (lose_worker, lose_command, lose_scheduler, fill_disk)
+
+
+def tell(rows, wrong, seconds):
+    "A row of each disturbance, and what is wrong"
+    table = Table("disturbed", "runs", "moments, s", "exit codes", "tasks when resumed", "wrong")
+    for name, cases in rows.items():
+        moments, codes, tasks, faults = zip(*cases, strict=True)
+        table.add_row(
+            name,
+            str(len(cases)),
+            f"{min(moments):.1f} to {max(moments):.1f}",
+            ", ".join(f"{code} ({n} x)" for code, n in sorted(Counter(codes).items())),
+            f"{min(tasks)} to {max(tasks)}",
+            str(sum(map(bool, faults))),
+        )
+    console = Console(width=110)
+    console.print(table)
+    console.print(f"Undisturbed: {seconds:.1f} s.")
+    for sentence in wrong:
+        console.print(sentence)
+
+
+def main(kills=60):
+    rng, rows, wrong = np.random.default_rng(0), {}, []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        project = bed.write_project(folder / "city", duration=6.0, tiles=TILES)
+        whole = Case(project, folder / "whole", {})
+        begin = monotonic()
+        whole.start("--workers", str(WORKERS))
+        if code := whole.end():
+            sys.exit(f"The run that nothing disturbs ended with {code}.")
+        seconds, expected = monotonic() - begin, contents(whole.out)
+        for number in track(range(kills)):
+            disturb = DISTURBANCES[number % len(DISTURBANCES)]
+            case = Case(project, folder / f"out-{number}", expected)
+            moment, name = float(rng.uniform(0.5, seconds)), disturb.__name__.replace("_", " ")
+            code = disturb(case, moment, rng)
+            faults, tasks = case.resumed()
+            rows.setdefault(name, []).append((moment, code, tasks, faults))
+            wrong += [f"{name} at {moment:.1f} s: {fault}" for fault in faults]
+            if os.path.ismount(case.out):
+                subprocess.run(["umount", str(case.out)], check=True)
+            shutil.rmtree(case.out)
+    tell(rows, wrong, seconds)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*map(int, sys.argv[1:])))
