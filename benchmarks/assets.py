@@ -3,12 +3,11 @@
     python benchmarks/assets.py [NAME ...] [--write]
 
 Without names those are drawn that need nothing from elsewhere, some minutes; the others can be
-named: the paper's and what costs of mistakes
-do take hours, the real ones the data that their scripts name. The same code draws
-the same file, byte for byte, on one machine; letters and the last figure of a sum may differ on
-another. So a picture has changed where its size has, or where more than 1 % of its pixels differ
-by more than 16 of 255 in a channel: a moved letter is less, a moved curve more. --write keeps the
-new ones; without it the exit code is 1 where one has changed.
+named: the paper's and what costs of mistakes do take hours, the real ones the data that their
+scripts name. The same code draws the same file, byte for byte, on one machine; letters and the last
+figure of a sum may differ on another. So a picture has changed where its size has, or where more
+than 1 % of its pixels differ by more than 16 of 255 in a channel: a moved letter is less, a moved
+curve more. --write keeps the new ones; without it the exit code is 1 where one has changed.
 """
 
 import argparse
@@ -23,18 +22,18 @@ from PIL import Image
 ROOT = Path(__file__).parents[1]
 ASSETS = ROOT / "assets"
 SCRIPTS = {  # picture: (script, whether it is drawn without being named)
-    "correct_a_survey": ("correct_a_survey.py", True),
-    "compare_methods": ("compare_methods.py", True),
-    "render_before_after": ("render_before_after.py", True),
-    "calibrate_mounting": ("calibrate_mounting.py", True),
-    "diagnose": ("diagnose_gap.py", True),
-    "decision_costs": ("decision_costs.py", False),
-    "pos_error": ("pos_error.py", False),
-    "paper_car": ("paper/car.py", False),
-    "paper_boat": ("paper/boat.py", False),
-    "paper_calibration": ("paper/calibration.py", False),
-    "real_pos_gap": ("real/pos_gap.py", False),
-    "two_pass_gap": ("real/two_pass_gap.py", False),
+    "correct_a_survey": ("examples/correct_a_survey.py", True),
+    "compare_methods": ("examples/compare_methods.py", True),
+    "render_before_after": ("examples/render_before_after.py", True),
+    "calibrate_mounting": ("examples/calibrate_mounting.py", True),
+    "diagnose": ("examples/diagnose_gap.py", True),
+    "decision_costs": ("benchmarks/decision_costs.py", False),
+    "pos_error": ("examples/pos_error.py", False),
+    "paper_car": ("examples/paper/car.py", False),
+    "paper_boat": ("examples/paper/boat.py", False),
+    "paper_calibration": ("examples/paper/calibration.py", False),
+    "real_pos_gap": ("examples/real/pos_gap.py", False),
+    "two_pass_gap": ("examples/real/two_pass_gap.py", False),
 }
 CHANNEL, SHARE = 16, 0.01  # of 255, of the pixels: see above
 
@@ -64,7 +63,7 @@ def draw(name, folder, write):
     """Draw a picture and compare it: whether it has changed."""
     new, old = folder / f"{name}.png", ASSETS / f"{name}.png"
     option = [] if name == "diagnose" else ["--picture"]
-    command = [sys.executable, ROOT / "examples" / SCRIPTS[name][0], *option, new]
+    command = [sys.executable, ROOT / SCRIPTS[name][0], *option, new]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
     share = share_changed(old, new)
     word = "has changed" if share > SHARE else "looks the same"

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 from tests.beds.joint_scores import records
-from tests.beds.places import EXAMPLES
+from tests.beds.places import BENCHMARKS, EXAMPLES
 
 
 def test_correct_a_survey_makes_its_picture(street, tmp_path):
@@ -36,7 +36,7 @@ def test_decision_costs_makes_its_picture(tmp_path):
         ]
         (tmp_path / f"{1000 + world}.json").write_text(f"[{','.join(part)}]")
     picture = tmp_path / "picture.png"
-    script = [sys.executable, EXAMPLES / "decision_costs.py", "--records", tmp_path]
+    script = [sys.executable, BENCHMARKS / "decision_costs.py", "--records", tmp_path]
     command = [*script, "--worlds", "2", "--picture", picture]
     printed = subprocess.check_output(command, text=True)
     assert [line.split(":")[0] for line in printed.splitlines()] == [

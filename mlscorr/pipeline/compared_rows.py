@@ -87,7 +87,7 @@ def compare_with_belief(
     believed: Survey,
     effects: tuple[Effect, ...],
     library: Iterable[type[Effect]],
-    seed: int,
+    rng: np.random.Generator,
     progress: Callable,
 ) -> ComparedRows:
     """ComparedRows against what is believed; the simulator runs again on the survey's own pulses.
@@ -100,8 +100,8 @@ def compare_with_belief(
     effects : tuple of Effect
         That the simulator has.
     library : iterable of Effect classes
-    seed : int
-        Of the simulator's noise.
+    rng : numpy.random.Generator
+        For the simulator's noise, and replicas of the contrasts.
     progress : function
         As of ``diagnose``.
 
@@ -111,10 +111,11 @@ def compare_with_belief(
         When there is too little to say anything.
     """
     pairing, rows, beams, absence, patches = _observed(survey, believed, library, progress)
-    simulator = BeamSimulator(rows, believed, beams, effects, seed)
+    simulator = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
     used = np.arange(len(rows)) < len(pairing.rows)
     observed = without_effects(rows, believed, effects)
-    contrasts = contrast_returns(believed, patches, _loss(effects))
+    apart = rng.spawn(1)[0]  # how much is contrasted leaves the draws of the verdict alone
+    contrasts = contrast_returns(believed, patches, _loss(effects), apart)
     return ComparedRows(observed, used, simulator.added, absence, pairing.notes, contrasts)
 
 
@@ -129,6 +130,7 @@ def compare_with_clouds(
     believed: Survey,
     folders: Sequence[Path],
     library: Iterable[type[Effect]],
+    rng: np.random.Generator,
     progress: Callable,
 ) -> ComparedRows:
     """ComparedRows against simulated clouds: those of the first folder.
@@ -137,7 +139,7 @@ def compare_with_clouds(
 
     Parameters
     ----------
-    survey, believed, library, progress
+    survey, believed, library, rng, progress
         As of compare_with_belief.
     folders : sequence of one or two Path
         Survey folders, folders of LAS or LAZ files, or such files.
@@ -172,7 +174,12 @@ def compare_with_clouds(
         )
     is_check = np.isin(first.targets.name, survey.check.name)
     used = (first.survey_item < 0) | ~is_check[first.survey_item]
-    channels = contrast_clouds(believed, *samples[:2]), cloud_distances(*samples)
+    real, simulated_first = samples[:2]
+    apart = rng.spawn(1)[0]
+    channels = (
+        contrast_clouds(believed, real, simulated_first, apart),
+        cloud_distances(real, simulated_first, samples[2] if following else None, apart),
+    )
     if following:
         change = first.residual - following[0].residual
         return ComparedRows(first, used, change, absence, notes, *channels)

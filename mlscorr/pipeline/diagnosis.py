@@ -110,10 +110,9 @@ def diagnose(
     simulator = beliefs_of(survey) if simulator is None else simulator
     believed, effects = as_believed(survey, simulator)
     if simulated:
-        compared = compare_with_clouds(survey, believed, simulated, library, progress)
+        compared = compare_with_clouds(survey, believed, simulated, library, rng, progress)
     else:
-        seed = int(rng.integers(2**63))
-        compared = compare_with_belief(survey, believed, effects, library, seed, progress)
+        compared = compare_with_belief(survey, believed, effects, library, rng, progress)
     observed, used, absence = compared.rows, compared.used, compared.absence
     step = progress("Weighing the causes", STEPS)
     signs, left_out = signatures(observed, believed, library, rng)
@@ -133,14 +132,14 @@ def diagnose(
     return DiagnosedSurvey(
         survey, simulator, effects, part, inference, closure, plan, left_out, compared.notes,
         absence, signs_of_part, costs, compared.contrasts,
-        (*compared.distances, *_of_innovations(part, errors, inference)),
+        (*compared.distances, *_of_innovations(part, errors, inference, rng)),
     )  # fmt: skip
 
 
-def _of_innovations(rows, errors, inference):
+def _of_innovations(rows, errors, inference, rng):
     """DistributionDistances of innovations from those of replicas, by channel of rows."""
-    where, replicas = inference.where, replica_innovations(rows, errors, inference)
-    return innovation_distances(rows.channel[where.row], where.innovation, replicas)
+    where, replicas = inference.where, replica_innovations(rows, errors, inference, rng)
+    return innovation_distances(rows.channel[where.row], where.innovation, replicas, rng)
 
 
 def _looks_again(absence):

@@ -21,7 +21,7 @@ CLASSES = ("dark", "medium", "bright")
 
 
 def contrast_clouds(
-    survey: Survey, real: ChannelSample, simulated: ChannelSample
+    survey: Survey, real: ChannelSample, simulated: ChannelSample, rng: np.random.Generator
 ) -> tuple[Contrast, ...]:
     """A Contrast of each channel of two clouds.
 
@@ -29,19 +29,21 @@ def contrast_clouds(
     ----------
     survey : Survey
     real, simulated : ChannelSample
+    rng : numpy.random.Generator
+        For replicas of the bootstrap.
     """
     real, simulated = of_shared_moments((real, simulated))
     pairs = paired_cells(survey, real, simulated)
     return _judged([
-        _intensity(pairs, real, simulated),
-        _density(pairs),
-        _dropout(survey, real.patches, simulated.patches),
-        _edge_width(real, simulated),
+        _intensity(pairs, real, simulated, rng),
+        _density(pairs, rng),
+        _dropout(survey, real.patches, simulated.patches, None, rng),
+        _edge_width(real, simulated, rng),
     ])  # fmt: skip
 
 
 def contrast_returns(
-    survey: Survey, patches: Patches | None, loss: float | None
+    survey: Survey, patches: Patches | None, loss: float | None, rng: np.random.Generator
 ) -> tuple[Contrast, ...]:
     """The same of a cloud and of what is believed: lost returns alone can be compared.
 
@@ -51,9 +53,11 @@ def contrast_returns(
     patches : Patches or None
     loss : float or None
         Share of returns that the simulator loses; None where it says nothing of it.
+    rng : numpy.random.Generator
+        For replicas of the bootstrap.
     """
     silent = [Contrast(name, SILENT[name]) for name in ("intensity", "density", "edge_width")]
-    return _judged([silent[0], silent[1], _dropout(survey, patches, None, loss), silent[2]])
+    return _judged([silent[0], silent[1], _dropout(survey, patches, None, loss, rng), silent[2]])
 
 
 def _judged(channels: Sequence[Contrast | Measure]) -> tuple[Contrast, ...]:
@@ -103,8 +107,8 @@ def _explained(table, sums):
     return float((weight * squares).sum() / max(weight.sum(), 1e-300))
 
 
-def _weights(block):
-    return weights_of(int(block.max()) + 1, np.random.default_rng(SETTINGS.seed))
+def _weights(block, rng):
+    return weights_of(int(block.max()) + 1, rng)
 
 
 def _by_sight(away, incidence):
@@ -116,7 +120,7 @@ def _by_sight(away, incidence):
 
 
 def _intensity(
-    pairs: PairedCells, real: ChannelSample, simulated: ChannelSample
+    pairs: PairedCells, real: ChannelSample, simulated: ChannelSample, rng: np.random.Generator
 ) -> Contrast | Measure:
     """The ratio of intensities beside the median one, which units make."""
     for name, cloud in (("survey's", real), ("simulated", simulated)):
@@ -128,7 +132,7 @@ def _intensity(
     ratio = np.log(10.0) * (known.brightness[:, 0] - known.brightness[:, 1])
     classes = Binning("reflectance", _classes(known), bins=CLASSES)
     splits = (*_by_sight(known.range, known.incidence), classes)
-    return _of_ratio(known, ratio, _weights(known.block), splits)
+    return _of_ratio(known, ratio, _weights(known.block, rng), splits)
 
 
 def _of_ratio(pairs, ratio, weights, splits):
@@ -172,12 +176,12 @@ def _classes(pairs):
     return np.where(np.isfinite(excess), np.searchsorted(thirds, excess), -1)
 
 
-def _density(pairs: PairedCells) -> Contrast | Measure:
+def _density(pairs: PairedCells, rng: np.random.Generator) -> Contrast | Measure:
     """Points of the real cloud over those of the simulated one."""
     if len(pairs) == 0 or not pairs.points.any(axis=0).all():
         return Contrast("density", SILENT["apart"])
     splits = _by_sight(pairs.range, pairs.incidence)
-    return _of_points(pairs.block, *pairs.points.T, _weights(pairs.block), splits)
+    return _of_points(pairs.block, *pairs.points.T, _weights(pairs.block, rng), splits)
 
 
 def _of_points(block, real, simulated, weights, splits):
@@ -189,9 +193,8 @@ def _of_points(block, real, simulated, weights, splits):
     )  # fmt: skip
 
 
-def _of_means(channel, block, real, simulated, splits, weights=None):
+def _of_means(channel, block, real, simulated, splits, weights):
     """Measure of the difference of two means, of pairs of sums and numbers (n,) of things."""
-    weights = _weights(block) if weights is None else weights
     (a, m), (b, n) = real, simulated
 
     def without(change):
@@ -205,7 +208,11 @@ def _of_means(channel, block, real, simulated, splits, weights=None):
 
 
 def _dropout(
-    survey: Survey, patches: Patches | None, simulated: Patches | None, loss: float | None = None
+    survey: Survey,
+    patches: Patches | None,
+    simulated: Patches | None,
+    loss: float | None,
+    rng: np.random.Generator,
 ) -> Contrast | Measure:
     """Beams without a return, between those of a scan line that have one."""
     if patches is None or not patches.fired.any():
@@ -224,10 +231,13 @@ def _dropout(
     if simulated is None:
         other = loss * fired, fired
     splits = _by_sight(away, np.degrees(np.arccos(np.clip(slant, 0.0, 1.0))))
-    return _of_means("dropout", block_of(joined.centre), real, other, splits)
+    block = block_of(joined.centre)
+    return _of_means("dropout", block, real, other, splits, _weights(block, rng))
 
 
-def _edge_width(real: ChannelSample, simulated: ChannelSample) -> Contrast | Measure:
+def _edge_width(
+    real: ChannelSample, simulated: ChannelSample, rng: np.random.Generator
+) -> Contrast | Measure:
     """Over which angle depth edges are smeared. Units: mrad."""
     share = min(real.edge_share, simulated.edge_share)
     sides = [each.edges[each.edges.chance < share] for each in (real, simulated)]
@@ -237,4 +247,5 @@ def _edge_width(real: ChannelSample, simulated: ChannelSample) -> Contrast | Mea
     is_real, width = np.arange(len(joined)) < len(sides[0]), 1e3 * joined.width
     sums = [(width * which, which.astype(float)) for which in (is_real, ~is_real)]
     splits = (Binning("range", joined.range, SETTINGS.ranges),)
-    return _of_means("edge_width", block_of(joined.place), *sums, splits)
+    block = block_of(joined.place)
+    return _of_means("edge_width", block, *sums, splits, _weights(block, rng))

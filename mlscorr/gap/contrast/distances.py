@@ -52,7 +52,7 @@ class DistributionDistance:
 
     def document(self) -> dict:
         """A row of ``distances`` in gap.json."""
-        return vars(self) | {"halves": SETTINGS.halves, "seed": SETTINGS.seed}
+        return vars(self) | {"halves": SETTINGS.halves}
 
 
 def energy_distance(x: np.ndarray, y: np.ndarray) -> float:
@@ -111,7 +111,10 @@ def _mean_of_pairs(table):
 
 
 def cloud_distances(
-    real: ChannelSample, simulated: ChannelSample, following: ChannelSample | None = None
+    real: ChannelSample,
+    simulated: ChannelSample,
+    following: ChannelSample | None,
+    rng: np.random.Generator,
 ) -> tuple[DistributionDistance, ...]:
     """Distances of a cloud from the simulator's, and from those of its next run.
 
@@ -121,7 +124,9 @@ def cloud_distances(
     Parameters
     ----------
     real, simulated : ChannelSample
-    following : ChannelSample, optional
+    following : ChannelSample or None
+    rng : numpy.random.Generator
+        For draws of both.
     """
     clouds = of_shared_moments([c for c in (real, simulated, following) if c is not None])
     share = min(cloud.point_share for cloud in clouds)
@@ -129,21 +134,21 @@ def cloud_distances(
     origin = points[0].xyz.mean(axis=0) if len(points[0]) else np.zeros(3)
     pulses = [part.gps_time.view(np.int64) for part in points]
     places = [_Sample(part.xyz - origin, pulse) for part, pulse in zip(points, pulses, strict=True)]
-    distances = [*_of_samples("points", places, {"chamfer": chamfer_distance})]
-    distances += _of_samples("points", places)
+    distances = [*_of_samples("points", places, rng, {"chamfer": chamfer_distance})]
+    distances += _of_samples("points", places, rng)
     if all(cloud.has_intensity for cloud in clouds):
         counts = [np.log10(np.maximum(part.intensity.astype(float), 1.0)) for part in points]
         distances += _of_samples("intensity", [
             _Sample(c[:, None], pulse) for c, pulse in zip(counts, pulses, strict=True)
-        ])  # fmt: skip
+        ], rng)  # fmt: skip
     ground = min(cloud.share for cloud in clouds)
     cells = [cloud.cells[cloud.cells.chance < ground] for cloud in clouds]
     density = [_Sample(np.log10(part.points)[:, None], part.key.view(np.int64)) for part in cells]
-    return (*distances, *_of_samples("density", density))
+    return (*distances, *_of_samples("density", density, rng))
 
 
 def innovation_distances(
-    channel: np.ndarray, innovation: np.ndarray, replicas: np.ndarray
+    channel: np.ndarray, innovation: np.ndarray, replicas: np.ndarray, rng: np.random.Generator
 ) -> tuple[DistributionDistance, ...]:
     """Distances of innovations from those of replicas of the survey in which nothing acts.
 
@@ -156,6 +161,8 @@ def innovation_distances(
     innovation : (n, 2) array
         Before and after the cause is in the simulator.
     replicas : (n, r) array
+    rng : numpy.random.Generator
+        For draws of both.
     """
     distances: list[DistributionDistance] = []
     for name in dict.fromkeys(channel.tolist()):
@@ -169,7 +176,7 @@ def innovation_distances(
             "floor": _against_replicas(others, others[:, ::-1]),
         }
         figures = _pairwise(others[:, :1])
-        distances += _of_draws(name, figures, pairs, dict.fromkeys(figures, number))
+        distances += _of_draws(name, figures, pairs, dict.fromkeys(figures, number), rng)
     return tuple(distances)
 
 
@@ -197,7 +204,7 @@ class _Sample:
         return self.values[rng.permutation(rows)]
 
 
-def _of_samples(channel, samples, figures=None):
+def _of_samples(channel, samples, rng, figures=None):
     """DistributionDistances of real things from those of one simulation or two."""
     real, simulated, *following = samples
     figures = _pairwise(simulated.values) if figures is None else figures
@@ -217,19 +224,19 @@ def _of_samples(channel, samples, figures=None):
     pairs = {"before": draws(real, simulated), "floor": draws(simulated, simulated)}
     if following:
         pairs["after"] = draws(real, following[0])
-    return _of_draws(channel, figures, pairs, number)
+    return _of_draws(channel, figures, pairs, number, rng)
 
 
-def _of_draws(channel, figures, pairs, number):
+def _of_draws(channel, figures, pairs, number, rng):
     """A DistributionDistance of each figure, where there are things enough."""
     for name, figure in figures.items():
         size = number[name]
         if size < SETTINGS.least_blocks:
             continue
-        values = {}
+        values, seed = {}, int(rng.integers(2**63))  # the same draws before and after
         for when, draw in pairs.items():
-            rng = np.random.default_rng(SETTINGS.seed)
-            samples = (draw(salt, rng) for salt in range(SETTINGS.halves))
+            stream = np.random.default_rng(seed)
+            samples = (draw(salt, stream) for salt in range(SETTINGS.halves))
             values[when] = [figure(x[:size], y[:size]) for x, y in samples]
         mean = {when: float(np.mean(drawn)) for when, drawn in values.items()}
         yield DistributionDistance(

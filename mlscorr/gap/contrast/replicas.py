@@ -8,7 +8,9 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.observe.rows import Background, Rows
 
 
-def replica_innovations(rows: Rows, background: Background, inference: Inference) -> np.ndarray:
+def replica_innovations(
+    rows: Rows, background: Background, inference: Inference, rng: np.random.Generator
+) -> np.ndarray:
     """Innovations (n, replicas) of surveys in which nothing acts.
 
     Their POS errs, and their noise has tails, as this one's do once its cause is taken off.
@@ -20,9 +22,9 @@ def replica_innovations(rows: Rows, background: Background, inference: Inference
         Of these.
     inference : Inference
         Of these; n is the number of its innovations.
+    rng : numpy.random.Generator
     """
     observed = Observations.of(rows, background)
     model = inference.evidence.likely_model(inference.verdict.label)
-    rng = np.random.default_rng(SETTINGS.seed)
     drawn = observed.whitener(model).draw(rng, SETTINGS.halves, inference.where.innovation[:, 1])
     return observed.whitener().innovations(drawn)[0][observed.second]

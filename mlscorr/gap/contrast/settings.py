@@ -21,34 +21,14 @@ class Settings:
     # bins and blocks
     # m, finest ones: those in which too few blocks lie are joined
     ranges: tuple[float, ...] = (
-        0,
-        2,
-        4,
-        6,
-        8,
-        10,
-        12,
-        15,
-        20,
-        25,
-        30,
-        40,
-        50,
-        60,
-        80,
-        100,
-        150,
-        500,
-    )
+        0, 2, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100, 150, 500,
+    )  # fmt: skip
     incidences: tuple[float, ...] = (0, 15, 30, 45, 60, 75, 90)  # deg
     block: float = 16.0  # m of ground that go together: a house or a lane has one reflectance
-    least_blocks: int = (
-        6  # in a bin, for a sigma that is known to a third; bins with fewer are joined
-    )
+    least_blocks: int = 6  # in a bin, for a sigma known to a third; bins with fewer are joined
     replicas: int = 400  # of the bootstrap: a sigma to 4 %
     confidence: float = 0.99  # that nothing is said of two clouds that differ by chance alone
     least_ratio: float = 0.02  # of intensity or density: what is less no simulator is mended for
-    seed: int = 0
     # distances between distributions
     drawn: int = 300  # of each sample at a time, as all pairs of them are looked at: 0.7 MB
     halves: int = 30  # times that this is done: their mean to a fifth of the scatter of each

@@ -206,5 +206,4 @@ class Contrast:
             "sentences": list(self.sentences),
             "confidence": SETTINGS.confidence,
             "replicas": SETTINGS.replicas,
-            "seed": SETTINGS.seed,
         }

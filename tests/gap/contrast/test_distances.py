@@ -44,7 +44,7 @@ def test_the_chamfer_distance_of_a_moved_grid():
 def test_twins_lie_within_the_floor(pair):
     "No distance of a twin stands out by more than the floor's own scatter"
     _, real, simulated = pair
-    for each in cloud_distances(real, simulated, real):
+    for each in cloud_distances(real, simulated, real, np.random.default_rng(0)):
         assert each.before <= each.floor + 1.5 * (each.floor_high - each.floor), each
         assert np.isfinite(each.after)
 
@@ -56,7 +56,7 @@ def test_a_moved_cloud_stands_out(pair):
     def move(_, cloud):
         return type(cloud)(cloud.xyz + 0.3 * EAST, cloud.gps_time, cloud.intensity)
 
-    chamfer, *_ = cloud_distances(sampled(survey, move), simulated)
+    chamfer, *_ = cloud_distances(sampled(survey, move), simulated, None, np.random.default_rng(0))
     assert (chamfer.figure, chamfer.unit) == ("chamfer", "m")
     assert chamfer.before > chamfer.floor_high
     assert np.isnan(chamfer.after)
@@ -68,7 +68,7 @@ def test_innovations_stand_out_before_the_cause_and_not_after():
     u = 0.5 * rng.standard_normal((400, 1))
     replicas = rng.standard_normal((400, 40))
     channel = np.repeat(["target", "surface"], 200)
-    told = innovation_distances(channel, np.hstack([u + 3.0, u]), replicas)
+    told = innovation_distances(channel, np.hstack([u + 3.0, u]), replicas, rng)
     assert len(told) == 4
     for each in told:
         assert each.before > 10 * each.floor_high

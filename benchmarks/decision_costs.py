@@ -1,6 +1,6 @@
 """What the cost of a false alarm buys and loses: clean surveys given a cause against effects named.
 
-    python examples/decision_costs.py [--records FOLDER] [--worlds N] [--picture FILE]
+    python benchmarks/decision_costs.py [--records FOLDER] [--worlds N] [--picture FILE]
 
 Made-up surveys of features, whose evidence is kept in FOLDER (as ``python -m mlscorr.gap.train``
 does; a world that lacks takes minutes), are labelled at costs from a tenth to a hundred times the
@@ -72,7 +72,7 @@ def main():
     """Collect what lacks, and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--records", type=Path, default=Path("build/records"))
-    parser.add_argument("--worlds", type=int, default=37)
+    parser.add_argument("--worlds", type=int, default=28)
     parser.add_argument("--picture", type=Path, default=Path("decision_costs.png"))
     given = parser.parse_args()
     mechanisms = known_mechanisms(Path(__file__).parents[1] / "tests/withheld/mechanisms.py")
