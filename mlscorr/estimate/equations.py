@@ -11,7 +11,14 @@ from functools import cached_property
 
 import numpy as np
 
-from mlscorr.collocation import Collocation, Noise, SparseRows, collocate, collocate_rows
+from mlscorr.collocation import (
+    Collocation,
+    Noise,
+    SparseRows,
+    collocate,
+    collocate_rows,
+    collocate_rows_dense,
+)
 from mlscorr.collocation.trend import polynomial_design
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
@@ -184,16 +191,34 @@ class Equations(Summary):
         like : Collocation, optional
             Of the same equations under parameters near by; with ties its knots are used again.
         """
-        signals: tuple = ()
-        if parameters is not None:
-            signals = pose_signals(self.stated, parameters, self.partials)
-            signals = drift_alone(signals, self.fallbacks)
         if self.ties is None or parameters is None:
+            signals = () if parameters is None else self._signals(parameters)
             return collocate(self.gps_time, self.misclosure, self.noise, self.design, signals)
-        times = self.gps_time[:, None]
-        control = SparseRows(times, self.misclosure, self.noise, self.design, signals)
-        rows = [control, self.ties.rows(parameters, self.pose_design)]
+        rows = self._linked_rows(parameters, self.ties)
         return collocate_rows(rows, None if like is None else like.solver)
+
+    def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
+        """As solve, for the likelihood alone: few rows with ties by their covariance matrix.
+
+        Parameters
+        ----------
+        parameters : SignalParameters
+        like : Collocation, optional
+            Of the same equations by this, under parameters near by.
+        """
+        if self.ties is None or self.misclosure.size + len(self.ties) > SETTINGS.dense_rows:
+            return self.solve(parameters, like)
+        return collocate_rows_dense(self._linked_rows(parameters, self.ties))
+
+    def _signals(self, parameters):
+        signals = pose_signals(self.stated, parameters, self.partials)
+        return drift_alone(signals, self.fallbacks)
+
+    def _linked_rows(self, parameters, ties):
+        """SparseRows of control and of ties."""
+        times, signals = self.gps_time[:, None], self._signals(parameters)
+        control = SparseRows(times, self.misclosure, self.noise, self.design, signals)
+        return [control, ties.rows(parameters, self.pose_design)]
 
     @property
     def design(self) -> np.ndarray:

@@ -114,7 +114,7 @@ class Objective:
         """Each block's Collocation."""
         chosen = self.parameters(family, logarithms)
         pairs = zip_longest(self.blocks, like)
-        return [block.solve(chosen, near) for block, near in pairs]
+        return [block.weigh(chosen, near) for block, near in pairs]
 
     def _value(self, logarithms, solved):
         """The log posterior by each block's Collocation."""

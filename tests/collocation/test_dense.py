@@ -5,8 +5,9 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation import Signal, collocate_dense
-from mlscorr.collocation.covariance import FAMILIES, Covariance
+from mlscorr.collocation import Signal, collocate_dense, collocate_rows_dense
+from mlscorr.collocation.covariance import FAMILIES, INTEGRATED, Covariance
+from tests.beds.linked_rows import Street
 
 START = 413_200.0  # s of week
 SPAN = 200.0  # s
@@ -128,6 +129,19 @@ def test_equals_gaussian_process_regression_without_a_trend(family, nu):
     assert np.abs(mean[:, 0] - expected).max() < 1e-8
     assert np.abs(np.sqrt(covariance[:, 0, 0]) - sigma).max() < 1e-8
     assert solved.log_likelihood == pytest.approx(process.log_marginal_likelihood_value_)
+
+
+@pytest.mark.parametrize("family", [*FAMILIES, INTEGRATED])
+def test_rows_of_two_epochs_equal_the_textbook(family):
+    "Control and ties: pose, its sigma, weights and likelihood are those by inverses, to 1e-6"
+    street = Street(family, 40.0)
+    solved = collocate_rows_dense(street.rows)
+    mean, sigma, weights, likelihood = street.predicted()
+    here, spread = street.predict(solved)
+    assert np.abs(here - mean).max() < 1e-6  # m, rad
+    assert np.abs(spread - sigma).max() < 1e-6  # m, rad
+    np.testing.assert_allclose(solved.weights, weights, rtol=1e-6, atol=1e-6 * abs(weights).max())
+    assert solved.log_likelihood == pytest.approx(likelihood, abs=1e-6)
 
 
 @pytest.mark.parametrize("order", range(6))

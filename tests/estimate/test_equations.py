@@ -6,12 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlscorr.collocation import collocate_dense
+from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
 from mlscorr.collocation.trend import polynomial_design
+from mlscorr.estimate import estimate_correction, with_ties
 from mlscorr.estimate.assembly import with_fallbacks
 from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.signals import drift_alone, pose_signals
+from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps
 from tests.beds.pos_errors import CONSTANT, EPOCHS, LENGTH, START, Case, even, smooth_case
+from tests.beds.tied_passes import tied_passes
 
 N = 9
 CASE = smooth_case(21, n=N)
@@ -141,6 +145,18 @@ def test_the_solution_is_the_dense_one(family):
     np.testing.assert_allclose(solved.trend, expected.trend, atol=1e-7)
     np.testing.assert_allclose(solved.weights, expected.weights, rtol=1e-6, atol=1e-4)
     assert solved.log_likelihood == pytest.approx(expected.log_likelihood, abs=1e-6)
+
+
+def test_few_rows_with_ties_are_weighed_as_they_are_solved():
+    "The log-likelihood by the covariance matrix is that of the knots, to 0.01 in any family"
+    survey = tied_passes(1)
+    estimate = with_ties(estimate_correction(survey.trajectory, survey.matched), survey.ties)
+    few = sample(estimate.equations)
+    objective = Objective.of(few)
+    for family in (*FAMILIES, INTEGRATED):
+        parameters = objective.parameters(family, objective.initial)
+        weighed, solved = few.weigh(parameters), few.solve(parameters)
+        assert weighed.log_likelihood == pytest.approx(solved.log_likelihood, abs=0.01)
 
 
 def test_the_trend_moves_positions_only():
