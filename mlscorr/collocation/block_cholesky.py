@@ -1,6 +1,6 @@
 """Cholesky factor of a sparse symmetric matrix in blocks, and its inverse where the factor stands.
 
-For node j with the diagonal block L_jj and the blocks B below it, by the order of a Pattern:
+For front j with the diagonal block L_jj and the blocks B below it, by the order of a Pattern:
 
     A_jj = L_jj L_jj^T,   B = A_j L_jj^-T,   A_SS <- A_SS - B B^T,    S the nodes below
 
@@ -8,8 +8,8 @@ and backward, with U = B L_jj^-1, those blocks of Z = A^-1 that stand where the 
 
     Z_Sj = -Z_SS U,   Z_jj = L_jj^-T L_jj^-1 - U^T Z_Sj
 
-Sources: Davis 2006, Direct Methods for Sparse Linear Systems, chapter 4; Takahashi, Fagan and Chin
-1973 (selected inverse).
+Sources: Davis 2006, Direct Methods for Sparse Linear Systems, chapter 4; Liu, Ng and Peyton 1993,
+SIAM J. Matrix Anal. Appl. 14, 242-252 (fronts); Takahashi, Fagan and Chin 1973 (selected inverse).
 """
 
 from __future__ import annotations
@@ -19,14 +19,25 @@ from numba import njit
 
 from mlscorr.collocation.pattern import Pattern
 
+STRIP = 12  # columns of a panel factored by loops before BLAS takes them to the next ones
+
 
 @njit(cache=True, nogil=True)
-def _largest_front(pattern):
-    """Largest number of states below a node."""
+def _panel(pattern, values, front):
+    """Values (h, b) of a front's columns, the block on the diagonal first."""
+    begin, end = pattern.node[front], pattern.node[front + 1]
+    width = pattern.first[end] - pattern.first[begin]
+    return values[pattern.start[front] : pattern.start[front + 1]].reshape((-1, width))
+
+
+@njit(cache=True, nogil=True)
+def _most_below(pattern):
+    """Largest number of states below a front."""
     largest = 0
-    for j in range(pattern.start.size - 1):
-        size = pattern.first[j + 1] - pattern.first[j]
-        largest = max(largest, (pattern.start[j + 1] - pattern.start[j]) // size - size)
+    for front in range(pattern.start.size - 1):
+        width = pattern.first[pattern.node[front + 1]] - pattern.first[pattern.node[front]]
+        below = (pattern.start[front + 1] - pattern.start[front]) // max(width, 1) - width
+        largest = max(largest, below)
     return largest
 
 
@@ -45,50 +56,81 @@ def factorise(pattern: Pattern, values: np.ndarray) -> int:
     state : int
         The first that has no positive pivot, in the order of elimination; -1 if all have.
     """
-    first, start, column = pattern.first, pattern.start, pattern.column
-    room = np.empty(_largest_front(pattern) ** 2)
-    for j in range(start.size - 1):
-        b = first[j + 1] - first[j]
-        panel = values[start[j] : start[j + 1]].reshape((-1, b))
-        for a in range(b):
-            for i in range(a, panel.shape[0]):
+    room = np.empty(_most_below(pattern) ** 2)
+    for front in range(pattern.start.size - 1):
+        panel = _panel(pattern, values, front)
+        failed = _factorise_panel(panel)
+        if failed >= 0:
+            return pattern.first[pattern.node[front]] + failed
+        below = panel[panel.shape[1] :]
+        if below.shape[0] > 0:
+            product = room[: below.shape[0] ** 2].reshape((below.shape[0], -1))
+            np.dot(below, below.T, product)
+            k = pattern.column[front]
+            while k < pattern.column[front + 1]:
+                end = _run_end(pattern, front, k)
+                _subtract(pattern, values, product, front, k, end)
+                k = end
+    return -1
+
+
+@njit(cache=True, nogil=True)
+def _run_end(pattern, front, k):
+    """The first below a front after its k-th node that doesn't follow in a front of its own."""
+    row, end = pattern.row, pattern.column[front + 1]
+    target, k = pattern.front[row[k]], k + 1
+    while k < end and row[k] == row[k - 1] + 1 and pattern.front[row[k]] == target:
+        k += 1
+    return k
+
+
+@njit(cache=True, nogil=True)
+def _factorise_panel(panel):
+    """L_jj and B in the place of A_jj and A_j; the column without a positive pivot, or -1."""
+    height, width = panel.shape
+    for begin in range(0, width, STRIP):
+        end = min(begin + STRIP, width)
+        if begin > 0:
+            done = panel[begin:, :begin].copy()
+            panel[begin:, begin:end] -= np.dot(done, done[: end - begin].T)
+        for i in range(begin, height):
+            for a in range(begin, min(end, i + 1)):
                 total = panel[i, a]
-                for k in range(a):
+                for k in range(begin, a):
                     total -= panel[i, k] * panel[a, k]
                 if i > a:
                     panel[i, a] = total / panel[a, a]
                 elif total > 0.0:
                     panel[a, a] = np.sqrt(total)
                 else:
-                    return first[j] + a
-            panel[a, a + 1 : b] = 0.0
-        if panel.shape[0] == b:
-            continue
-        below = panel[b:]
-        product = room[: below.shape[0] ** 2].reshape((below.shape[0], -1))
-        np.dot(below, below.T, product)
-        for k in range(column[j], column[j + 1]):
-            _subtract(pattern, values, product, j, k)
+                    return a
+    for a in range(width):
+        panel[a, a + 1 :] = 0.0
     return -1
 
 
 @njit(cache=True, nogil=True)
-def _subtract(pattern, values, product, j, k):
-    """Subtract column k of a product of the blocks below node j from the matrix."""
-    first, start, column, row, height = pattern[1:]
-    target, at = row[k], column[row[k]]
-    b, size = first[j + 1] - first[j], first[target + 1] - first[target]
-    left = height[k] - b
-    for other in range(k, column[j + 1]):
-        node, top = row[other], height[other] - b
-        position = start[target]
-        if node != target:
-            while row[at] != node:
+def _subtract(pattern, values, product, front, k, run_end):
+    """Subtract columns k to run_end of a product of the blocks below a front from the matrix."""
+    first, row, height = pattern.first, pattern.row, pattern.height
+    node = row[k]
+    target, size = pattern.front[node], first[row[run_end - 1] + 1] - first[node]
+    begin, end = first[pattern.node[target]], pattern.node[target + 1]
+    width, at = first[end] - begin, pattern.column[target]
+    top = height[pattern.column[front]]  # of the blocks below
+    left = height[k] - top
+    for other in range(k, pattern.column[front + 1]):
+        below = row[other]
+        if below < end:
+            high = first[below] - begin
+        else:
+            while row[at] != below:
                 at += 1
-            position += height[at] * size
-        for p in range(first[node + 1] - first[node]):
+            high = height[at]
+        position = pattern.start[target] + high * width + first[node] - begin
+        for p in range(first[below + 1] - first[below]):
             for q in range(size):
-                values[position + p * size + q] -= product[top + p, left + q]
+                values[position + p * width + q] -= product[height[other] - top + p, left + q]
 
 
 @njit(cache=True, nogil=True)
@@ -103,37 +145,54 @@ def solve_in_place(pattern: Pattern, values: np.ndarray, x: np.ndarray) -> None:
     x : (n, c) array
         In the order of elimination.
     """
-    first, start, column, row, height = pattern[1:]
-    count, c = start.size - 1, x.shape[1]
+    count = pattern.start.size - 1
     for step in range(2 * count):
-        is_forward = step < count
-        j = step if is_forward else 2 * count - 1 - step
-        b = first[j + 1] - first[j]
-        panel = values[start[j] : start[j + 1]].reshape((-1, b))
-        here = x[first[j] : first[j + 1]]
-        if is_forward:
+        front = step if step < count else 2 * count - 1 - step
+        panel = _panel(pattern, values, front)
+        width = panel.shape[1]
+        begin = pattern.first[pattern.node[front]]
+        here, below = x[begin : begin + width], panel[width:]
+        if step < count:
             _substitute(panel, here)
-        for k in range(column[j], column[j + 1]):
-            there = x[first[row[k]] : first[row[k] + 1]]
-            for p in range(there.shape[0]):
-                for a in range(b):
-                    weight = panel[height[k] + p, a]
-                    for m in range(c):
-                        if is_forward:
-                            there[p, m] -= weight * here[a, m]
-                        else:
-                            here[a, m] -= weight * there[p, m]
-        if not is_forward:
+            if below.shape[0] > 0:
+                _subtract_below(pattern, front, np.dot(below, here), x)
+        else:
+            if below.shape[0] > 0:
+                here -= np.dot(below.T, _states_below(pattern, front, below.shape[0], x))
             _substitute_back(panel, here)
+
+
+@njit(cache=True, nogil=True)
+def _states_below(pattern, front, count, x):
+    """Rows (m, c) of x at the nodes below a front."""
+    gathered, at = np.empty((count, x.shape[1])), 0
+    for k in range(pattern.column[front], pattern.column[front + 1]):
+        for state in range(pattern.first[pattern.row[k]], pattern.first[pattern.row[k] + 1]):
+            for c in range(x.shape[1]):
+                gathered[at, c] = x[state, c]
+            at += 1
+    return gathered
+
+
+@njit(cache=True, nogil=True)
+def _subtract_below(pattern, front, change, x):
+    """Subtract rows (m, c) from those of x at the nodes below a front."""
+    at = 0
+    for k in range(pattern.column[front], pattern.column[front + 1]):
+        for state in range(pattern.first[pattern.row[k]], pattern.first[pattern.row[k] + 1]):
+            for c in range(x.shape[1]):
+                x[state, c] -= change[at, c]
+            at += 1
 
 
 @njit(cache=True, nogil=True)
 def _substitute(lower, x):
     """X <- L^-1 x, L the first rows of lower."""
     for a in range(x.shape[0]):
-        for m in range(x.shape[1]):
-            for k in range(a):
+        for k in range(a):
+            for m in range(x.shape[1]):
                 x[a, m] -= lower[a, k] * x[k, m]
+        for m in range(x.shape[1]):
             x[a, m] /= lower[a, a]
 
 
@@ -142,9 +201,10 @@ def _substitute_back(lower, x):
     """X <- L^-T x, L the first rows of lower."""
     for a in range(x.shape[0] - 1, -1, -1):
         for m in range(x.shape[1]):
-            for k in range(a + 1, x.shape[0]):
-                x[a, m] -= lower[k, a] * x[k, m]
             x[a, m] /= lower[a, a]
+        for k in range(a):
+            for m in range(x.shape[1]):
+                x[k, m] -= lower[a, k] * x[a, m]
 
 
 @njit(cache=True, nogil=True)
@@ -157,39 +217,46 @@ def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
     values : (v,) array
         Of the factor; of the inverse in the end.
     """
-    first, start, column = pattern.first, pattern.start, pattern.column
-    room = np.empty(_largest_front(pattern) ** 2)
-    for j in range(start.size - 2, -1, -1):
-        b = first[j + 1] - first[j]
-        panel = values[start[j] : start[j + 1]].reshape((-1, b))
-        root = np.eye(b)
+    room = np.empty(_most_below(pattern) ** 2)
+    for front in range(pattern.start.size - 2, -1, -1):
+        panel = _panel(pattern, values, front)
+        width = panel.shape[1]
+        root = np.eye(width)
         _substitute(panel, root)
-        scaled = np.dot(panel[b:], root)  # U
-        panel[:b] = np.dot(root.T, root)
+        scaled = np.dot(panel[width:], root)  # U
+        panel[:width] = np.dot(root.T, root)
         if scaled.shape[0] > 0:
             known = room[: scaled.shape[0] ** 2].reshape((scaled.shape[0], -1))
-            for k in range(column[j], column[j + 1]):
-                _collect(pattern, values, known, j, k)
-            np.dot(known, -scaled, panel[b:])
-            panel[:b] -= np.dot(scaled.T, panel[b:])
+            k = pattern.column[front]
+            while k < pattern.column[front + 1]:
+                end = _run_end(pattern, front, k)
+                _collect(pattern, values, known, front, k, end)
+                k = end
+            np.dot(known, -scaled, panel[width:])
+            panel[:width] -= np.dot(scaled.T, panel[width:])
 
 
 @njit(cache=True, nogil=True)
-def _collect(pattern, inverse, known, j, k):
-    """Columns of the inverse at the k-th node below node j, and their mirror image."""
-    first, start, column, row, height = pattern[1:]
-    source, at = row[k], column[row[k]]
-    b, size = first[j + 1] - first[j], first[source + 1] - first[source]
-    left = height[k] - b
-    for other in range(k, column[j + 1]):
-        node, top = row[other], height[other] - b
-        position = start[source]
-        if node != source:
-            while row[at] != node:
+def _collect(pattern, inverse, known, front, k, run_end):
+    """Columns of the inverse at nodes k to run_end below a front, and their mirror image."""
+    first, row, height = pattern.first, pattern.row, pattern.height
+    node = row[k]
+    source, size = pattern.front[node], first[row[run_end - 1] + 1] - first[node]
+    begin, end = first[pattern.node[source]], pattern.node[source + 1]
+    width, at = first[end] - begin, pattern.column[source]
+    top = height[pattern.column[front]]
+    left = height[k] - top
+    for other in range(k, pattern.column[front + 1]):
+        below = row[other]
+        if below < end:
+            high = first[below] - begin
+        else:
+            while row[at] != below:
                 at += 1
-            position += height[at] * size
-        for p in range(first[node + 1] - first[node]):
+            high = height[at]
+        position = pattern.start[source] + high * width + first[node] - begin
+        for p in range(first[below + 1] - first[below]):
             for q in range(size):
-                value = inverse[position + p * size + q]
-                known[top + p, left + q] = value
-                known[left + q, top + p] = value
+                value = inverse[position + p * width + q]
+                known[height[other] - top + p, left + q] = value
+                known[left + q, height[other] - top + p] = value

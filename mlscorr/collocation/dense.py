@@ -13,7 +13,14 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import LinAlgError, block_diag, cholesky, solve_triangular
 
-from mlscorr.collocation.model import NOT_POSITIVE, Collocation, Noise, Signal, solve_trend
+from mlscorr.collocation.model import (
+    LARGEST_ERROR,
+    NOT_POSITIVE,
+    Collocation,
+    Noise,
+    Signal,
+    solve_trend,
+)
 from mlscorr.collocation.sparse_rows import SparseRows
 
 CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
@@ -74,11 +81,10 @@ def collocate_rows_dense(rows: Sequence[SparseRows]) -> Collocation:
 
 def _collocate(rows, total):
     """The Collocation of SparseRows whose noise has the covariance (m, m)."""
-    parts = [_sides(part) for part in rows]
-    count = np.concatenate([np.full(c.shape[0], c.shape[1]) for c, _ in parts])
+    count, clocks, *mixings = (
+        np.concatenate(parts) for parts in zip(*(_sides(part) for part in rows), strict=True)
+    )
     first = np.cumsum(count) - count
-    clocks = np.concatenate([np.vstack(c) for c, _ in parts])
-    mixings = tuple(np.concatenate(mixing) for mixing in zip(*(m for _, m in parts), strict=True))
     covariances = tuple(signal.covariance for signal in rows[0].signals)
     sides = np.zeros((len(clocks), len(clocks)))
     for mixing, covariance, clock in zip(mixings, covariances, clocks.T, strict=True):
@@ -90,21 +96,30 @@ def _collocate(rows, total):
         factor = cholesky(total, lower=True)
     except LinAlgError as problem:
         raise LinAlgError(NOT_POSITIVE.format(len(total))) from problem
-    solver = DenseSolver(clocks, mixings, covariances, first, factor)
-    design = np.concatenate([np.vstack(part.design) for part in rows])
+    error = np.finfo(float).eps * (np.diag(total) / np.diag(factor) ** 2).sum()
+    if error > LARGEST_ERROR:
+        raise LinAlgError(
+            f"Rounding leaves the log-likelihood of {len(total)} misclosures wrong by {error:.1g} "
+            f"(limit {LARGEST_ERROR:g}): their noise is next to nothing beside the signals. Give "
+            "each observation the sigma that it has."
+        )
+    solver = DenseSolver(clocks, tuple(mixings), covariances, first, factor)
+    width = rows[0].design.shape[2]
+    design = np.concatenate([part.design.reshape(part.misclosure.size, width) for part in rows])
     return solve_trend(solver, np.concatenate([np.ravel(p.misclosure) for p in rows]), design)
 
 
 def _sides(part):
-    """Clocks (n r, e, s) of the sides of each row, and mixings (n r e, k) of each signal."""
+    """Number (n r) of each row's sides, their clocks (n r e, s), and mixings of each signal."""
     n, r = np.shape(part.misclosure)
-    e = np.shape(part.gps_time)[1]
-    clocks = np.repeat(part.epochs[1].reshape(n, e, len(part.signals)), r, axis=0)
+    e, s = np.shape(part.gps_time)[1], len(part.signals)
+    clocks = np.repeat(part.epochs[1].reshape(n, e, s), r, axis=0).reshape(n * r * e, s)
+    widths = [signal.mixing.shape[-1] for signal in part.signals]
     mixings = [
-        signal.mixing.reshape(n, e, r, -1).swapaxes(1, 2).reshape(n * r * e, -1)
-        for signal in part.signals
+        signal.mixing.reshape(n, e, r, k).swapaxes(1, 2).reshape(n * r * e, k)
+        for signal, k in zip(part.signals, widths, strict=True)
     ]
-    return clocks, mixings
+    return np.full(n * r, e), clocks, *mixings
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from mlscorr.collocation.block_cholesky import factorise, invert_in_place, solve
 from mlscorr.collocation.graph import information_edges
 from mlscorr.collocation.interpolation import CHUNK, interpolate_knots, predictor_by
 from mlscorr.collocation.knots import Knots, add_prior, prior_roots
+from mlscorr.collocation.model import LARGEST_ERROR
 from mlscorr.collocation.pattern import Pattern, diagonal
 from mlscorr.collocation.row_loops import (
     add_information,
@@ -32,8 +33,6 @@ from mlscorr.collocation.row_loops import (
 )
 from mlscorr.collocation.sparse_rows import Sides, SparseRows
 from mlscorr.collocation.states import Layout
-
-LARGEST_ERROR = 0.01  # of the log-likelihood by rounding: parameters differ by more than that
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numba import njit
 
 from mlscorr.collocation.conditional import Epochs, fill_spans, neighbours, predict_between
 from mlscorr.collocation.knots import Knots, enter_cell
-from mlscorr.collocation.pattern import Pattern, locate
+from mlscorr.collocation.pattern import Pattern, locate, panel_width
 from mlscorr.collocation.states import Layout
 
 CHUNK = 1 << 16  # epochs predicted at once: copies of broadcast designs and mixings stay small
@@ -136,7 +136,7 @@ def _gather_knots(pattern, nodes, slots, states, inverse, about):
             if node < 0 or other < 0:
                 joint[u, v] = 0.0
             elif node >= other:
-                width = pattern.first[other + 1] - pattern.first[other]
+                width = panel_width(pattern, other)
                 joint[u, v] = inverse[positions[slot[u], slot[v]] + local[u] * width + local[v]]
                 joint[v, u] = joint[u, v]
 

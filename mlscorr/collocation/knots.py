@@ -25,7 +25,7 @@ from numba import njit
 from mlscorr.collocation.conditional import Neighbours, fill_gains, fill_spans, neighbours
 from mlscorr.collocation.covariance import Covariance, process_noise
 from mlscorr.collocation.matrices import multiply, multiply_transposed, whitening_root
-from mlscorr.collocation.pattern import Pattern, locate
+from mlscorr.collocation.pattern import Pattern, locate, panel_width
 from mlscorr.collocation.states import Layout, fill_noise, fill_transition
 
 SHARE = 5e-5  # of a signal's sigma that knots may leave: 0.05 mm of a drift of 1 m
@@ -207,8 +207,8 @@ def _add_to_processes(pattern, values, i, j, block):
     position, d = locate(pattern, i, j), block.shape[0]
     if position < 0:
         return
-    width = pattern.first[j + 1] - pattern.first[j]
-    for begin in range(0, width, d):
+    width = panel_width(pattern, j)
+    for begin in range(0, pattern.first[j + 1] - pattern.first[j], d):
         for a in range(d):
             row = position + (begin + a) * width + begin
             target = values[row : row + d]

@@ -14,6 +14,7 @@ from mlscorr.collocation.covariance import Covariance
 SMALLEST_INFORMATION = (
     1e-9  # least share of the trend's information that must remain without some rows
 )
+LARGEST_ERROR = 0.01  # of the log-likelihood by rounding: parameters differ by more than that
 NOT_POSITIVE = (
     "The covariance of the {} misclosures is not positive definite: two observations of one time "
     "without noise, or a sigma of zero. Give each observation and control point the sigma that it "

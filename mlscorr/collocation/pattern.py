@@ -21,8 +21,9 @@ from scipy.sparse.linalg import splu
 class Pattern(NamedTuple):
     """Where the blocks of a matrix, of its factor and of its inverse stand.
 
-    Nodes and states are in the order of elimination. A column's blocks are stacked in ``values``,
-    the one on the diagonal first, each row of a block after the other.
+    Nodes and states are in the order of elimination. Nodes in a row below which the factor has the
+    same blocks are a front, whose columns are a panel in ``values``: the block on the diagonal,
+    of which the lower triangle counts, then those below it, each row after the other.
 
     Parameters
     ----------
@@ -30,16 +31,22 @@ class Pattern(NamedTuple):
         Of each node, as the caller numbers them, in the order of elimination.
     first : (k + 1,) int array
         State at which each node begins.
-    start : (k + 1,) int array
-        Where the panel of each column begins in values.
-    column : (k + 1,) int array
-        Where the nodes below the diagonal of each column begin in ``row``.
+    front : (k,) int array
+        That each node belongs to.
+    node : (g + 1,) int array
+        At which each front begins.
+    start : (g + 1,) int array
+        Where the panel of each front begins in values.
+    column : (g + 1,) int array
+        Where the nodes below the diagonal of each front begin in ``row``.
     row, height : (l,) int array
         These nodes, in order, and how many rows of the panel stand above each.
     """
 
     place: np.ndarray
     first: np.ndarray
+    front: np.ndarray
+    node: np.ndarray
     start: np.ndarray
     column: np.ndarray
     row: np.ndarray
@@ -61,14 +68,20 @@ class Pattern(NamedTuple):
         low, high = np.sort(place[edges].reshape(-1, 2), axis=1).T
         graph = coo_array((np.ones(len(low)), (low, high)), shape=(count, count)).tocsr()
         row, column = _fill_in(graph.indptr.astype(np.int64), graph.indices.astype(np.int64))
+        ends = _ends_front(row, column)
+        node = np.append(0, np.flatnonzero(ends) + 1)
+        below = np.diff(column)
+        row, column = row[np.repeat(ends, below)], np.append(0, np.cumsum(below[ends]))
         ordered = np.empty(count, dtype=np.int64)
         ordered[place] = sizes
-        first = np.concatenate([[0], np.cumsum(ordered)])
-        above = np.concatenate([[0], np.cumsum(ordered[row])])
-        height = above[:-1] + np.repeat(ordered - above[column[:-1]], np.diff(column))
-        heights = ordered + above[column[1:]] - above[column[:-1]]
-        start = np.concatenate([[0], np.cumsum(heights * ordered)])
-        return cls(place, first, start, column, row, height)
+        first = np.append(0, np.cumsum(ordered))
+        widths = np.diff(first[node])
+        above = np.append(0, np.cumsum(ordered[row]))
+        height = above[:-1] + np.repeat(widths - above[column[:-1]], np.diff(column))
+        heights = widths + above[column[1:]] - above[column[:-1]]
+        start = np.append(0, np.cumsum(heights * widths))
+        front = np.repeat(np.arange(len(widths)), np.diff(node))
+        return cls(place, first, front, node, start, column, row, height)
 
     @property
     def states(self) -> int:
@@ -93,6 +106,15 @@ def _elimination_order(count, edges):
     options = {"SymmetricMode": True}
     factor = splu(graph.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     return factor.perm_c.astype(np.int64)
+
+
+def _ends_front(row, column):
+    """Which nodes (k,) have other blocks below them than the next one has with its own."""
+    below = np.diff(column)
+    ends = np.ones(len(below), dtype=bool)
+    inner = np.flatnonzero(below[:-1] == below[1:] + 1)
+    ends[inner] = row[column[inner]] != inner + 1
+    return ends
 
 
 @njit(cache=True, nogil=True)
@@ -150,9 +172,14 @@ def locate(pattern: Pattern, i: int, j: int) -> int:
     position : int
         -1 where there is no such block, or it stands above the diagonal.
     """
-    if i <= j:
-        return pattern.start[j] if i == j else -1
-    low, end = pattern.column[j], pattern.column[j + 1]
+    if i < j:
+        return -1
+    front = pattern.front[j]
+    node = pattern.node[front]
+    width, left = panel_width(pattern, j), pattern.first[j] - pattern.first[node]
+    if pattern.front[i] == front:
+        return pattern.start[front] + (pattern.first[i] - pattern.first[node]) * width + left
+    low, end = pattern.column[front], pattern.column[front + 1]
     high = end
     while low < high:
         middle = (low + high) // 2
@@ -162,7 +189,20 @@ def locate(pattern: Pattern, i: int, j: int) -> int:
             high = middle
     if low == end or pattern.row[low] != i:
         return -1
-    return pattern.start[j] + pattern.height[low] * (pattern.first[j + 1] - pattern.first[j])
+    return pattern.start[front] + pattern.height[low] * width + left
+
+
+@njit(cache=True, nogil=True)
+def panel_width(pattern: Pattern, j: int) -> int:
+    """Number of values from one row of a block below node j to the next.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    j : int
+    """
+    front = pattern.front[j]
+    return pattern.first[pattern.node[front + 1]] - pattern.first[pattern.node[front]]
 
 
 @njit(cache=True, nogil=True)
@@ -175,8 +215,8 @@ def diagonal(pattern: Pattern, values: np.ndarray) -> np.ndarray:
     values : (v,) array
     """
     out = np.empty(pattern.first[-1])
-    for j in range(pattern.start.size - 1):
-        b = pattern.first[j + 1] - pattern.first[j]
-        for a in range(b):
-            out[pattern.first[j] + a] = values[pattern.start[j] + a * (b + 1)]
+    for front in range(pattern.start.size - 1):
+        begin, end = pattern.first[pattern.node[front : front + 2]]
+        for a in range(end - begin):
+            out[begin + a] = values[pattern.start[front] + a * (end - begin + 1)]
     return out

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mlscorr.collocation.pattern import Pattern, locate
+from mlscorr.collocation.pattern import Pattern, locate, panel_width
 from mlscorr.collocation.sparse_rows import Sides
 from mlscorr.collocation.states import Layout
 
@@ -120,12 +120,12 @@ def add_information(
                     continue
                 left = columns[:, begin[a] : begin[a + 1]]
                 right = columns[:, begin[b] : begin[b + 1]]
-                width = right.shape[1]
+                width = panel_width(pattern, nodes[b])
                 for p in range(left.shape[1]):
-                    target = values[position + p * width : position + (p + 1) * width]
+                    target = values[position + p * width : position + p * width + right.shape[1]]
                     for m in range(left.shape[0]):
                         weight = left[m, p]
-                        for q in range(width):
+                        for q in range(right.shape[1]):
                             target[q] += weight * right[m, q]
 
 
@@ -208,12 +208,12 @@ def row_covariances(
                     continue
                 left = columns[:, begin[a] : begin[a + 1]]
                 right = columns[:, begin[b] : begin[b + 1]]
-                width = right.shape[1]
+                width = panel_width(pattern, nodes[b])
                 for p in range(left.shape[1]):
-                    known = inverse[position + p * width : position + (p + 1) * width]
+                    known = inverse[position + p * width : position + p * width + right.shape[1]]
                     for m in range(r):
                         total = 0.0
-                        for q in range(width):
+                        for q in range(right.shape[1]):
                             total += known[q] * right[m, q]
                         for other in range(r):
                             covariances[i, m, other] += total * left[other, p]

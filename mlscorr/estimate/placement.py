@@ -7,7 +7,6 @@ and what they leave of the variance along the drive is worked out before anybody
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -23,7 +22,6 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.prediction import predict_under
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Matched, Pos, Trajectory
@@ -32,8 +30,6 @@ PLACES = 3  # that are named: what one more visit to the site can survey
 CANDIDATES = 20  # epochs that are tried, of even shares of the variance; twice as many gain < 1 %
 EPOCHS = 200  # at which the drive's variance is worked out; twice as many give the same places
 LIMIT = 2.0  # times the sigma beside control points: what counts as good along the drive
-
-Families = Sequence[tuple[SignalParameters, float]]
 
 
 @dataclass(frozen=True)

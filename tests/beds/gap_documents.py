@@ -130,7 +130,6 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
                 "floor_high": 0.0114,
                 "drawn": 500,
                 "halves": 40,
-                "seed": 0,
             }
             for channel, figure in (("points", "chamfer"), ("surface", "energy_distance"))
         ],
@@ -148,7 +147,7 @@ def contrasts():
         "sigma": [0.0021, 0.0052, None], "blocks": [20.1, 17.3, 2.0],
         "differs": [False, True, False],
     }  # fmt: skip
-    common = {"unit": "counts", "whole": None, "confidence": 0.99, "replicas": 400, "seed": 0}
+    common = {"unit": "counts", "whole": None, "confidence": 0.99, "replicas": 400}
     said = "Real returns are 1.40 ± 0.01 times weaker than simulated ones beyond 10 m."
     return [
         {"channel": "intensity", "figure": "ratio", "silent": "", "tables": [table],

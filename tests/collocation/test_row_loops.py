@@ -74,7 +74,7 @@ def test_information_is_the_square_of_what_rows_see(bed):
     rest = np.tril(total)
     for rows, columns, where in blocks(pattern):
         block = total[rows, columns]
-        assert np.abs(values[where] - block.ravel()).max() < 1e-9 * np.abs(total).max()
+        assert np.abs(values[where] - block).max() < 1e-9 * np.abs(total).max()
         rest[rows, columns] = 0.0
     assert np.abs(rest).max() < 1e-12 * np.abs(total).max()
 
@@ -86,7 +86,7 @@ def test_covariances_of_rows_come_from_blocks_of_the_inverse(bed):
     root = np.random.default_rng(2).normal(size=(pattern.states, pattern.states))
     symmetric, values = root + root.T, pattern.zeros
     for rows, columns, where in blocks(pattern):
-        values[where] = symmetric[rows, columns].ravel()
+        values[where] = symmetric[rows, columns]
     for part, h in zip(sides, observing, strict=True):
         covariances = row_covariances(*loops, part, values)
         expected = h @ symmetric @ h.swapaxes(1, 2)

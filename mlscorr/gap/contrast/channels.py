@@ -78,10 +78,10 @@ def _contrast(measure, tables, tests):
 
     Things that are far are often seen at a slant, too: a difference by range shows by incidence.
     """
-    judged = [table.judged(tests, measure.least) for table, _ in tables]
+    judged = [table.judged(tests) for table, _ in tables]
     clear = [_explained(table, sums) for table, (_, sums) in zip(judged, tables, strict=True)]
     whole, sums_of_all = measure.whole()
-    whole = whole.judged(tests, measure.least)
+    whole = whole.judged(tests)
     sentences = []
     if max(clear) == 0.0:  # too few blocks in each bin, and enough in all
         sentences.append(sentence(measure, whole, sums_of_all))
@@ -95,7 +95,7 @@ def _contrast(measure, tables, tests):
         for other in measure.splits:
             if other is not split:
                 table, sums = rest.table(other)
-                text = sentence(rest, table.judged(tests, rest.least), sums)
+                text = sentence(rest, table.judged(tests), sums)
                 sentences.append(f"Beyond that, {text[:1].lower()}{text[1:]}" if text else "")
     return Contrast(measure.channel, "", whole, tuple(judged), tuple(filter(None, sentences)))
 

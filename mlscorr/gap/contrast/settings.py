@@ -28,7 +28,6 @@ class Settings:
     least_blocks: int = 6  # in a bin, for a sigma known to a third; bins with fewer are joined
     replicas: int = 400  # of the bootstrap: a sigma to 4 %
     confidence: float = 0.99  # that nothing is said of two clouds that differ by chance alone
-    least_ratio: float = 0.02  # of intensity or density: what is less no simulator is mended for
     # distances between distributions
     drawn: int = 300  # of each sample at a time, as all pairs of them are looked at: 0.7 MB
     halves: int = 30  # times that this is done: their mean to a fifth of the scatter of each

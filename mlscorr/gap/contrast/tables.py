@@ -46,17 +46,15 @@ class ContrastTable:
     blocks: np.ndarray
     differs: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
-    def judged(self, tests: int, least: float) -> ContrastTable:
+    def judged(self, tests: int) -> ContrastTable:
         """The table with what differs by more than chance, where so many bins are looked at.
 
         Parameters
         ----------
         tests : int
-        least : float
-            Value below which nothing is said to differ.
         """
         with np.errstate(invalid="ignore"):
-            differs = np.abs(self.value) > np.maximum(limit(self.blocks, tests) * self.sigma, least)
+            differs = np.abs(self.value) > limit(self.blocks, tests) * self.sigma
         return replace(self, differs=differs)
 
     def document(self, is_ratio: bool) -> dict:
@@ -159,11 +157,6 @@ class Measure:
             sides = self.sides(sums.sum(axis=0))
         figures = with_sigma(sums, self.figure, self.weights)
         return ContrastTable(split.by, edges, bins, *sides, *figures), sums
-
-    @property
-    def least(self) -> float:
-        """Value below which nothing is said to differ."""
-        return SETTINGS.least_ratio if self.channel in RATIOS else 0.0
 
     def whole(self) -> tuple[ContrastTable, np.ndarray]:
         """ContrastTable of all things as one bin, and its sums."""

@@ -29,7 +29,7 @@ def said(channel, factors):
         weights_of(30, rng), None, (split,),
     )  # fmt: skip
     table, sums = measure.table(split)
-    return sentence(measure, table.judged(4, measure.least), sums)
+    return sentence(measure, table.judged(4), sums)
 
 
 @pytest.mark.parametrize(
