@@ -138,11 +138,12 @@ def sparse_matrix(solver):
     pattern, values = solver.pattern, solver.information()
     rows, columns, elements = [], [], []
     for j in range(len(pattern.start) - 1):
-        nodes = [j, *pattern.row[pattern.column[j] : pattern.column[j + 1]]]
+        begin, end = pattern.node[j : j + 2]
+        nodes = [*range(begin, end), *pattern.row[pattern.column[j] : pattern.column[j + 1]]]
         states = np.concatenate([np.arange(*pattern.first[k : k + 2]) for k in nodes])
-        width = pattern.first[j + 1] - pattern.first[j]
-        rows.append(np.repeat(states, width))
-        columns.append(np.tile(np.arange(*pattern.first[j : j + 2]), len(states)))
+        own = np.arange(pattern.first[begin], pattern.first[end])
+        rows.append(np.repeat(states, len(own)))
+        columns.append(np.tile(own, len(states)))
         elements.append(values[pattern.start[j] : pattern.start[j + 1]])
     row, column, element = (np.concatenate(p) for p in (rows, columns, elements))
     lower = (row > column) & (element != 0)
