@@ -70,16 +70,7 @@ class Covariance:
 
     def __call__(self, lag: np.ndarray) -> np.ndarray:
         """Correlation at time lags of any shape. Units: s."""
-        ratio = np.abs(lag) / self.correlation_time
-        if self.family == "exponential":
-            return np.exp(-ratio)
-        if self.family == "matern32":
-            a = np.sqrt(3.0) * ratio
-            return (1.0 + a) * np.exp(-a)
-        if self.family == INTEGRATED:
-            return 1.5 * np.exp(-0.5 * ratio) - 0.5 * np.exp(-1.5 * ratio)
-        a = np.sqrt(5.0) * ratio
-        return (1.0 + a + a * a / 3.0) * np.exp(-a)
+        return _correlations(self.kind, np.asarray(self.rate * lag).ravel()).reshape(np.shape(lag))
 
     @property
     def states(self) -> int:
@@ -96,6 +87,35 @@ class Covariance:
         """Rate of the process's poles. Units: 1/s."""
         scale = 1.0 if self.family == INTEGRATED else np.sqrt(2.0 * self.states - 1.0)
         return scale / self.correlation_time
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def correlation(kind: int, x: float) -> float:
+    """Correlation at a time lag, which may be negative.
+
+    Parameters
+    ----------
+    kind : int
+        Covariance.kind.
+    x : float
+        Time lag in units of 1 / rate.
+    """
+    x = abs(x)
+    if kind == INTEGRATED_KIND:
+        half = np.exp(-0.5 * x)
+        return half * (1.5 - 0.5 * half * half)
+    e = np.exp(-x)
+    if kind == 1:
+        return e
+    return (1.0 + x) * e if kind == 2 else (1.0 + x + x * x / 3.0) * e
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _correlations(kind, lags):
+    out = np.empty(lags.size)
+    for i in range(lags.size):
+        out[i] = correlation(kind, lags[i])
+    return out
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

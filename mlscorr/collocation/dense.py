@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from scipy.linalg import LinAlgError, block_diag, cholesky, solve_triangular
 
+from mlscorr.collocation.covariance import correlation
 from mlscorr.collocation.model import (
     LARGEST_ERROR,
     NOT_POSITIVE,
@@ -22,6 +24,7 @@ from mlscorr.collocation.model import (
     solve_trend,
 )
 from mlscorr.collocation.sparse_rows import SparseRows
+from mlscorr.collocation.states import Layout
 
 CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
 
@@ -86,12 +89,10 @@ def _collocate(rows, total):
     )
     first = np.cumsum(count) - count
     covariances = tuple(signal.covariance for signal in rows[0].signals)
-    sides = np.zeros((len(clocks), len(clocks)))
-    for mixing, covariance, clock in zip(mixings, covariances, clocks.T, strict=True):
-        epochs, of = np.unique(clock, return_inverse=True)
-        lag = epochs[:, None] - epochs
-        sides += (mixing @ mixing.T) * covariance(lag)[np.ix_(of, of)]
-    total = total + np.add.reduceat(np.add.reduceat(sides, first, axis=0), first, axis=1)
+    total = np.array(total, dtype=float)
+    row = np.repeat(np.arange(len(count)), count)
+    mixing = np.column_stack([np.zeros((len(row), 0)), *mixings])
+    _add_signals(Layout.of(rows[0].signals), clocks, mixing, row, total)
     try:
         factor = cholesky(total, lower=True)
     except LinAlgError as problem:
@@ -107,6 +108,23 @@ def _collocate(rows, total):
     width = rows[0].design.shape[2]
     design = np.concatenate([part.design.reshape(part.misclosure.size, width) for part in rows])
     return solve_trend(solver, np.concatenate([np.ravel(p.misclosure) for p in rows]), design)
+
+
+@njit(cache=True, nogil=True)
+def _add_signals(layout, clocks, mixing, row, total):
+    """Add B D_Lambda B^T of sides, of which each belongs to a row, to the lower triangle of V."""
+    processes = np.searchsorted(layout.signal, np.arange(layout.states.size + 1))
+    for i in range(row.size):
+        for j in range(row.size):
+            if row[j] > row[i]:
+                break
+            for s in range(layout.states.size):
+                weight = 0.0
+                for k in range(processes[s], processes[s + 1]):
+                    weight += mixing[i, k] * mixing[j, k]
+                if weight != 0.0:
+                    lag = layout.rates[s] * (clocks[i, s] - clocks[j, s])
+                    total[row[i], row[j]] += weight * correlation(layout.kinds[s], lag)
 
 
 def _sides(part):

@@ -42,7 +42,7 @@ class Settings:
     tie_majority: float = 0.5  # of the ties; with fewer nobody knows which of them are right
     tie_epoch: float = 0.1  # s: in half of it a drift of 3 cm/s makes 1.5 mm
     tie_sample: int = 100  # ties that choose parameters: a scale to a tenth
-    dense_rows: int = 300  # with ties, up to which their covariance matrix is factored faster
+    dense_rows: int = 500  # with ties: for more of them knots are faster than their covariances
     sufficient_ratio: float = 1.1  # of a median sigma: a difference that no check point shows
     tie_points: int = 12  # as points below, each with a solution of all ties
     tie_freedom: float = 4.0  # degrees of freedom of Student's t (Lange et al. 1989)
