@@ -4,9 +4,9 @@
 
 A project of two drives in four files each is corrected without a disturbance. Then, KILLS times (60
 by default) in turn: a worker, the command itself, the scheduler of a cluster is ended by SIGKILL,
-or the disk is full (a file system in memory, which only root may mount). What stands in the folder
-then must be whole, and ``--resume`` must end with the same bytes, without doing again what had
-ended. Times don't count: it may run beside other work.
+the disk is full (a file system in memory, which only root may mount), or the command is interrupted
+as by Ctrl-C. What stands in the folder then must be whole, and ``--resume`` must end with the same
+bytes, without doing again what had ended. Times don't count: it may run beside other work.
 """
 
 import json
@@ -174,7 +174,15 @@ def fill_disk(case, moment, rng):
     return code
 
 
-DISTURBANCES = (lose_worker, lose_command, lose_scheduler, fill_disk)
+def interrupt_command(case, moment, rng):
+    "Ctrl-C"
+    case.start("--workers", str(WORKERS))
+    case.wait(moment)
+    case.process.send_signal(signal.SIGINT)
+    return case.end()
+
+
+DISTURBANCES = (lose_worker, lose_command, lose_scheduler, fill_disk, interrupt_command)
 
 
 def tell(rows, wrong, seconds):

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -221,17 +222,20 @@ def test_an_edited_control_list_reads_no_cloud_again(project, copy, tmp_path):
     assert kinds == {"tiles", "clouds", "reports"}  # whose paths are new, or their correction
 
 
-def test_a_killed_run_is_resumed_to_the_same_bytes(project, corrected, tmp_path):
-    "SIGKILL in the middle, then --resume: the same results as without"
+@pytest.mark.parametrize("sent, code", [(signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)])
+def test_an_ended_run_is_resumed_to_the_same_bytes(project, corrected, tmp_path, sent, code):
+    "SIGKILL or Ctrl-C in the middle, then --resume: the same results as without"
     command = [*COMMAND, "correct", project, "-o", tmp_path / "out", "--no-report"]
-    process = subprocess.Popen(list(map(str, command)), stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True)
     log, due = tmp_path / "out" / "log.txt", time.monotonic() + 120
     while time.monotonic() < due and process.poll() is None:
         if log.exists() and "findings:" in log.read_text():
             break
         time.sleep(0.05)
-    process.kill()
-    process.wait()
+    process.send_signal(sent)
+    said = process.communicate()[1]
+    assert process.returncode == code and "Traceback" not in said
+    assert sent == signal.SIGKILL or "with --resume goes on" in said
     assert not (tmp_path / "out" / "project.json").exists()
     correct_project(project, tmp_path / "out", Options(page=False, resume=True))
     assert outputs(tmp_path / "out") == outputs(corrected[1])
