@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 
 from mlscorr.targets.plane import Plane
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
@@ -62,17 +63,36 @@ def beams_at_plane(
         BRIGHT, DARK or MISS.
     rows : (k,) int array
     """
-    height = (echoes.xyz - plane.origin) @ plane.axes[2]
-    beam = echoes.sight @ plane.axes[2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        beyond = height / beam  # in units of the range; positive behind the plane
-    on_plane = np.abs(height) <= echoes.tolerance
-    rows = np.flatnonzero((on_plane | ((beyond > 0) & (beyond < 1))) & (np.abs(beyond) < 1))
+    rows, on_plane = _beams_near(
+        echoes.xyz, echoes.sight, echoes.tolerance, plane.origin, plane.axes, middle, radius
+    )
     points = plane.crossing(echoes.xyz[rows], echoes.sight[rows])
-    near = np.sum((points - middle) ** 2, axis=1) < radius**2
-    rows, points = rows[near], points[near]
     state = np.where(echoes.intensity[rows] >= threshold, BRIGHT, DARK)
-    return points, np.where(on_plane[rows], state, MISS), rows
+    return points, np.where(on_plane, state, MISS), rows
+
+
+@njit(cache=True, error_model="numpy")
+def _beams_near(xyz, sight, tolerance, origin, axes, middle, radius):
+    """Rows (k,) of these beams, and which of them ended on the plane: thousands of calls look."""
+    rows, on_plane, count = np.empty(len(xyz), np.int64), np.empty(len(xyz), np.bool_), 0
+    for row in range(len(xyz)):
+        height = steep = 0.0
+        for i in range(3):
+            height += (xyz[row, i] - origin[i]) * axes[2, i]
+            steep += sight[row, i] * axes[2, i]
+        beyond, is_on = height / steep, abs(height) <= tolerance  # positive behind the plane
+        if not (abs(beyond) < 1.0 and (is_on or beyond > 0.0)):  # in units of the range
+            continue
+        away = 0.0
+        for axis in range(2):
+            across = -middle[axis]
+            for i in range(3):
+                across += (xyz[row, i] - origin[i] - beyond * sight[row, i]) * axes[axis, i]
+            away += across**2
+        if away < radius**2:
+            rows[count], on_plane[count] = row, is_on
+            count += 1
+    return rows[:count].copy(), on_plane[:count].copy()
 
 
 def missed_points(echoes: Echoes, rows: np.ndarray, plane: Plane) -> np.ndarray:

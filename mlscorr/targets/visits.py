@@ -1,6 +1,7 @@
 """When the scanner came by: one observation of a target for each pass and visit of it."""
 
 import numpy as np
+from numba import njit
 
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pos import stated_sigma
@@ -38,11 +39,8 @@ def split_visits(gps_time: np.ndarray, scanner: np.ndarray) -> list[np.ndarray]:
 
 def _by_direction(rows, scanner):
     """Rows of one run, parted where the vehicle turned back against the way it came."""
-    path, marks, step = scanner[rows], [0], SETTINGS.turn_step
-    far = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
-    while far.max() > step and (beyond := np.flatnonzero(far[marks[-1] :] > step)).size:
-        marks.append(marks[-1] + int(beyond[0]))
-        far = np.linalg.norm(path[:, :2] - path[marks[-1], :2], axis=1)
+    path = scanner[rows]
+    marks = _each_step(path, SETTINGS.turn_step)
     steps = np.diff(path[marks, :2], axis=0)
     cuts, forward = [], steps[0] if len(steps) else None
     for number in range(1, len(steps)):
@@ -51,6 +49,18 @@ def _by_direction(rows, scanner):
             cuts.append(first + int(np.argmax(path[first:last, :2] @ forward)))
             forward = steps[number]
     return np.split(rows, cuts)
+
+
+@njit(cache=True)
+def _each_step(path, step):
+    """Rows (k,) of a path, of which each is the first farther than a step from the one before."""
+    marks, count = np.zeros(len(path), dtype=np.int64), 1
+    for row in range(len(path)):
+        east, north = path[row, :2] - path[marks[count - 1], :2]
+        if east**2 + north**2 > step**2:
+            marks[count] = row
+            count += 1
+    return marks[:count]
 
 
 def scanner_path(gps_time: np.ndarray, trajectory: Trajectory, lever_arm: np.ndarray) -> np.ndarray:

@@ -17,7 +17,9 @@ def echoes(xyz, intensity=None, gps_time=None):
 def test_beams_are_bright_dark_or_miss_the_plane():
     "On it by intensity, through it to a point behind, and not those that stopped in front"
     xyz = np.array([[0.1, 5.0, 0.0], [0.2, 5.01, 0.0], [0.2, 10.0, 0.2], [0.1, 4.0, 0.1]])
-    points, state, rows = beams_at_plane(echoes(xyz, np.array([9, 1, 9, 9])), FACE, 0.0, 1.0, 5)
+    points, state, rows = beams_at_plane(
+        echoes(xyz, np.array([9, 1, 9, 9])), FACE, np.zeros(2), 1.0, 5
+    )
     assert state.tolist() == [BRIGHT, DARK, MISS]
     assert rows.tolist() == [0, 1, 2]
     through = FACE.origin + points[2] @ FACE.axes[:2]
