@@ -76,12 +76,23 @@ def factorise(pattern: Pattern, values: np.ndarray) -> int:
 
 @njit(cache=True, nogil=True)
 def _run_end(pattern, front, k):
-    """The first below a front after its k-th node that doesn't follow in a front of its own."""
+    """End of the run of nodes below a front, from the k-th on, whose columns stand side by side."""
     row, end = pattern.row, pattern.column[front + 1]
     target, k = pattern.front[row[k]], k + 1
     while k < end and row[k] == row[k - 1] + 1 and pattern.front[row[k]] == target:
         k += 1
     return k
+
+
+@njit(cache=True, nogil=True)
+def _find_row(pattern, front, node, at):
+    """Row of a front's panel where a node begins, and where in ``row`` the next is looked for."""
+    begin, end = pattern.node[front], pattern.node[front + 1]
+    if node < end:
+        return pattern.first[node] - pattern.first[begin], at
+    while pattern.row[at] != node:
+        at += 1
+    return pattern.height[at], at
 
 
 @njit(cache=True, nogil=True)
@@ -113,24 +124,16 @@ def _factorise_panel(panel):
 def _subtract(pattern, values, product, front, k, run_end):
     """Subtract columns k to run_end of a product of the blocks below a front from the matrix."""
     first, row, height = pattern.first, pattern.row, pattern.height
-    node = row[k]
-    target, size = pattern.front[node], first[row[run_end - 1] + 1] - first[node]
-    begin, end = first[pattern.node[target]], pattern.node[target + 1]
-    width, at = first[end] - begin, pattern.column[target]
-    top = height[pattern.column[front]]  # of the blocks below
-    left = height[k] - top
+    target, size = pattern.front[row[k]], first[row[run_end - 1] + 1] - first[row[k]]
+    panel, at = _panel(pattern, values, target), pattern.column[target]
+    column = first[row[k]] - first[pattern.node[target]]
+    left, top = height[k], height[pattern.column[front]]  # of all blocks below
     for other in range(k, pattern.column[front + 1]):
-        below = row[other]
-        if below < end:
-            high = first[below] - begin
-        else:
-            while row[at] != below:
-                at += 1
-            high = height[at]
-        position = pattern.start[target] + high * width + first[node] - begin
-        for p in range(first[below + 1] - first[below]):
+        high, at = _find_row(pattern, target, row[other], at)
+        for p in range(first[row[other] + 1] - first[row[other]]):
             for q in range(size):
-                values[position + p * width + q] -= product[height[other] - top + p, left + q]
+                value = product[height[other] - top + p, left - top + q]
+                panel[high + p, column + q] -= value
 
 
 @njit(cache=True, nogil=True)
@@ -240,23 +243,14 @@ def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
 def _collect(pattern, inverse, known, front, k, run_end):
     """Columns of the inverse at nodes k to run_end below a front, and their mirror image."""
     first, row, height = pattern.first, pattern.row, pattern.height
-    node = row[k]
-    source, size = pattern.front[node], first[row[run_end - 1] + 1] - first[node]
-    begin, end = first[pattern.node[source]], pattern.node[source + 1]
-    width, at = first[end] - begin, pattern.column[source]
-    top = height[pattern.column[front]]
-    left = height[k] - top
+    source, size = pattern.front[row[k]], first[row[run_end - 1] + 1] - first[row[k]]
+    panel, at = _panel(pattern, inverse, source), pattern.column[source]
+    column = first[row[k]] - first[pattern.node[source]]
+    left, top = height[k], height[pattern.column[front]]
     for other in range(k, pattern.column[front + 1]):
-        below = row[other]
-        if below < end:
-            high = first[below] - begin
-        else:
-            while row[at] != below:
-                at += 1
-            high = height[at]
-        position = pattern.start[source] + high * width + first[node] - begin
-        for p in range(first[below + 1] - first[below]):
+        high, at = _find_row(pattern, source, row[other], at)
+        for p in range(first[row[other] + 1] - first[row[other]]):
             for q in range(size):
-                value = inverse[position + p * width + q]
-                known[height[other] - top + p, left + q] = value
-                known[left + q, height[other] - top + p] = value
+                value = panel[high + p, column + q]
+                known[height[other] - top + p, left - top + q] = value
+                known[left - top + q, height[other] - top + p] = value
