@@ -24,7 +24,7 @@ MODULE_LINES, FUNCTION_LINES = 300, 40
 CONSTANTS = 590  # at most in the package, on the way to 300
 DOCUMENTED = 0.65  # share of the public names with sections
 TESTS_PER_SOURCE = 0.7  # lines of code
-CODE_LINES = 40_490  # at most in the package
+CODE_LINES = 40_509  # at most in the package
 LONG_MODULES = {  # to be parted
     "mlscorr/blind/scoring.py",
     "mlscorr/gap/infer/evidence.py",

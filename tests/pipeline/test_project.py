@@ -198,15 +198,26 @@ def test_a_project_of_one_drive_is_its_survey(project, tmp_path):
 
 
 def test_resume_does_what_is_missing_or_damaged(project, copy):
-    "A cloud that is gone, and a result of which a bit fell over, are made again; nothing else"
+    """A cloud that is gone, and a result of which a bit fell over, are made again; nothing else.
+
+    A cloud of a drive that is no more is named.
+    """
     out, before = copy, outputs(copy)
     (out / "first" / "tile-2.laz").unlink()
     damaged = next((out / "tasks" / "tiles").glob("*.result"))
     content = bytearray(damaged.read_bytes())
     content[-1] ^= 1
     damaged.write_bytes(content)
-    correct_project(project, out, Options(page=False, resume=True))
-    assert outputs(out) == before
+    (out / "third").mkdir()
+    shutil.copy(out / "first" / "tile-1.laz", out / "third" / "tile-1.laz")
+    document = correct_project(project, out, Options(page=False, resume=True)).document
+    (older,) = [row for row in document["statements"] if row["what"] == "Older results"]
+    assert older["sentence"].startswith("1 corrected cloud is left of an earlier run")
+    assert older["items"] == [{"name": "third/tile-1.laz", "text": "not of this run"}]
+    shutil.rmtree(out / "third")
+    same = outputs(out)
+    same.pop("project.json"), before.pop("project.json")
+    assert same == before
     kinds = [kind for kind, _ in worked(out)]
     assert sorted(kinds) == ["clouds", "tiles"]
 

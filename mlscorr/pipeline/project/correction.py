@@ -17,7 +17,12 @@ from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.io.trajectory_exports import check_exports
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.project.corrected import corrected_drives, found_drive, motion_of
-from mlscorr.pipeline.project.document import ProjectResult, drive_result, project_document
+from mlscorr.pipeline.project.document import (
+    ProjectResult,
+    drive_result,
+    older_clouds,
+    project_document,
+)
 from mlscorr.pipeline.project.engine import engine
 from mlscorr.pipeline.project.file_tasks import ReportInput
 from mlscorr.pipeline.project.joint_estimate import estimate_drives
@@ -153,7 +158,8 @@ class _Work:
         keys = self._estimated(planned, origin)
         clouds = self._clouds(planned, keys)
         drives = self._reports(planned, keys, clouds)
-        result = project_document(self.project, drives, self.run)
+        older = older_clouds(self.out, clouds)
+        result = project_document(self.project, drives, self.run, older)
         write_json(self.out / "project.json", result.document)
         if self.options.page:
             from mlscorr.report.project_page import write_project

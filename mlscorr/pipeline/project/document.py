@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
+from posixpath import normpath
 
 import numpy as np
 
 from mlscorr.evaluate.model import largest_sigma
 from mlscorr.io.output import document
 from mlscorr.io.project_file import ProjectParts
+from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.corrected import STATES, DriveState
 from mlscorr.pipeline.project.running import Run
@@ -84,8 +87,25 @@ class ProjectResult:
         )
 
 
+def older_clouds(out: Path, clouds: Mapping[str, WrittenClouds]) -> list[str]:
+    """Clouds among results that an earlier run left there: of files or drives that are no more.
+
+    Parameters
+    ----------
+    out : Path
+    clouds : dict
+        WrittenClouds of each drive of this run, by its name.
+    """
+    made = {normpath(f"{name}/{file}") for name, own in clouds.items() for file, *_ in own.files}
+    there = [path for path in out.glob("*/*") if path.suffix.lower() in (".las", ".laz")]
+    return sorted({f"{path.parent.name}/{path.name}" for path in there} - made)
+
+
 def project_document(
-    project: ProjectParts, drives: Sequence[tuple[DriveResult, dict]], run: Run
+    project: ProjectParts,
+    drives: Sequence[tuple[DriveResult, dict]],
+    run: Run,
+    older: Sequence[str] = (),
 ) -> ProjectResult:
     """What became of a project.
 
@@ -95,13 +115,17 @@ def project_document(
     drives : sequence of (DriveResult, dict)
         With the report.json of each.
     run : Run
+    older : sequence of str
+        Clouds of an earlier run.
     """
     rows = [_row(result, report) for result, report in drives]
     faults = [
         {"drive": fault.drive, "name": fault.name, "stage": fault.kind, "fault": fault.fault}
         for fault in run.faults
     ]
-    statements = [*_statements(project, rows, drives, faults), *_lost(run.engine.lost)]
+    statements = [
+        *_statements(project, rows, drives, faults), *_lost(run.engine.lost), *_left(older)
+    ]  # fmt: skip
     ratings = [row["rating"] for row in statements]
     content = document(
         "project",
@@ -189,8 +213,6 @@ def _statements(project, rows, drives, faults):
 
 def _minded(rows, reports):
     """A statement on drives whose own first screen isn't green: the worst of each, red first."""
-    from mlscorr.report.headline import NAMED
-
     doubts = []
     for row, report in zip(rows, reports, strict=True):
         facts = [fact for fact in report["statements"] if fact["rating"] == row["rating"]]
@@ -201,11 +223,18 @@ def _minded(rows, reports):
     doubts = [doubt for doubt in doubts if doubt[0] != "green"]
     if doubts:
         doubts.sort(key=lambda doubt: -_worst(doubt[0]))
-        more = len(doubts) - NAMED
-        items = [(name, why) for _, name, why in doubts[:NAMED]]
-        items += [("", f"and {more} more")] if more > 0 else []
         sentence = f"{len(doubts)} of {len(rows)} drives have something to mind."
-        yield _statement("Doubts", doubts[0][0], sentence, items)
+        yield _statement(
+            "Doubts", doubts[0][0], sentence, _first_items([row[1:] for row in doubts])
+        )
+
+
+def _first_items(items):
+    """Items that stand on the first screen."""
+    from mlscorr.report.headline import NAMED
+
+    more = len(items) - NAMED
+    return [*items[:NAMED], *([("", f"and {more} more")] if more > 0 else [])]
 
 
 def _lost(number):
@@ -213,6 +242,17 @@ def _lost(number):
     if number:
         sentence = f"{number} times a worker was lost; what it worked on was done again."
         yield _statement("Workers", "amber", sentence)
+
+
+def _left(older):
+    """A statement on clouds of an earlier run, where there are any."""
+    if older:
+        sentence = (
+            f"{len(older)} corrected cloud{'s are' if len(older) > 1 else ' is'} left of an "
+            "earlier run, of files or drives that are no more or failed now. Delete what is old."
+        )
+        items = _first_items([(name, "not of this run") for name in older])
+        yield _statement("Older results", "amber", sentence, items)
 
 
 def _statement(what, rating, sentence, items=()):
