@@ -15,7 +15,7 @@ spec.loader.exec_module(assets)
 def test_every_picture_has_a_script_that_draws_it():
     "None is left of an example that went"
     assert {path.stem for path in assets.ASSETS.glob("*.png")} == set(assets.SCRIPTS)
-    assert all((ROOT / "examples" / script).exists() for script, _ in assets.SCRIPTS.values())
+    assert all((ROOT / script).exists() for script, _ in assets.SCRIPTS.values())
 
 
 def test_a_moved_curve_is_a_change_and_a_shade_is_none(tmp_path):
