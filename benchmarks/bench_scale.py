@@ -1,16 +1,17 @@
 """What workers gain and what tasks cost: a project of tiles against a survey of the same files.
 
-    python benchmarks/bench_scale.py [DRIVES] [KILLS]
+    python benchmarks/bench_scale.py [DRIVES] [KILLS] [--points MILLIONS]
 
 A simulated street is driven DRIVES times (2 by default). In the same run are timed: the single
 survey of one drive, a project of that drive, the project of all drives with one worker and with
-two, and a resumed run with nothing to do. Then the client is killed at KILLS random moments (2 by
-default), and each time resumed: the bytes must be the same. Times alone mean nothing on a busy
-machine; ratios of one run do, where nothing else is at work.
+two, and a resumed run with nothing to do; beside each stands the memory of its largest process.
+Then the client is killed at KILLS random moments (2 by default), and each time resumed: the bytes
+must be the same. Times alone mean nothing on a busy machine; ratios of one run do, where nothing
+else is at work.
 """
 
+import argparse
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -28,17 +29,20 @@ from mlscorr.pipeline.project.progress import Progress
 from mlscorr.simulate import Scenario, simulate
 
 TILES = 4  # of a drive
-SCANNER = {"lines_per_second": 150, "points_per_line": 2000}
+SECONDS = 12.0  # of a drive
+LINES = 250  # a second
+SEEN = 0.75  # of a scanner's pulses come back
 COMMAND = [sys.executable, "-m", "mlscorr", "correct"]
 SINGLE = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # as in each of more workers
 
 
-def write_drive(folder, number, seconds=12.0):
-    """A survey in tiles: the same street each time, another POS."""
+def write_drive(folder, number, points):
+    """A survey in tiles of a number of points: the same street each time, another POS."""
+    pulses = round(points * TILES / (SECONDS * LINES * SEEN))
     scenario = Scenario(
-        drive={"duration": seconds},
+        drive={"duration": SECONDS},
         targets={"control": 6, "check": 2, "hidden": 0.0},
-        scanner=[SCANNER],
+        scanner=[{"lines_per_second": LINES, "points_per_line": pulses}],
         start_time=357_700.0 + 3600 * number,
     )
     simulate(scenario, np.random.default_rng(7)).write(folder)
@@ -62,18 +66,18 @@ def write_project(folder, numbers, name):
 
 
 def timed(*arguments):
-    """Seconds of a run of correct without pages, by the clock and of all processors (2,)."""
-    start, worked = perf_counter(), processor_seconds()
+    """Cost of a run of correct without pages: seconds by the clock, of all processors, MB (3,).
+
+    The memory is that of the largest of its processes.
+    """
+    start = perf_counter()
     command = [*COMMAND, *map(str, arguments), "--no-report", "--quiet"]
-    alone = os.environ | SINGLE
-    subprocess.run(command, check=True, stderr=subprocess.DEVNULL, env=alone)
-    return np.array([perf_counter() - start, processor_seconds() - worked])
-
-
-def processor_seconds():
-    """Of all processes that were started here and have ended."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, env=os.environ | SINGLE)
+    _, status, used = os.wait4(process.pid, 0)
+    if status:
+        raise subprocess.CalledProcessError(os.waitstatus_to_exitcode(status), command)
+    worked = used.ru_utime + used.ru_stime
+    return np.array([perf_counter() - start, worked, used.ru_maxrss * 1024 / 1e6])
 
 
 def outputs(out):
@@ -120,11 +124,13 @@ def stage_costs(project, out, points):
     return {stage: seconds * 1e9 / points for stage, seconds in costs.items()}
 
 
-def main(drives=2, kills=2):
-    rng, table = np.random.default_rng(0), Table("run", "s", "processor s", "against")
+def main(drives, kills, million_points):
+    """Print the table and the stages; whether all bytes are the same."""
+    rng, table = np.random.default_rng(0), Table("run", "s", "processor s", "MB", "against")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        points = sum(write_drive(folder / f"drive-{n}", n) for n in range(drives))
+        folders = [folder / f"drive-{number}" for number in range(drives)]
+        points = sum(write_drive(path, n, 1e6 * million_points) for n, path in enumerate(folders))
         single = write_project(folder, [0], "single")
         whole = write_project(folder, range(drives), "whole")
         timed(folder / "drive-0", "-o", folder / "warm")  # compiles what is compiled once
@@ -141,7 +147,9 @@ def main(drives=2, kills=2):
             "resumed, nothing to do": (nothing, second, "two workers"),
         }
         for name, (seconds, other, words) in rows.items():
-            ratio = "" if other is None else "{:.2f}, {:.2f} x {}".format(*seconds / other, words)
+            ratio = (
+                "" if other is None else "{:.2f}, {:.2f} x {}".format(*(seconds / other)[:2], words)
+            )
             table.add_row(name, *(f"{value:.1f}" for value in seconds), ratio)
         expected = outputs(folder / "first")
         same = outputs(folder / "second") == expected
@@ -162,4 +170,9 @@ def main(drives=2, kills=2):
 
 
 if __name__ == "__main__":
-    sys.exit(main(*map(int, sys.argv[1:])))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("drives", type=int, nargs="?", default=2)
+    parser.add_argument("kills", type=int, nargs="?", default=2)
+    parser.add_argument("--points", type=float, default=0.7, help="Of a tile. Units: million.")
+    given = parser.parse_args()
+    sys.exit(main(given.drives, given.kills, given.points))

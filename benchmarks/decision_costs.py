@@ -14,10 +14,10 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
+from mlscorr.gap.infer.decision import OPERATING_POINTS
 from mlscorr.gap.train.cases import known_mechanisms
 from mlscorr.gap.train.fit import figures, out_of_fold
 from mlscorr.gap.train.records import collect
-from mlscorr.gap.train.report import OPERATING_POINTS
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

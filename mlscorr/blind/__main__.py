@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.blind.grading import grading_mechanisms
-from mlscorr.gap.infer.decision import learned
+from mlscorr.gap.infer.decision import OPERATING_POINTS, learned
 from mlscorr.gap.train.fit import figures
 from mlscorr.gap.train.records import collect
-from mlscorr.gap.train.report import OPERATING_POINTS, print_figures
+from mlscorr.gap.train.report import print_figures
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ from mlscorr.io.nearness import far_cloud
 from mlscorr.io.preparation import glance
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
-from mlscorr.pipeline.finding import check_control
+from mlscorr.pipeline.near_points import check_control
 from mlscorr.pipeline.needs import (
     Amount,
     amounts_needed,

@@ -10,7 +10,8 @@ import numpy as np
 
 from mlscorr.io.las_windows import read_windows
 from mlscorr.io.nearness import nearest_epochs
-from mlscorr.pipeline.finding import NearPoints, fit_while_reading, match_targets, nothing_found
+from mlscorr.pipeline.finding import fit_while_reading, match_targets
+from mlscorr.pipeline.near_points import NearPoints, nothing_found
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import ControlPoints, Matched, PointCloud, Survey
 from mlscorr.targets import Candidates, search_radius

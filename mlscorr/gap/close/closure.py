@@ -15,8 +15,9 @@ from mlscorr.gap.close.folds import FoundCause, Simulated, make_folds
 from mlscorr.gap.close.over_sigma import OverSigma, errors_over_sigma
 from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.gap.close.systematic import SystematicGap, share_gone
+from mlscorr.gap.infer.columns import ColumnTable, column_table
 from mlscorr.gap.infer.error_models import ErrorModel
-from mlscorr.gap.infer.evidence import ColumnTable, column_table, nuisance_columns
+from mlscorr.gap.infer.evidence import nuisance_columns
 from mlscorr.gap.infer.measure import (
     UNITS,
     Predicted,

@@ -15,8 +15,8 @@ import numpy as np
 
 from mlscorr.gap.close.cross_fit import CrossFit
 from mlscorr.gap.close.folds import Folds
+from mlscorr.gap.infer.columns import ColumnTable
 from mlscorr.gap.infer.error_models import ErrorModel
-from mlscorr.gap.infer.evidence import ColumnTable
 from mlscorr.gap.infer.measure import Explanations, unit_square
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS

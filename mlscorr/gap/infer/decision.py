@@ -70,6 +70,13 @@ class Costs:
     unknown: float = 0.9
 
 
+OPERATING_POINTS = {
+    "sensitive": Costs(false_alarm=1.0, miss=1.0, unknown=1.0),
+    "default": Costs(),
+    "careful": Costs(false_alarm=10.0),
+}
+
+
 def kind_of(label: str, noisy: Collection[str]) -> str:
     """The one of KINDS that a label is of: how many effects it names, whatever noise is beside.
 

@@ -5,14 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mlscorr.gap.infer.columns import ColumnTable, column_table, is_of_one_target
 from mlscorr.gap.infer.error_models import ErrorModel
-from mlscorr.gap.infer.evidence import (
-    BlockEvidence,
-    ColumnTable,
-    column_table,
-    is_of_one_target,
-    weigh_blocks,
-)
+from mlscorr.gap.infer.evidence import BlockEvidence, weigh_blocks
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Rows

@@ -6,16 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from mlscorr.gap.infer.columns import ColumnTable, column_table
 from mlscorr.gap.infer.error_models import ErrorModel, error_models
 from mlscorr.gap.infer.events import RefinedEvent, refine_events
-from mlscorr.gap.infer.evidence import (
-    BlockEvidence,
-    ColumnTable,
-    column_table,
-    nuisance_columns,
-    weigh_blocks,
-    without_known,
-)
+from mlscorr.gap.infer.evidence import BlockEvidence, nuisance_columns, weigh_blocks, without_known
 from mlscorr.gap.infer.noise import NoiseEvidence, draw_channels, weigh_noise
 from mlscorr.gap.infer.observations import Observations, model_likelihood, relevant_models
 from mlscorr.gap.infer.settings import SETTINGS

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.effects import effect_class
+from mlscorr.gap.infer.columns import ColumnTable, block_groups
 from mlscorr.gap.infer.error_models import STATED, ErrorModel, window_growth
-from mlscorr.gap.infer.evidence import ColumnTable, block_groups
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Rows
@@ -77,30 +77,6 @@ def gap_kind(label: str, noisy: Iterable[str], rows: Rows) -> str:
 def signed_root(square: np.ndarray, unit: str = "mm") -> np.ndarray:
     """sign(g) |g|^(1/2) of a square in m^2 (in mm) or of shares (in percent)."""
     return (1e3 if unit == "mm" else 1e2) * np.sign(square) * np.sqrt(np.abs(square))
-
-
-def systematic_square(
-    observations: Observations, model: ErrorModel, table: ColumnTable, residual: np.ndarray
-) -> np.ndarray:
-    """The most that any block of a table explains of the squares of residuals.
-
-    In the metric of V^-1; see ``Explanations``.
-
-    Parameters
-    ----------
-    observations : Observations
-    model : ErrorModel
-        Of V.
-    table : ColumnTable
-    residual : (n, k) array
-
-    Returns
-    -------
-    square : (k,) array
-    """
-    whitener = observations.whitener(model)
-    columns = whitener.innovations(observations.columns(table.columns))[0]
-    return Explanations.of(table, columns).largest(whitener.innovations(residual)[0])[0]
 
 
 @dataclass(frozen=True)

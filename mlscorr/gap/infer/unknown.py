@@ -133,18 +133,37 @@ def unknown_blocks(rows: Rows, survey: Survey) -> tuple[UnknownBlock, ...]:
 def _functions(views):
     """Values (k, p) of the functions of each name at the looks."""
     c = views.covariates
-    away, speed, turn = c["range"], c["speed"], c["turn_rate"]
-    time = _without_gaps(c["time"])
-    warmth = 1 - np.exp(-3 * (c["time"] - c["time"].min()) / max(np.ptp(c["time"]), 1e-9))
-    values = {
+    parts = (_of_time, _of_place, _of_beam, _of_motion, _of_pass, _of_scan_angle)
+    values: dict[str, np.ndarray] = {}
+    for part in parts:
+        values |= part(c)
+    values["map"] = np.column_stack([_centred(v) for v in views.xyz[:, :2].T])
+    return {name: values[name] for name in FUNCTIONS if name in values and values[name].shape[1]}
+
+
+def _of_time(c):
+    since, time = c["time"] - c["time"].min(), _without_gaps(c["time"])
+    return {
         "constant": np.ones((len(time), 1)),
         "elapsed": _centred(c["time"])[:, None],
-        "warming": warmth[:, None],
+        "warming": 1 - np.exp(-3 * since / max(np.ptp(since), 1e-9))[:, None],
         "elapsed in the pass": c["elapsed"][:, None],
         "time": _splines(time, np.ptp(time) / SETTINGS.knots),
         "slow time": _splines(time, 5),
-        "location": _splines(c["location"], np.ptp(c["location"]) / SETTINGS.knots_place),
-        "map": np.column_stack([_centred(v) for v in views.xyz[:, :2].T]),
+    }
+
+
+def _of_place(c):
+    place = c["location"]
+    return {
+        "location": _splines(place, np.ptp(place) / SETTINGS.knots_place),
+        "slow place": _splines(place, 5),
+    }
+
+
+def _of_beam(c):
+    away = c["range"]
+    return {
         "range": away[:, None] / away.mean(),
         "range squared": (away[:, None] / away.mean()) ** 2,
         "smooth range": _splines(np.log(away), 5),
@@ -152,6 +171,12 @@ def _functions(views):
         "incidence": _splines(c["incidence"], 5),
         "intensity": _centred(c["intensity"])[:, None],
         "smooth intensity": _splines(c["intensity"], 5),
+    }
+
+
+def _of_motion(c):
+    speed, turn = c["speed"], c["turn_rate"]
+    return {
         "speed": speed[:, None] / max(speed.mean(), 1e-9),
         "speed squared": (speed[:, None] / max(speed.mean(), 1e-9)) ** 2,
         "smooth speed": _splines(speed, 5),
@@ -162,23 +187,27 @@ def _functions(views):
         "roll rate": c["roll_rate"][:, None],
         "pitch rate": c["pitch_rate"][:, None],
         "heading": _waves(c["heading"], (1, 2)),
-        "slow place": _splines(c["location"], 5),
         "smooth turn rate": _splines(turn, 5),
         "smooth acceleration": _splines(c["acceleration"], 5),
         "smooth roll": _splines(c["roll"], 5),
         "smooth pitch": _splines(c["pitch"], 5),
     }
-    if len(np.unique(c["pass"])) > 1:
-        number = c["pass"][:, None] == np.unique(c["pass"])
-        values["pass"] = number[:, 1:] - number[:, 1:].mean(axis=0)
-    if np.isfinite(c["scan_angle"]).all():
-        angle = c["scan_angle"]
-        values |= {
-            "scan angle": angle[:, None],
-            "once or twice a turn": _waves(angle, (1, 2)),
-            "often a turn": _waves(angle, (3, 4, 5, 6)),
-        }
-    return {name: columns for name, columns in values.items() if columns.shape[1]}
+
+
+def _of_pass(c):
+    number = c["pass"][:, None] == np.unique(c["pass"])
+    return {"pass": number[:, 1:] - number[:, 1:].mean(axis=0)}
+
+
+def _of_scan_angle(c):
+    angle = c["scan_angle"]
+    if not np.isfinite(angle).all():
+        return {}
+    return {
+        "scan angle": angle[:, None],
+        "once or twice a turn": _waves(angle, (1, 2)),
+        "often a turn": _waves(angle, (3, 4, 5, 6)),
+    }
 
 
 def _centred(values):

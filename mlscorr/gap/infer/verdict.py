@@ -10,9 +10,10 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.effects import effect_class
 from mlscorr.effects.vehicle import PositionNoise
+from mlscorr.gap.infer.columns import ColumnTable
 from mlscorr.gap.infer.decision import Costs, JointScore, cheapest, learned
 from mlscorr.gap.infer.error_models import error_models
-from mlscorr.gap.infer.evidence import ColumnTable, weigh_blocks
+from mlscorr.gap.infer.evidence import weigh_blocks
 from mlscorr.gap.infer.labels import LabelEvidence, block_scores, noise_scores
 from mlscorr.gap.infer.noise import draw_channels, noisy_pos_models, weigh_noise
 from mlscorr.gap.infer.observations import relevant_models

@@ -10,10 +10,11 @@ import json
 from pathlib import Path
 
 import mlscorr.gap.infer
+from mlscorr.gap.infer.decision import OPERATING_POINTS
 from mlscorr.gap.train.cases import known_mechanisms
 from mlscorr.gap.train.fit import code_hash, document, figures, fit, hash_of, out_of_fold
 from mlscorr.gap.train.records import collect
-from mlscorr.gap.train.report import OPERATING_POINTS, print_figures
+from mlscorr.gap.train.report import print_figures
 
 
 def main() -> None:

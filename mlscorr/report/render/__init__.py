@@ -2,4 +2,4 @@
 
 from mlscorr.report.render.drawing import draw
 from mlscorr.report.render.picture import Picture, panel_size
-from mlscorr.report.render.views import PictureOptions
+from mlscorr.report.render.view import PictureOptions

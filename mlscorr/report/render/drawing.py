@@ -15,7 +15,9 @@ from mlscorr.report.render.picture import Picture
 from mlscorr.report.render.quantities import COLOURS, CloudPair, point_sigma
 from mlscorr.report.render.scout import scout
 from mlscorr.report.render.sheet import Sheet
-from mlscorr.report.render.views import VIEWS, PictureOptions, overview, section, target
+from mlscorr.report.render.target_view import target_view
+from mlscorr.report.render.view import PictureOptions
+from mlscorr.report.render.views import VIEWS, overview, section
 from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import PointCloud, Survey
 
@@ -134,7 +136,7 @@ def _views(survey, correction, rows, views, options, stream, ties):
         for name in dict.fromkeys(row.name for row in rows):
             of_name = [k for k, row in enumerate(rows) if row.name == name]
             normal, passes = scouted.normals[of_name[0]], [rows[k] for k in of_name]
-            to_draw.append(target(passes, normal, points, survey.trajectory, options))
+            to_draw.append(target_view(passes, normal, points, survey.trajectory, options))
     if "section" in views:
         cut = section(scouted, options, ties)
         if cut is None:

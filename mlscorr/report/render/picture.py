@@ -19,7 +19,7 @@ from mlscorr.report.render.symbols import (
     letter,
     scale_bar,
 )
-from mlscorr.report.render.views import View
+from mlscorr.report.render.view import View
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import STYLE, label
 

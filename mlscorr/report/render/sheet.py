@@ -10,7 +10,7 @@ import numpy as np
 from mlscorr.report.render.open3d_engine import draw_pair
 from mlscorr.report.render.picture import Picture
 from mlscorr.report.render.quantities import GHOST, PAIRS, CloudPair, limits, paint, rgb
-from mlscorr.report.render.views import View
+from mlscorr.report.render.view import View
 from mlscorr.report.render.zbuffer import Canvas
 
 

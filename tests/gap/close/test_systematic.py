@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.gap.close.cross_fit import CrossFit
 from mlscorr.gap.close.systematic import SystematicGap, share_gone
-from mlscorr.gap.infer.evidence import ColumnBlock, ColumnTable
+from mlscorr.gap.infer.columns import ColumnBlock, ColumnTable
 from mlscorr.gap.infer.measure import Explanations
 
 

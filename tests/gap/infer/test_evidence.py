@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import EFFECTS, make_effect
+from mlscorr.gap.infer.columns import column_table
 from mlscorr.gap.infer.error_models import STATED, ErrorModel, error_models
-from mlscorr.gap.infer.evidence import block_gain, column_table, weigh_blocks, without_known
+from mlscorr.gap.infer.evidence import block_gain, weigh_blocks, without_known
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.unknown import unknown_blocks

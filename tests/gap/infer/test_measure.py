@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
+from mlscorr.gap.infer.columns import column_table
 from mlscorr.gap.infer.error_models import STATED
-from mlscorr.gap.infer.evidence import column_table
 from mlscorr.gap.infer.measure import (
+    Explanations,
     Predicted,
     gap_kind,
     position_terms,
     scatter_terms,
     signed_root,
-    systematic_square,
     unit_square,
 )
 from mlscorr.gap.infer.observations import Observations
@@ -64,8 +64,10 @@ def test_an_effect_explains_its_own_squares(with_surface):
     observed = Observations.of(g.rows, g.background)
     table = column_table(g.rows, (effect,), (), observed.sigma)
     shift = observed.columns(0.05 * effect.jacobian)
+    whitener = observed.whitener(STATED)
+    explained = Explanations.of(table, whitener.innovations(observed.columns(table.columns))[0])
     once, twice = (
-        systematic_square(observed, STATED, table, size * shift)[0] for size in (1.0, 2.0)
+        explained.largest(whitener.innovations(size * shift)[0])[0][0] for size in (1.0, 2.0)
     )
     assert once > 0
     assert twice + 1 == pytest.approx(4 * (once + 1))

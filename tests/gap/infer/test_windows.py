@@ -7,8 +7,9 @@ import pytest
 
 from mlscorr.collocation.covariance import Covariance
 from mlscorr.gap.infer.causes import infer_causes
+from mlscorr.gap.infer.columns import column_table
 from mlscorr.gap.infer.error_models import STATED, error_models, window_growth
-from mlscorr.gap.infer.evidence import column_table, weigh_blocks
+from mlscorr.gap.infer.evidence import weigh_blocks
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.windows import models_with_windows, weigh_windows

@@ -1,6 +1,7 @@
 """Tables of figures."""
 
-from mlscorr.gap.train.report import OPERATING_POINTS, print_figures
+from mlscorr.gap.infer.decision import OPERATING_POINTS
+from mlscorr.gap.train.report import print_figures
 
 
 def test_a_table_has_a_column_each_operating_point(capsys):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.report.render.scout import Scouted
-from mlscorr.report.render.views import PictureOptions, overview
+from mlscorr.report.render.view import PictureOptions
+from mlscorr.report.render.views import overview
 from tests.beds.street_of_points import SIZE, START, street, target
 
 
