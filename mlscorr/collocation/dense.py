@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -82,17 +83,54 @@ def collocate_rows_dense(rows: Sequence[SparseRows]) -> Collocation:
     return _collocate(rows, block_diag(*(part.noise.matrix for part in rows)))
 
 
-def _collocate(rows, total):
-    """The Collocation of SparseRows whose noise has the covariance (m, m)."""
-    count, clocks, *mixings = (
-        np.concatenate(parts) for parts in zip(*(_sides(part) for part in rows), strict=True)
+def covariance_given(
+    observations: Sequence[SparseRows], sought: Sequence[SparseRows]
+) -> np.ndarray:
+    r"""Covariance (q, q) of the error of what rows hold without their noise, given others (Eq. 15).
+
+    Of trend and signals together, all rows with all: what another observation would leave of it is
+    known before that is made. Misclosures don't matter.
+
+    Parameters
+    ----------
+    observations, sought : sequences of SparseRows
+        Of the same signals and trend.
+
+    Raises
+    ------
+    ValueError
+        As of collocate_dense.
+
+    Examples
+    --------
+    Half a correlation time from a point that is held to a millimetre:
+
+    >>> from mlscorr.collocation import Noise, Signal, SparseRows, covariance_given
+    >>> from mlscorr.collocation.covariance import Covariance
+    >>> signal = Signal(np.ones((1, 1, 1)), Covariance("exponential", 30.0))
+    >>> noise, none = Noise(np.full((1, 1, 1), 1e-6)), np.zeros((1, 1, 0))
+    >>> at_0 = SparseRows(np.array([[0.0]]), np.zeros((1, 1)), noise, none, [signal])
+    >>> at_15 = SparseRows(np.array([[15.0]]), np.zeros((1, 1)), noise, none, [signal])
+    >>> np.sqrt(covariance_given([at_0], [at_15])).round(3)
+    array([[0.795]])
+    """
+    solved, m = (
+        collocate_rows_dense(observations),
+        sum(part.misclosure.size for part in observations),
     )
-    first = np.cumsum(count) - count
-    covariances = tuple(signal.covariance for signal in rows[0].signals)
-    total = np.array(total, dtype=float)
-    row = np.repeat(np.arange(len(count)), count)
-    mixing = np.column_stack([np.zeros((len(row), 0)), *mixings])
-    _add_signals(Layout.of(rows[0].signals), clocks, mixing, row, total)
+    size = m + sum(part.misclosure.size for part in sought)
+    total = _covariance(_all_sides([*observations, *sought]), np.zeros((size, size)))
+    half = solved.solver.whiten(total[m:, :m].T)
+    trend = solved.solver.whiten(solved.design)
+    left = (_design(sought) - half.T @ trend) @ solved.trend_root
+    prior = np.tril(total[m:, m:]) + np.tril(total[m:, m:], -1).T
+    return np.asarray(prior - half.T @ half + left @ left.T)
+
+
+def _collocate(rows, noise):
+    """The Collocation of SparseRows whose noise has the covariance (m, m)."""
+    sides = _all_sides(rows)
+    total = _covariance(sides, noise)
     try:
         factor = cholesky(total, lower=True)
     except LinAlgError as problem:
@@ -104,10 +142,42 @@ def _collocate(rows, total):
             f"(limit {LARGEST_ERROR:g}): their noise is next to nothing beside the signals. Give "
             "each observation the sigma that it has."
         )
-    solver = DenseSolver(clocks, tuple(mixings), covariances, first, factor)
+    covariances = tuple(signal.covariance for signal in rows[0].signals)
+    solver = DenseSolver(sides.clocks, sides.mixings, covariances, sides.first, factor)
+    return solve_trend(
+        solver, np.concatenate([np.ravel(p.misclosure) for p in rows]), _design(rows)
+    )
+
+
+class _Sides(NamedTuple):
+    """The sides of all rows: first (m,) of each row, clocks (q, s), mixings (q, k) of signals."""
+
+    layout: Layout
+    first: np.ndarray
+    clocks: np.ndarray
+    mixings: tuple[np.ndarray, ...]
+
+
+def _all_sides(rows):
+    count, clocks, *mixings = (
+        np.concatenate(parts) for parts in zip(*(_sides(part) for part in rows), strict=True)
+    )
+    return _Sides(Layout.of(rows[0].signals), np.cumsum(count) - count, clocks, tuple(mixings))
+
+
+def _covariance(sides, noise):
+    """V by its lower triangle, of the noise's covariance (m, m)."""
+    total = np.array(noise, dtype=float)
+    row = np.repeat(np.arange(len(total)), np.diff(sides.first, append=len(sides.clocks)))
+    mixing = np.column_stack([np.zeros((len(row), 0)), *sides.mixings])
+    _add_signals(sides.layout, sides.clocks, mixing, row, total)
+    return total
+
+
+def _design(rows):
+    """A (m, p)."""
     width = rows[0].design.shape[2]
-    design = np.concatenate([part.design.reshape(part.misclosure.size, width) for part in rows])
-    return solve_trend(solver, np.concatenate([np.ravel(p.misclosure) for p in rows]), design)
+    return np.concatenate([part.design.reshape(part.misclosure.size, width) for part in rows])
 
 
 @njit(cache=True, nogil=True)

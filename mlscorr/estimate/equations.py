@@ -61,6 +61,8 @@ class Equations(Summary):
         Number of fall-backs among the last h epochs.
     ties : TieEquations, optional
         Of what two passes both saw.
+    trend_span : (float, float), optional
+        First and last time of the trend's polynomial; those of the observed targets by default.
     """
 
     names: np.ndarray
@@ -76,6 +78,7 @@ class Equations(Summary):
     mounting: np.ndarray | None = None
     fallbacks: int = 0
     ties: TieEquations | None = None
+    trend_span: tuple[float, float] | None = None
 
     @cached_property
     def stated_epochs(self) -> StatedSigma:
@@ -149,6 +152,8 @@ class Equations(Summary):
     @property
     def span(self) -> tuple[float, float]:
         """First and last control epoch; those of the trajectory without any. Units: s."""
+        if self.trend_span is not None:
+            return self.trend_span
         if len(self.observed) == 0:
             return tuple(self.trajectory.gps_time[[0, -1]].tolist())
         return float(self.observed.min()), float(self.observed.max())
@@ -194,7 +199,7 @@ class Equations(Summary):
         if self.ties is None or parameters is None:
             signals = () if parameters is None else self._signals(parameters)
             return collocate(self.gps_time, self.misclosure, self.noise, self.design, signals)
-        rows = self._linked_rows(parameters, self.ties)
+        rows = self.rows(parameters)
         return collocate_rows(rows, None if like is None else like.solver)
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
@@ -208,17 +213,26 @@ class Equations(Summary):
         """
         if self.ties is None or self.misclosure.size + len(self.ties) > SETTINGS.dense_rows:
             return self.solve(parameters, like)
-        return collocate_rows_dense(self._linked_rows(parameters, self.ties))
+        return collocate_rows_dense(self.rows(parameters))
 
     def _signals(self, parameters):
         signals = pose_signals(self.stated, parameters, self.partials)
         return drift_alone(signals, self.fallbacks)
 
-    def _linked_rows(self, parameters, ties):
-        """SparseRows of control and of ties."""
+    def rows(self, parameters: SignalParameters) -> list[SparseRows]:
+        """Rows of control, and of ties where there are any.
+
+        Parameters
+        ----------
+        parameters : SignalParameters
+        """
         times, signals = self.gps_time[:, None], self._signals(parameters)
         control = SparseRows(times, self.misclosure, self.noise, self.design, signals)
-        return [control, ties.rows(parameters, self.pose_design)]
+        return (
+            [control]
+            if self.ties is None
+            else [control, self.ties.rows(parameters, self.pose_design)]
+        )
 
     @property
     def design(self) -> np.ndarray:

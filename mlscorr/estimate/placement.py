@@ -1,8 +1,8 @@
 """Where one more control point helps most.
 
 A target tells of the POS when it is observed, whatever its misclosure will be: the covariances of a
-collocation hold no misclosure. So candidates are put into the equations, each as it would be seen,
-and what they leave of the variance along the drive is worked out before anybody surveys them.
+collocation hold no misclosure. So each candidate is taken as it would be seen, and what that leaves
+of the variance along the drive is worked out before anybody surveys it.
 """
 
 from __future__ import annotations
@@ -10,20 +10,17 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from mlscorr.collocation import Noise
 from mlscorr.collocation.covariance import FAMILIES
 from mlscorr.estimate.assembly import position_equations
 from mlscorr.estimate.inputs import checked_inputs
 from mlscorr.estimate.orders import affordable_order
+from mlscorr.estimate.outlook import Outlook
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.prediction import predict_under
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.tied import sample
-from mlscorr.pos import stated_sigma
 from mlscorr.survey import Matched, Pos, Trajectory
 
 PLACES = 3  # that are named: what one more visit to the site can survey
@@ -136,64 +133,46 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
 def _places(equations, families, sigma):
     """NextControl, at most PLACES, by the 3D sigma (n,) at all epochs of the trajectory."""
     families = [family for family in families if family[1] > SETTINGS.smallest_share]
-    equations = _with_fewer_ties(equations)
     trajectory, regular = equations.trajectory, _even_rows(equations.trajectory)
     candidates = np.unique(_candidate_rows(regular, sigma))
     rows = np.union1d(regular, candidates)
     is_even, at = np.isin(rows, regular), np.searchsorted(rows, candidates)
     sights = [_passing(trajectory, equations, row) for row in candidates]
-    complete, numbers = _with_candidates(equations, candidates, sights)
-    chosen, places, n = np.arange(len(equations.names)), [], len(equations.names)
+    outlook = Outlook.of(equations, families, rows, sights)
+    observed, names, places = equations.observed, equations.names, []
+    taken: list[int] = []
     square = sigma[rows] ** 2
-    limit = LIMIT * float(np.median(np.interp(equations.observed, trajectory.gps_time, sigma)))
-    gains = np.full(len(candidates), np.inf)
-    for _ in range(min(PLACES, len(candidates))):
-        now = _variance(complete.select(chosen), families, rows)
-        best = _best(complete, families[:1], regular, chosen, [n + row for row in numbers], gains)
-        chosen = np.append(chosen, n + numbers[best])
-        after = square * _variance(complete.select(chosen), families, rows) / now
+    limit = LIMIT * float(np.median(np.interp(observed, trajectory.gps_time, sigma)))
+    for number in range(1, min(PLACES, len(candidates)) + 1):
+        best = outlook.best(is_even)
+        taken.append(best)
+        observed = np.append(observed, trajectory.gps_time[sights[best]])
+        span = float(observed.min()), float(observed.max())
+        if span == equations.span:
+            chosen = outlook.with_target(best)
+        else:  # the trend of a correction with that target reaches as far
+            equations = replace(equations, trend_span=span)
+            chosen = Outlook.of(equations, families, rows, sights)
+            for target in taken:
+                chosen = chosen.with_target(target)
+        after = square * chosen.variance / outlook.variance
         roots = [np.sqrt(values) for values in (square, after)]
         drive = [float(np.sqrt(np.mean(root[is_even] ** 2))) for root in roots]
         share = [float(np.mean(root[is_even] < limit)) for root in roots]
         there = [float(root[at[best]]) for root in roots]
         row, passes = candidates[best], len(sights[best])
-        why = _reason(complete.select(chosen[: -len(numbers[best])]), trajectory.gps_time[row],
-                      drive, share, limit, passes)  # fmt: skip
-        place = trajectory.position[row, :2].tolist()
-        time = float(trajectory.gps_time[row])
+        place, time = trajectory.position[row, :2].tolist(), float(trajectory.gps_time[row])
+        why = _reason(observed[:-passes], names, time, drive, share, limit, passes)
         places.append(NextControl(time, *place, *there, *drive, *share, limit, passes, why))
-        square = after
+        names = np.append(names, [f"place {number}"] * passes)
+        square, outlook = after, chosen
     return tuple(places)
 
 
-def _with_fewer_ties(equations):
-    """The equations with some of the ties, each as precise as all those that it stands for."""
-    if equations.ties is None:
-        return equations
-    some = sample(equations)
-    share = len(some.ties) / len(equations.ties)
-    return replace(some, ties=replace(some.ties, variance=share * some.ties.variance))
-
-
-def _best(complete, families, rows, chosen, candidates, gains):
-    """Number of the candidate that lowers the variance along the drive most.
-
-    What a candidate gains falls with those already chosen. So gains (c,) of the round before,
-    which are replaced, are upper limits, and only the largest are worked out anew (Minoux 1978).
-    """
-    before = _variance(complete.select(chosen), families, rows).mean()
-    is_new = np.zeros(len(candidates), bool)
-    while not is_new[best := int(np.argmax(gains))]:
-        kept = complete.select(np.append(chosen, candidates[best]))
-        gains[best] = before - _variance(kept, families, rows).mean()
-        is_new[best] = True
-    return best
-
-
-def _reason(equations, time, drive, share, limit, passes):
-    """Why a target belongs at a time, in words."""
-    order = np.argsort(equations.observed, kind="stable")
-    times, names = equations.observed[order], equations.names[order]
+def _reason(observed, names, time, drive, share, limit, passes):
+    """Why a target belongs at a time, in words, beside those that are observed by their names."""
+    order = np.argsort(observed, kind="stable")
+    times, names = observed[order], names[order]
     after = int(np.searchsorted(times, time))
     if 0 < after < len(times):
         where = (
@@ -246,50 +225,3 @@ def _passing(trajectory, equations, row):
 
 def _last_rows(trajectory):
     return np.searchsorted(trajectory.gps_time, trajectory.passes[:, 1])
-
-
-def _with_candidates(equations, candidates, sights):
-    """Equations in which all candidates are observed, and each one's numbers among their rows.
-
-    Each is as far and as well observed and surveyed as the median control point, on its side.
-    """
-    trajectory, n, noise = equations.trajectory, len(equations.names), equations.noise
-    rows = np.concatenate(sights)
-    number = np.repeat(np.arange(len(candidates)), [len(sight) for sight in sights])
-    at = np.insert(np.arange(len(equations.gps_time)), n, np.zeros(len(rows), int))
-    is_new = np.zeros(len(at), bool)
-    is_new[n : n + len(rows)] = True
-    turned = stated_sigma(trajectory, equations.pos, equations.observed).rotation.as_matrix()
-    arm = np.median(turned.swapaxes(1, 2) @ equations.partials[:n, :, 3:] @ turned, axis=0)
-    attitude = trajectory.attitude[rows].as_matrix()
-    partials = np.concatenate(
-        [np.tile(np.eye(3), (len(rows), 1, 1)), attitude @ arm @ attitude.swapaxes(1, 2)], axis=2
-    )
-    new = {
-        "gps_time": trajectory.gps_time[rows],
-        "misclosure": np.zeros((len(rows), 3)),
-        "partials": partials,
-    }
-    if equations.mounting is not None:  # the first scanner's: the others lack something beside it
-        new["mounting"] = np.zeros((len(rows), *equations.mounting.shape[1:]))
-    columns = {name: np.insert(getattr(equations, name), n, new[name], axis=0) for name in new}
-    own, group = noise.own[at], noise.group[at]
-    # of the variances alone: medians of whole matrices, element by element, can be no covariance
-    own[is_new] = np.diag(np.median(np.diagonal(noise.own[:n], axis1=1, axis2=2), axis=0))
-    usual = np.median(noise.shared[noise.group[:n]], axis=0)
-    group[is_new] = len(noise.shared) + number
-    shared = np.vstack([noise.shared, np.tile(usual, (len(candidates), 1))])
-    stated, beside = equations.stated.at(at), equations.stated_epochs.at(rows)
-    for name in ("gps_time", "position", "angles"):
-        getattr(stated, name)[is_new] = getattr(beside, name)
-    order = np.arange(len(at))
-    order[is_new] = len(at) + np.arange(len(rows))
-    rotation = Rotation.concatenate([stated.rotation, beside.rotation])[order]
-    complete = replace(
-        equations,
-        **columns,
-        names=np.append(equations.names, [f"place {i + 1}" for i in number]),
-        noise=Noise(own, group, shared),
-        stated=replace(stated, rotation=rotation),
-    )
-    return complete, [np.flatnonzero(number == i) for i in range(len(candidates))]

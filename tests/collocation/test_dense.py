@@ -5,7 +5,14 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation import Signal, collocate_dense, collocate_rows_dense
+from mlscorr.collocation import (
+    Noise,
+    Signal,
+    SparseRows,
+    collocate_dense,
+    collocate_rows_dense,
+    covariance_given,
+)
 from mlscorr.collocation.covariance import FAMILIES, INTEGRATED, Covariance
 from tests.beds.linked_rows import Street
 
@@ -142,6 +149,29 @@ def test_rows_of_two_epochs_equal_the_textbook(family):
     assert np.abs(spread - sigma).max() < 1e-6  # m, rad
     np.testing.assert_allclose(solved.weights, weights, rtol=1e-6, atol=1e-6 * abs(weights).max())
     assert solved.log_likelihood == pytest.approx(likelihood, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_observations_leave_of_others_together_equals_the_textbook(seed):
+    "The whole covariance of what is asked, every row with every other, by inverses to 1e-9"
+    case = Case(seed)
+    joint, m, q = case.joint(), len(case.gps_time), 4 * len(case.asked)
+    a, b = case.design, case.asked_design.reshape(q, -1)
+    weight, cross = np.linalg.inv(joint[:m, :m] + 1e-4 * np.eye(m)), joint[m:, :m]
+    left = b - cross @ weight @ a
+    error = joint[m:, m:] - cross @ weight @ cross.T
+    error += left @ np.linalg.inv(a.T @ weight @ a) @ left.T
+
+    def rows(times, design, mixings):
+        "Single rows, whose noise is 1 cm"
+        n, pairs = len(times), zip(mixings, case.covariances, strict=True)
+        signals = [Signal(mixing.reshape(n, 1, -1), covariance) for mixing, covariance in pairs]
+        noise = Noise(np.full((n, 1, 1), 1e-4))
+        return SparseRows(times[:, None], np.zeros((n, 1)), noise, design[:, None], signals)
+
+    observed = rows(case.gps_time, a, case.mixing)
+    asked = rows(np.repeat(case.asked, 4), b, case.asked_mixing)
+    assert np.abs(covariance_given([observed], [asked]) - error).max() < 1e-9
 
 
 @pytest.mark.parametrize("order", range(6))

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate import estimate_correction, place_control, predict_accuracy, with_ties
-from mlscorr.estimate.placement import _variance, _with_fewer_ties
-from tests.beds.tied_passes import tied_passes
+from mlscorr.estimate import estimate_correction, place_control, predict_accuracy
 from tests.estimate.test_outages import BELIEVED, START, TIME, survey
 
 GAPPED = np.concatenate([np.linspace(4.0, 76.0, 10), np.linspace(164.0, 236.0, 10)])  # s
@@ -72,17 +70,3 @@ def test_a_plan_sees_the_gap_before_anyone_drives():
     worst = planned.gps_time[np.argmax(planned.sigma)] - START
     assert 98.0 < worst < 142.0
     assert 98.0 < planned.next_control[0].gps_time - START < 142.0
-
-
-def test_fewer_ties_hold_the_drive_as_all_of_them_do():
-    "A hundred ties, each as precise as the twelve that it stands for: its sigma to 10 %"
-    case = tied_passes(1, number=1200)
-    estimate = with_ties(estimate_correction(case.trajectory, case.matched), case.ties)
-    fewer = _with_fewer_ties(estimate.equations)
-    assert len(fewer.ties) <= 100 and len(estimate.equations.ties) > 1000
-    rows = np.arange(0, len(case.trajectory), 20)
-    some, complete = (
-        np.sqrt(_variance(equations, estimate.families[:1], rows))
-        for equations in (fewer, estimate.equations)
-    )
-    assert np.median(some / complete) == pytest.approx(1.0, abs=0.1)
