@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import njit
 
 from mlscorr.targets.sequence import quasi_random
 from mlscorr.targets.settings import SETTINGS
@@ -86,19 +87,31 @@ def _axes(u, normal):
     return np.array([u, np.cross(normal, u), normal])
 
 
-def consensus(distance: np.ndarray, tolerance: float) -> np.ndarray:
-    """Support (k,) of k planes: nearer points count more.
+@njit(cache=True, nogil=True)
+def most_common(xyz: np.ndarray, origins: np.ndarray, normals: np.ndarray, tolerance: float) -> int:
+    """Number of the plane that most points support, nearer ones more.
 
     Parameters
     ----------
-    distance : (n, k) array
-        Of n points from each. Units: m.
+    xyz : (n, 3) array
+        Units: m.
+    origins, normals : (k, 3) array
+        Of at least one plane. Units: m, 1.
     tolerance : float
         Units: m.
 
     Source: MSAC (Torr and Zisserman 2000).
     """
-    return np.clip(1.0 - (distance / tolerance) ** 2, 0.0, None).sum(axis=0)
+    best, largest = 0, -1.0
+    for k in range(len(normals)):
+        a, b, c = normals[k]
+        offset = a * origins[k, 0] + b * origins[k, 1] + c * origins[k, 2]
+        support = 0.0
+        for x, y, z in xyz:
+            support += max(1.0 - ((a * x + b * y + c * z - offset) / tolerance) ** 2, 0.0)
+        if support > largest:
+            best, largest = k, support
+    return best
 
 
 def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
@@ -127,16 +140,17 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
     length = np.linalg.norm(normals, axis=1)
     normals, corners = normals[length > 0], corners[length > 0]
     normals /= length[length > 0, None]
-    distance = np.abs(local @ normals.T - np.sum(normals * corners[:, 0], axis=1))
     inside = np.ones(len(local), bool)
     if len(normals):
-        inside = distance[:, np.argmax(consensus(distance, tolerance))] <= tolerance
+        best = most_common(local, corners[:, 0], normals, tolerance)
+        inside = np.abs((local - corners[best, 0]) @ normals[best]) <= tolerance
     for _ in range(2):
         centre = local[inside].mean(axis=0)
-        _, singular, axes = np.linalg.svd(local[inside] - centre, full_matrices=False)
-        sigma = singular[-1] / np.sqrt(max(inside.sum() - 3, 1))
-        height = np.abs((local - centre) @ axes[-1])
+        square, axes = np.linalg.eigh((local[inside] - centre).T @ (local[inside] - centre))
+        sigma = np.sqrt(max(square[0], 0.0) / max(inside.sum() - 3, 1))
+        height = np.abs((local - centre) @ axes[:, 0])
         inside = height <= np.clip(3 * sigma, 1e-3, tolerance)
+    axes = axes.T[::-1]
     return Plane(xyz.mean(axis=0) + centre, axes, float(sigma), inside)
 
 

@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from mlscorr.targets.clusters import bright_components, components
 from mlscorr.targets.echoes import Echoes
-from mlscorr.targets.plane import Plane, consensus, fit_plane, plane_through
+from mlscorr.targets.plane import Plane, fit_plane, most_common, plane_through
 from mlscorr.targets.regions import BrightRegion
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import diameter
@@ -170,8 +170,7 @@ def _most_common_plane(xyz, size, tolerance, rng):
     if not good.any():
         return None
     normal, origin = normal[good] / length[good, None], xyz[seeds[good]]
-    away = np.abs(xyz @ normal.T - np.sum(normal * origin, axis=1))
-    best = np.argmax(consensus(away, tolerance))
+    best = most_common(xyz, origin, normal, tolerance)
     return plane_through(origin[best], normal[best])
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.targets.plane import consensus, fit_plane, plane_through
+from mlscorr.targets.plane import fit_plane, most_common, plane_through
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 42.0])  # m, UTM
 
@@ -45,6 +45,11 @@ def test_axes_are_turned_like_those_of_another_plane():
 
 
 def test_nearer_points_support_a_plane_more():
-    "A point on it counts one, half the tolerance off three quarters, beyond it nothing"
-    distance = np.array([[0.0], [0.015], [0.05]])
-    assert consensus(distance, 0.03) == pytest.approx([1.75])
+    "Three points on a plane weigh more than three half the tolerance off another; far ones nothing"
+    beside = [[0.0, 0.0, 0.015], [1.0, 0.0, -0.015], [0.0, 1.0, 0.015]]
+    upon = [[5.0, 5.0, 1.0], [6.0, 5.0, 1.0], [5.0, 6.0, 1.0]]
+    far = np.random.default_rng(0).uniform(10.0, 14.0, (50, 3))
+    xyz = np.concatenate([beside, upon, far])
+    origins, up = np.array([[0.0, 0, 0], [0, 0, 1]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+    assert most_common(xyz, origins, up, 0.03) == 1
+    assert most_common(xyz[:3], origins, up, 0.03) == 0
