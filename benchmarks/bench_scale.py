@@ -1,6 +1,6 @@
 """What workers gain and what tasks cost: a project of tiles against a survey of the same files.
 
-    python benchmarks/bench_scale.py [DRIVES] [KILLS] [--points MILLIONS]
+    python benchmarks/bench_scale.py [DRIVES] [KILLS] [--points MILLIONS] [--workers-alone]
 
 A simulated street is driven DRIVES times (2 by default). In the same run are timed: the single
 survey of one drive, a project of that drive, the project of all drives with one worker and with
@@ -11,22 +11,19 @@ else is at work.
 """
 
 import argparse
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from time import perf_counter, process_time, sleep
 
-import laspy
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-
-from mlscorr.pipeline.project import correct_project
-from mlscorr.pipeline.project.progress import Progress
-from mlscorr.simulate import Scenario, simulate
 
 TILES = 4  # of a drive
 SECONDS = 12.0  # of a drive
@@ -36,8 +33,19 @@ COMMAND = [sys.executable, "-m", "mlscorr", "correct"]
 SINGLE = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # as in each of more workers
 
 
+def apart(function, *arguments):
+    """What a function returns, in another process: a child's memory begins with its parent's."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=context) as executor:
+        return executor.submit(function, *arguments).result()
+
+
 def write_drive(folder, number, points):
     """A survey in tiles of a number of points: the same street each time, another POS."""
+    import laspy
+
+    from mlscorr.simulate import Scenario, simulate
+
     pulses = round(points * TILES / (SECONDS * LINES * SEEN))
     scenario = Scenario(
         drive={"duration": SECONDS},
@@ -99,6 +107,9 @@ def killed(project, out, seconds, workers):
 
 def stage_costs(project, out, points):
     """Processor seconds of each stage of a project for 1e9 points, all in this process."""
+    from mlscorr.pipeline.project import correct_project
+    from mlscorr.pipeline.project.progress import Progress
+
     costs, begun = {}, {"stage": "headers", "at": process_time()}
 
     def count(stage):
@@ -124,45 +135,47 @@ def stage_costs(project, out, points):
     return {stage: seconds * 1e9 / points for stage, seconds in costs.items()}
 
 
-def main(drives, kills, million_points):
+def main(drives, kills, million_points, workers_alone):
     """Print the table and the stages; whether all bytes are the same."""
     rng, table = np.random.default_rng(0), Table("run", "s", "processor s", "MB", "against")
+    costs = {}
+
+    def row(name, cost, other=None, words=""):
+        """Add a row, and the ratios of both times to those of another one."""
+        ratio = other is not None and "{:.2f}, {:.2f} x {}".format(*(cost / other)[:2], words)
+        table.add_row(name, *(f"{value:.1f}" for value in cost), ratio or "")
+        return cost
+
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         folders = [folder / f"drive-{number}" for number in range(drives)]
-        points = sum(write_drive(path, n, 1e6 * million_points) for n, path in enumerate(folders))
-        single = write_project(folder, [0], "single")
+        points = sum(
+            apart(write_drive, path, number, 1e6 * million_points)
+            for number, path in enumerate(folders)
+        )
         whole = write_project(folder, range(drives), "whole")
-        timed(folder / "drive-0", "-o", folder / "warm")  # compiles what is compiled once
-        alone = timed(folder / "drive-0", "-o", folder / "alone")
-        as_project = timed(single, "-o", folder / "single")
-        first = timed(whole, "-o", folder / "first")
+        if not workers_alone:
+            single = write_project(folder, [0], "single")
+            timed(folder / "drive-0", "-o", folder / "warm")  # compiles what is compiled once
+            alone = row("survey", timed(folder / "drive-0", "-o", folder / "alone"))
+            row("project of it", timed(single, "-o", folder / "single"), alone, "the survey")
+        first = row(f"{drives} drives, 1 worker", timed(whole, "-o", folder / "first"))
         second = timed(whole, "-o", folder / "second", "--workers", 2)
+        row("2 workers", second, first, "one worker")
         nothing = timed(whole, "-o", folder / "second", "--workers", 2, "--resume")
-        rows = {
-            "survey": (alone, None, ""),
-            "project of it": (as_project, alone, "the survey"),
-            f"{drives} drives, 1 worker": (first, None, ""),
-            "2 workers": (second, first, "one worker"),
-            "resumed, nothing to do": (nothing, second, "two workers"),
-        }
-        for name, (seconds, other, words) in rows.items():
-            ratio = (
-                "" if other is None else "{:.2f}, {:.2f} x {}".format(*(seconds / other)[:2], words)
-            )
-            table.add_row(name, *(f"{value:.1f}" for value in seconds), ratio)
+        row("resumed, nothing to do", nothing, second, "two workers")
         expected = outputs(folder / "first")
         same = outputs(folder / "second") == expected
         for number in range(kills):
             out, moment = folder / f"kill-{number}", rng.uniform(2.0, second[0])
-            seconds = killed(whole, out, moment, 2)
+            row(f"killed after {moment:.1f} s, resumed", killed(whole, out, moment, 2))
             same &= outputs(out) == expected
-            words = f"killed after {moment:.1f} s, resumed"
-            table.add_row(words, *(f"{value:.1f}" for value in seconds), "")
-        costs = stage_costs(whole, folder / "costs", points)
+        if not workers_alone:
+            costs = apart(stage_costs, whole, folder / "costs", points)
     console = Console()
     console.print(table)
-    console.print("Processor time for 1e9 points, one core, by the stages of these few points:")
+    if costs:
+        console.print("Processor time for 1e9 points, one core, by the stages of these few points:")
     for stage, seconds in costs.items():
         console.print(f"  {stage}: {seconds / 60:.0f} min")
     console.print(f"{points} points in {drives * TILES} tiles; bytes the same: {same}")
@@ -174,5 +187,8 @@ if __name__ == "__main__":
     parser.add_argument("drives", type=int, nargs="?", default=2)
     parser.add_argument("kills", type=int, nargs="?", default=2)
     parser.add_argument("--points", type=float, default=0.7, help="Of a tile. Units: million.")
+    parser.add_argument(
+        "--workers-alone", action="store_true", help="No survey by itself, and no stages."
+    )
     given = parser.parse_args()
-    sys.exit(main(given.drives, given.kills, given.points))
+    sys.exit(main(given.drives, given.kills, given.points, given.workers_alone))
