@@ -124,6 +124,10 @@ class Equations(Summary):
             mounting=None if self.mounting is None else self.mounting[kept],
         )
 
+    def without_fallbacks(self) -> Equations:
+        """The equations of control points alone."""
+        return replace(self._rows(np.arange(len(self.names))), fallbacks=0)
+
     def without_outer_fallbacks(self) -> Equations:
         """The equations without fall-backs outside the control span."""
         n, first = len(self.gps_time), len(self.gps_time) - self.fallbacks

@@ -40,9 +40,8 @@ from mlscorr.gap.observe import (
     without_unpaired,
 )
 from mlscorr.gap.signatures import expected
-from mlscorr.io.las import read_chunks
 from mlscorr.io.simulated_clouds import simulated_survey
-from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces
+from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.planning import too_little
 from mlscorr.survey import Survey, TargetObservations
 
@@ -192,18 +191,10 @@ def compare_with_clouds(
 
 def _simulated_clouds(simulated, patches, progress):
     """SimulatedClouds and ChannelSample of a simulated survey, read once."""
-    collector, sampler, beams = PatchCollector(simulated), SampleCollector(simulated), None
-    if patches is not None:
-        beams = SimulatedBeams(patches)
-
-    def read(file):
-        for chunk in read_chunks(file):
-            collector.add(file, chunk)
-            sampler.add(chunk)
-            if beams is not None:
-                beams.add(chunk)
-            yield chunk
-
+    collector, sampler = PatchCollector(simulated), SampleCollector(simulated)
+    beams = None if patches is None else SimulatedBeams(patches)
+    others = [sampler] if beams is None else [sampler, beams]
+    read = read_into(collector.add, *map(_chunks_alone, others))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of beams, which refuse the clouds
         finding, _ = find_or_compare_surfaces(simulated, read, None, progress)
@@ -215,6 +206,10 @@ def _simulated_clouds(simulated, patches, progress):
     flat = collector.patches()
     clouds = SimulatedClouds(simulated.name, finding.matches.matched, flat, beams)
     return clouds, sampler.sample(flat)
+
+
+def _chunks_alone(collector):
+    return lambda _, chunk: collector.add(chunk)
 
 
 def _with_moved(finding: Finding, survey: Survey) -> Finding:
@@ -240,15 +235,8 @@ def _read(
     SampleCollector, its sample are taken from each chunk as it comes.
     """
     collector, surroundings = PatchCollector(believed), Surroundings(believed)
-
-    def read(file):
-        for chunk in read_chunks(file):
-            collector.add(file, chunk)
-            surroundings.add(chunk)
-            if sampler is not None:
-                sampler.add(chunk)
-            yield chunk
-
+    others = [surroundings] if sampler is None else [surroundings, sampler]
+    read = read_into(collector.add, *map(_chunks_alone, others))
     finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
     return finding, collector.patches(), surroundings, notes
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mlscorr.io.las import read_chunks
 from mlscorr.matching import Matches
-from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets
+from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, read_into
 from mlscorr.survey import PointCloud, Survey, TieFeatures
 from mlscorr.targets import NO_POINTS, Candidates, PassTarget, as_observations, number_passes
 from mlscorr.ties import TieCollector
@@ -55,13 +55,7 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
         Whether planes and poles are looked for.
     """
     collector = TieCollector(survey, origin=origin)
-
-    def read(file):
-        for chunk in read_chunks(file):
-            if with_ties:
-                collector.add(file, chunk)
-            yield chunk
-
+    read = read_into(collector.add) if with_ties else read_chunks
     fitted, candidates, near = fit_while_reading(survey, read)
     segments = {number: segment for (_, segment), number in candidates.passes.items()}
     features = collector.features()

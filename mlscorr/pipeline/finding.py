@@ -267,6 +267,23 @@ def find_or_compare_surfaces(
     return Finding(Matches(nothing, nothing, (), np.empty(0), ()), empty, {}), (note,)
 
 
+def read_into(*adds: Callable) -> Callable:
+    """A ``read_chunks`` that also adds each chunk to collectors, so that a cloud is decoded once.
+
+    Parameters
+    ----------
+    *adds : function of CloudFile and PointCloud
+    """
+
+    def read(file):
+        for chunk in read_chunks(file):
+            for add in adds:
+                add(file, chunk)
+            yield chunk
+
+    return read
+
+
 def silent(_title: str, _total: int) -> Callable:
     """Progress that is shown nowhere."""
     return lambda _points: None

@@ -16,8 +16,7 @@ from mlscorr.estimate import (
     previewed_mounting,
     with_scanner_errors,
 )
-from mlscorr.io.las import read_chunks
-from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces
+from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.tying import narrowest_gate, placed_sigma, widest_gate
 from mlscorr.survey import SAME_EPOCH, Matched, Survey, TieFeatures
 from mlscorr.ties import (
@@ -72,12 +71,7 @@ def estimate_site(
         calibration = estimate_mounting(survey.trajectory, survey.mounting, control, survey.pos)
         return control, check, finding, with_scanner_errors(calibration, control)
     collector = TieCollector(survey)
-
-    def read(file):
-        for chunk in read_chunks(file):
-            collector.add(file, chunk)
-            yield chunk
-
+    read = read_into(collector.add)
     finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
     matched = Matched.by_name(finding.matches.matched, survey.surveyed)
     is_control = np.isin(matched.name, survey.control.name)

@@ -20,7 +20,7 @@ from mlscorr.estimate import (
     with_ties,
 )
 from mlscorr.io.las import read_chunks
-from mlscorr.pipeline.finding import Finding, find_check, find_control
+from mlscorr.pipeline.finding import Finding, find_check, find_control, read_into
 from mlscorr.survey import Matched, Survey, TieFeatures, Ties
 from mlscorr.ties import (
     NORMAL_SCATTER,
@@ -82,13 +82,7 @@ def estimate_survey(
     if ties == "only":
         survey = without_control(survey)
     collector = TieCollector(survey)
-
-    def read(file):
-        for chunk in read_chunks(file):
-            if ties != "off":
-                collector.add(file, chunk)
-            yield chunk
-
+    read = read_chunks if ties == "off" else read_into(collector.add)
     if ties == "only":
         control, check, finding = find_check(survey, progress, read)
     else:

@@ -177,19 +177,7 @@ def _equations(equations, rows, trajectory, shift):
     """The Equations of a drive's own control points, in its own times."""
     own = equations.select(rows) if len(rows) else equations
     own = replace(own, gps_time=own.gps_time - shift, trajectory=trajectory, ties=None)
-    kept = np.arange(len(own.names))
-    if len(kept) == len(own.gps_time):
-        return own
-    return replace(
-        own,
-        gps_time=own.gps_time[kept],
-        misclosure=own.misclosure[kept],
-        noise=own.noise.select(kept),
-        partials=own.partials[kept],
-        stated=own.stated.at(kept),
-        mounting=None if own.mounting is None else own.mounting[kept],
-        fallbacks=0,
-    )
+    return own.without_fallbacks()
 
 
 def _ties(joint, residuals, number):
