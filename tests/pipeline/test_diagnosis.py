@@ -115,8 +115,7 @@ def test_the_cloud_is_read_once(late, diagnosed, monkeypatch):
             decoded.append(len(chunk))
             yield chunk
 
-    monkeypatch.setattr("mlscorr.pipeline.compared_rows.read_chunks", counted)
-    monkeypatch.setattr("mlscorr.pipeline.finding.read_chunks", None)
+    monkeypatch.setattr("mlscorr.pipeline.finding.read_chunks", counted)
     found = mlscorr.diagnose(survey).document
     assert sum(decoded) == sum(file.points for file in survey.clouds)
     told = json.loads((diagnosed / "gap.json").read_text())
