@@ -77,6 +77,9 @@ def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
     records : structured array of the same length
     """
     places = np.unique(np.linspace(0, layout.points - 1, SETTINGS.sampled_points).astype(np.int64))
+    chunks = places[:-1] // layout.chunk_size
+    is_first = np.append(True, np.diff(chunks) > 0)[: len(chunks)]
+    places[:-1][is_first] = chunks[is_first] * layout.chunk_size  # nothing to decode before it
     return places, records_at(layout, places)
 
 
@@ -178,14 +181,18 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     """
     places = np.asarray(places)
     records = np.empty(len(places), layout.record)
-    buffer = bytearray(layout.record_length)
+    length, size, reached = layout.record_length, layout.chunk_size, -1
     with open_file(layout.path, is_scattered=True) as file:
         decoder = layout.decoder(file, threads=False, is_brief=True)
-        for k, place in enumerate(places):
+        for k, place in enumerate(places.tolist()):
+            is_ahead = place >= reached and place // size == reached // size
+            raw = bytearray((place - reached if is_ahead else 0) * length + length)
             with _decoding(layout, place, place + 1):
-                decoder.seek(int(place))
-                decoder.decompress_many(buffer)
-            records[k] = np.frombuffer(buffer, layout.record)[0]
+                if not is_ahead:
+                    decoder.seek(place)  # decodes the chunk from its start
+                decoder.decompress_many(raw)
+            records[k] = np.frombuffer(raw[-length:], layout.record)[0]
+            reached = place + 1
     return records
 
 

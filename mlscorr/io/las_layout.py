@@ -233,6 +233,12 @@ class LasLayout:
         """Whether the points lie in the chunks of an octree, in no order of time (COPC 1.0)."""
         return bool(self.vlrs) and self.owner(self.vlrs[0][0]) == COPC and self.is_compressed
 
+    @property
+    def chunk_size(self) -> int:
+        """Number of points that are decoded together; 1 where it is none or differs by chunk."""
+        vlr = lazrs.LazVlr(self.laszip) if self.is_compressed else None
+        return 1 if vlr is None or vlr.uses_variable_size_chunks() else vlr.chunk_size()
+
     @cached_property
     def laszip(self) -> bytes:
         """Data of the LASzip VLR, which says how the points are compressed."""

@@ -15,7 +15,14 @@ from laspy.vlrs.vlrlist import VLRList
 
 from mlscorr.correction import Correction
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.las import read_chunks, sample_gps_times, sha256
+from mlscorr.io.las import (
+    read_chunks,
+    read_layout,
+    sample_gps_times,
+    sha256,
+    spread_times,
+    times_at,
+)
 from mlscorr.io.las_copy import write_corrected
 from mlscorr.survey import CloudFile, Trajectory
 from tests.beds.places import ROOT
@@ -205,7 +212,11 @@ def test_samples_are_spread_over_the_file(suffix, tmp_path):
     points, is_standard, times = sample_gps_times(path)
     whole = laspy.read(path).gps_time
     assert (points, is_standard) == (123_456, False)
-    assert np.array_equal(times, whole[np.linspace(0, points - 1, 65).astype(int)])
+    places = spread_times(read_layout(path))[0]
+    assert np.array_equal(times, whole[places]) and len(places) == 65
+    assert np.abs(places - np.linspace(0, points - 1, 65)).max() < points / 64
+    backwards = places[::-1]
+    assert np.array_equal(times_at(read_layout(path), backwards), whole[backwards])
     data = bytearray(path.read_bytes())
     data[6] |= 1
     path.write_bytes(data)
