@@ -1,13 +1,7 @@
 """Targets in the cloud: candidates -> clusters -> plane and outline -> observations."""
 
-from mlscorr.targets.candidates import (
-    NO_POINTS,
-    Candidates,
-    Neighbourhoods,
-    collect,
-    number_passes,
-    search_radius,
-)
+from mlscorr.targets.balls import Neighbourhoods
+from mlscorr.targets.candidates import NO_POINTS, Candidates, collect, number_passes, search_radius
 from mlscorr.targets.extract import PassTarget, as_observations, fit_near_control
 from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
 from mlscorr.targets.intensity import why_useless

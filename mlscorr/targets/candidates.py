@@ -4,13 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import ControlPoints, PointCloud, Survey
+from mlscorr.targets.balls import Neighbourhoods
 from mlscorr.targets.settings import SETTINGS
 
 NO_POINTS = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0, np.uint16))
@@ -121,87 +118,3 @@ def number_passes(starts: dict[tuple[int, int], float]) -> dict[tuple[int, int],
         When each begins. Units: s.
     """
     return {key: i for i, key in enumerate(sorted(starts, key=starts.get), start=1)}
-
-
-class Neighbourhoods:
-    """Balls about places: a raster of their squares first, then exact distances.
-
-    Parameters
-    ----------
-    position : (b, 3) array
-        Units: m.
-    radius : (b,) array
-        Units: m.
-    """
-
-    def __init__(self, position: np.ndarray, radius: np.ndarray):
-        self.position, self.radius = position, radius
-        if len(position) == 0:
-            self.low, self.cell, self.mask = np.zeros(2), 1.0, np.zeros((0, 0), bool)
-            return
-        self.low = (position[:, :2] - radius[:, None]).min(axis=0)
-        extent = (position[:, :2] + radius[:, None]).max(axis=0) - self.low
-        self.cell = max(1.0, float(np.sqrt(extent.prod() / SETTINGS.held_points)))
-        self.mask = np.zeros(np.ceil(extent / self.cell).astype(int) + 1, dtype=bool)
-        first = np.floor((position[:, :2] - self.low - radius[:, None]) / self.cell).astype(int)
-        last = np.floor((position[:, :2] - self.low + radius[:, None]) / self.cell).astype(int) + 1
-        for (west, south), (east, north) in zip(first.clip(0), last, strict=True):
-            self.mask[west:east, south:north] = True
-
-    def contains(self, xyz: np.ndarray) -> np.ndarray:
-        """Rows (k,) of the points in any ball, in order.
-
-        Parameters
-        ----------
-        xyz : (n, 3) array
-            Units: m.
-        """
-        return np.unique(np.concatenate([np.empty(0, int), *self.each(xyz)]))
-
-    def each(self, xyz: np.ndarray) -> list[np.ndarray]:
-        """Rows of the points within each ball, in order.
-
-        Parameters
-        ----------
-        xyz : (n, 3) array
-            Units: m.
-        """
-        rows = _rows_in_mask(xyz, self.low, self.cell, self.mask)
-        if len(rows) == 0:
-            return [np.empty(0, int)] * len(self.position)
-        near = cKDTree(xyz[rows]).query_ball_point(self.position, self.radius, return_sorted=True)
-        return [rows[np.asarray(part, int)] for part in near]
-
-    def passed(self, cloud: PointCloud, before: float) -> np.ndarray:
-        """Points (n,) in balls that no later point is in, nor in balls that overlap with these.
-
-        Parameters
-        ----------
-        cloud : PointCloud
-        before : float
-            Time from which on a point is later. Units: s.
-        """
-        pairs = cKDTree(self.position).query_pairs(2 * self.radius.max(), output_type="ndarray")
-        apart = np.linalg.norm(np.diff(self.position[pairs], axis=1)[:, 0], axis=1)
-        pairs = pairs[apart < self.radius[pairs].sum(axis=1)].T
-        graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(len(self.position),) * 2)
-        groups = connected_components(graph, directed=False)[1]
-        group = np.zeros(len(cloud), int)
-        for label, rows in zip(groups, self.each(cloud.xyz), strict=True):
-            group[rows] = label
-        latest = np.full(len(groups), -np.inf)
-        np.maximum.at(latest, group, cloud.gps_time)
-        return latest[group] < before
-
-
-@njit(cache=True)
-def _rows_in_mask(xyz, low, cell, mask):
-    """Rows (k,) of the points whose cell of a horizontal raster is marked."""
-    rows, count = np.empty(len(xyz), np.int64), 0
-    for i in range(len(xyz)):
-        x, y = (xyz[i, 0] - low[0]) / cell, (xyz[i, 1] - low[1]) / cell
-        inside = x >= 0 and y >= 0 and x < mask.shape[0] and y < mask.shape[1]
-        if inside and mask[int(x), int(y)]:
-            rows[count] = i
-            count += 1
-    return rows[:count].copy()

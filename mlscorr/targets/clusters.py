@@ -79,11 +79,6 @@ def _cells(xyz, edge):
     return cells - cells.min(axis=0)
 
 
-def _keys(cells):
-    """One number (n,) for each cube, in the order of its coordinates."""
-    return np.ravel_multi_index(tuple(cells.T), cells.max(axis=0) + 1)
-
-
 def components(points: np.ndarray, link: float) -> list[np.ndarray]:
     """Connected components of enough points to be a target.
 
@@ -122,7 +117,8 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
     if len(points) == 0:
         return np.empty(0, int)
     cells = _cells(points, link / 3)
-    _, first, cell_of = np.unique(_keys(cells), return_index=True, return_inverse=True)
+    keys = np.ravel_multi_index(tuple(cells.T), cells.max(axis=0) + 1)
+    _, first, cell_of = np.unique(keys, return_index=True, return_inverse=True)
     cells = cells[first]
     link_cells = np.nextafter(3.0, 0.0)  # three voxels apart is a tie that rounding would decide
     pairs = cKDTree(cells).query_pairs(link_cells, output_type="ndarray").T

@@ -4,9 +4,9 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mlscorr.survey import Survey, TargetObservations
+from mlscorr.targets.balls import Neighbourhoods
 from mlscorr.targets.candidates import Candidates, search_radius
 from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
 from mlscorr.targets.intensity import why_useless
@@ -45,15 +45,8 @@ def fit_near_control(
     _warn_of_intensity(cloud.intensity, surveyed.kind)
     scanned_from = scanner_path(cloud.gps_time, survey.trajectory, survey.lever_arm)
     seed = rng.integers(2**63)  # of each piece alike: no target depends on another
-    tree = cKDTree(cloud.xyz)
     targets: dict[int, list[FittedTarget]] = {}
-    balls = [
-        (index, min(ball, whole))
-        for index, whole in enumerate(search_radius(survey, surveyed))
-        for ball in (SETTINGS.near_radius + surveyed.size[index] / np.sqrt(2), whole)
-    ]
-    for index, radius in dict.fromkeys(balls):
-        rows = np.sort(np.array(tree.query_ball_point(surveyed.position[index], radius), int))
+    for index, rows in _balls(survey, cloud.xyz):
         shape = surveyed.kind[index], float(surveyed.size[index])
         for number in np.unique(passes[rows]).tolist():
             in_pass, generator = rows[passes[rows] == number], np.random.default_rng(seed)
@@ -64,6 +57,20 @@ def fit_near_control(
                 targets.setdefault(number, []).extend(fits)
     best = [(number, target) for number in sorted(targets) for target in distinct(targets[number])]
     return _with_motion(best, survey)
+
+
+def _balls(survey, xyz):
+    """Numbers of surveyed points, and the rows where each should stand and where it may."""
+    surveyed = survey.surveyed
+    balls = [
+        (index, min(ball, whole))
+        for index, whole in enumerate(search_radius(survey, surveyed))
+        for ball in (SETTINGS.near_radius + surveyed.size[index] / np.sqrt(2), whole)
+    ]
+    index, radius = np.array(list(dict.fromkeys(balls))).reshape(-1, 2).T
+    numbers = index.astype(int)
+    near = Neighbourhoods(surveyed.position[numbers], radius)
+    return zip(numbers.tolist(), near.each(xyz), strict=True)
 
 
 def _with_motion(targets, survey):

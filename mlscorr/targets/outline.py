@@ -8,9 +8,8 @@ drawn to where they are denser. The spread of the posterior is the covariance.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
-from mlscorr.targets.sequence import quasi_random
+from mlscorr.targets.sequence import quasi_normal, quasi_random
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import (
     CHECKERED,
@@ -161,7 +160,7 @@ def _next_trials(mean, covariance, free, number, count):
     scale = np.sqrt(np.diag(covariance)) + 1e-9
     correlation = covariance / np.outer(scale, scale) + 1e-6 * np.eye(len(free))
     root = np.linalg.cholesky(correlation) * scale[:, None]
-    normal = ndtri(quasi_random(count, len(free), number))
+    normal = quasi_normal(count, len(free), number)
     trials = np.tile(mean, (count, 1))
     trials[:, free] += normal @ root.T
     return trials, 0.5 * np.sum(normal**2, axis=1)

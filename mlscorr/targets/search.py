@@ -6,7 +6,7 @@ import numpy as np
 
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import PointCloud, Survey
-from mlscorr.targets.candidates import Neighbourhoods
+from mlscorr.targets.balls import Neighbourhoods
 from mlscorr.targets.clusters import split_by_time
 from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
 from mlscorr.targets.regions import bright_regions

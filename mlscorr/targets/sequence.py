@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+from scipy.special import ndtri
 from scipy.stats import qmc
 
 
@@ -24,3 +25,15 @@ def quasi_random(count: int, dimensions: int, block: int = 0) -> np.ndarray:
     sequence = qmc.Halton(dimensions, scramble=False)
     sequence.fast_forward(1 + block * count)  # the first point is a corner
     return sequence.random(count)
+
+
+@cache
+def quasi_normal(count: int, dimensions: int, block: int = 0) -> np.ndarray:
+    """Points (count, dimensions) of a standard normal distribution.
+
+    Parameters
+    ----------
+    count, dimensions, block : int
+        As of quasi_random.
+    """
+    return ndtri(quasi_random(count, dimensions, block))

@@ -6,7 +6,6 @@ import pytest
 from mlscorr.frames import attitude_from_angles
 from mlscorr.survey import PointCloud, Trajectory
 from mlscorr.targets import collect, fit_near_control, search_radius
-from mlscorr.targets.candidates import Neighbourhoods
 from tests.targets.test_extract import ORIGIN, SIZE, START, control_point, survey_of, view
 
 
@@ -71,24 +70,3 @@ def test_collect_far_from_control_keeps_nothing():
     candidates = collect(survey, lambda _: [seen.cloud])
     assert len(candidates.cloud) == len(candidates.unplaced) == 0
     assert fit_near_control(candidates, survey, np.random.default_rng(0)) == []
-
-
-def test_balls_hold_what_is_within_their_radius():
-    "Each of three balls, at UTM coordinates, holds the points that distances say"
-    rng = np.random.default_rng(2)
-    places, radius = ORIGIN + rng.uniform(0, 50, (3, 3)), np.array([2.0, 5.0, 9.0])
-    xyz = ORIGIN + rng.uniform(0, 50, (5000, 3))
-    apart = np.linalg.norm(xyz[:, None] - places, axis=2) <= radius
-    balls = Neighbourhoods(places, radius)
-    for rows, inside in zip(balls.each(xyz), apart.T, strict=True):
-        assert np.array_equal(rows, np.flatnonzero(inside))
-    assert np.array_equal(balls.contains(xyz), np.flatnonzero(apart.any(axis=1)))
-
-
-def test_a_ball_is_passed_when_all_that_overlap_with_it_are():
-    "Points at two places that overlap are handed on together, after the last of both"
-    places = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [50.0, 0.0, 0.0]])
-    cloud = PointCloud(places, np.array([1.0, 9.0, 1.0]), np.ones(3))
-    balls = Neighbourhoods(places, np.full(3, 2.0))
-    assert balls.passed(cloud, 5.0).tolist() == [False, False, True]
-    assert balls.passed(cloud, 10.0).all()

@@ -1,0 +1,112 @@
+"""Balls about places and the points of a cloud in each, by a raster of what reaches where."""
+
+import numpy as np
+from numba import njit
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from mlscorr.survey import PointCloud
+from mlscorr.targets.settings import SETTINGS
+
+
+class Neighbourhoods:
+    """Balls about places: a raster of what reaches their squares first, then exact distances.
+
+    Parameters
+    ----------
+    position : (b, 3) array
+        Units: m.
+    radius : (b,) array
+        Units: m.
+    """
+
+    def __init__(self, position: np.ndarray, radius: np.ndarray):
+        self.position, self.radius = np.ascontiguousarray(position, float), radius
+        ends = [self.position[:, :2] + sign * radius[:, None] for sign in (-1, 1)]
+        low = ends[0].min(axis=0, initial=np.inf)
+        extent = ends[1].max(axis=0, initial=-np.inf) - low
+        edge = max(1.0, float(np.sqrt(max(extent.prod(), 0.0) / SETTINGS.held_points)))
+        first, last = (np.floor((end - low) / edge).astype(int) for end in ends)
+        shape = last.max(axis=0, initial=-1) + 1
+        self._raster = low, edge, shape, *_reaching(first, last, shape)
+
+    def contains(self, xyz: np.ndarray) -> np.ndarray:
+        """Rows (k,) of the points in any ball, in order.
+
+        Parameters
+        ----------
+        xyz : (n, 3) array
+            Units: m.
+        """
+        return np.unique(np.concatenate([np.empty(0, int), *self.each(xyz)]))
+
+    def each(self, xyz: np.ndarray) -> list[np.ndarray]:
+        """Rows of the points within each ball, in order.
+
+        Parameters
+        ----------
+        xyz : (n, 3) array
+            Units: m.
+        """
+        balls = self._raster, self.position, self.radius**2
+        xyz, counts = np.ascontiguousarray(xyz), np.zeros(len(self.position), int)
+        _enter(xyz, *balls, counts, np.empty(0, int))
+        ends = np.cumsum(counts)
+        rows = np.empty(counts.sum(), int)
+        _enter(xyz, *balls, ends - counts, rows)
+        return np.split(rows, ends[:-1]) if len(ends) else []
+
+    def passed(self, cloud: PointCloud, before: float) -> np.ndarray:
+        """Points (n,) in balls that no later point is in, nor in balls that overlap with these.
+
+        Parameters
+        ----------
+        cloud : PointCloud
+        before : float
+            Time from which on a point is later. Units: s.
+        """
+        pairs = cKDTree(self.position).query_pairs(2 * self.radius.max(), output_type="ndarray")
+        apart = np.linalg.norm(np.diff(self.position[pairs], axis=1)[:, 0], axis=1)
+        pairs = pairs[apart < self.radius[pairs].sum(axis=1)].T
+        graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(len(self.position),) * 2)
+        groups = connected_components(graph, directed=False)[1]
+        group = np.zeros(len(cloud), int)
+        for label, rows in zip(groups, self.each(cloud.xyz), strict=True):
+            group[rows] = label
+        latest = np.full(len(groups), -np.inf)
+        np.maximum.at(latest, group, cloud.gps_time)
+        return latest[group] < before
+
+
+def _reaching(first, last, shape):
+    """Numbers of the balls that reach each cell, cell by cell, and where those of a cell start."""
+    cells = [
+        np.arange(x, east + 1)[:, None] * shape[1] + np.arange(y, north + 1)
+        for (x, y), (east, north) in zip(first, last, strict=True)
+    ]
+    ball = np.repeat(np.arange(len(cells)), [part.size for part in cells])
+    cell = np.concatenate([np.empty(0, int), *map(np.ravel, cells)])
+    starts = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=shape.prod()))])
+    return starts, ball[np.argsort(cell, kind="stable")]
+
+
+@njit(cache=True)
+def _enter(xyz, raster, position, squares, free, rows):
+    """Enter the row of each point at the free place of each ball it is in, or count them alone
+    where there is no room.
+    """
+    low, edge, shape, starts, balls = raster
+    for i in range(len(xyz)):
+        x, y = (xyz[i, 0] - low[0]) / edge, (xyz[i, 1] - low[1]) / edge
+        if not (x >= 0 and y >= 0 and x < shape[0] and y < shape[1]):
+            continue
+        cell = int(x) * shape[1] + int(y)
+        for k in range(starts[cell], starts[cell + 1]):
+            ball, apart = balls[k], 0.0
+            for axis in range(3):
+                apart += (xyz[i, axis] - position[ball, axis]) ** 2
+            if apart <= squares[ball]:
+                if len(rows) > 0:
+                    rows[free[ball]] = i
+                free[ball] += 1
