@@ -181,6 +181,8 @@ class MarkovSolver:
         r = self.mixing.shape[1]
         position = self._position[np.asarray(rows) // r]
         within = np.asarray(rows) % r
+        if not self.shared.size and (position == position[0]).all():
+            return self._smoothed[0][position[0]][within[:, None], within]
         epochs, of = np.unique(position, return_inverse=True)
         block = np.empty((len(epochs), r, len(epochs), r))
         for a, early in enumerate(epochs):

@@ -208,10 +208,10 @@ class Collocation:
 
     def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
-        basis = self._leverage[rows]
-        if basis.shape[1] == 0:
+        basis, most = self._leverage[rows], 1.0 - SMALLEST_INFORMATION
+        if np.sum(basis**2) < most:  # of all singular values, which is quick
             return True
-        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < 1.0 - SMALLEST_INFORMATION)
+        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < most)
 
     def leave_out(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the other observations say of some: residuals (l - prediction) and covariance.
@@ -234,9 +234,13 @@ class Collocation:
                 f"Without the {len(rows)} observations that are left out the other "
                 f"{len(self.misclosure) - len(rows)} do not determine the trend."
             )
-        projected = self.projected[rows]
-        covariance = np.linalg.inv(self.solver.precision(rows) - projected @ projected.T)
+        covariance = np.linalg.inv(self.precision_of(rows))
         return covariance @ self.weights[rows], covariance
+
+    def precision_of(self, rows: np.ndarray) -> np.ndarray:
+        """Inverse covariance (k, k) of rows that are left out, the trend unknown."""
+        projected = self.projected[rows]
+        return self.solver.precision(rows) - projected @ projected.T
 
 
 def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Collocation:
@@ -260,12 +264,14 @@ def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Coll
     """
     p = design.shape[1]
     whitened = solver.whiten(np.column_stack([design, misclosure]))
-    if len(misclosure) < p or np.linalg.matrix_rank(whitened[:, :p]) < p:
+    basis, triangle = np.linalg.qr(whitened[:, :p])
+    values = np.linalg.svd(triangle, compute_uv=False)
+    smallest = len(whitened) * np.finfo(float).eps  # of a rank, as numpy's matrix_rank has it
+    if len(misclosure) < p or (p and values[-1] <= smallest * values[0]):
         raise ValueError(
             f"{p} trend parameters are not determined by {len(misclosure)} "
             "misclosures. Lower the order or observe more control points."
         )
-    basis, triangle = np.linalg.qr(whitened[:, :p])
     root = np.linalg.inv(triangle)
     trend = root @ (basis.T @ whitened[:, p])
     residual = whitened[:, p] - whitened[:, :p] @ trend

@@ -136,10 +136,7 @@ def _joseph(first, mixing, noise, p, gain, observed):
 
 
 @njit(cache=True, nogil=True)
-def filter_columns(
-    recursion: Recursion,
-    columns: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
+def filter_columns(recursion: Recursion, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Filter columns of observations.
 
     Parameters
@@ -174,10 +171,7 @@ def filter_columns(
 
 
 @njit(cache=True, nogil=True)
-def smooth_columns(
-    recursion: Recursion,
-    whitened: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
+def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """From whitened columns back.
 
     Parameters
@@ -210,9 +204,7 @@ def smooth_columns(
 
 @njit(cache=True, nogil=True)
 def smooth_covariance(
-    recursion: Recursion,
-    steps: np.ndarray,
-    covariances: np.ndarray,
+    recursion: Recursion, steps: np.ndarray, covariances: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The backward pass of N.
 
@@ -270,10 +262,7 @@ def smooth_covariance(
 
 @njit(cache=True, nogil=True)
 def precision_between(
-    recursion: Recursion,
-    future: np.ndarray,
-    early: int,
-    late: int,
+    recursion: Recursion, future: np.ndarray, early: int, late: int
 ) -> np.ndarray:
     """Block (r, r) of V^-1 at an early and a late epoch, walking from late to early.
 

@@ -184,7 +184,7 @@ class Equations(Summary):
             return float(np.ptp(self.trajectory.gps_time))
         return self.trajectory.recorded_time(epochs[0], epochs[-1]) / (len(epochs) - 1)
 
-    @property
+    @cached_property
     def target_rows(self) -> dict[str, np.ndarray]:
         """Rows of the observation equations of each target, all its passes together."""
         names = np.repeat(self.names, 3)
@@ -240,7 +240,7 @@ class Equations(Summary):
             else [control, self.ties.rows(parameters, self.pose_design)]
         )
 
-    @property
+    @cached_property
     def design(self) -> np.ndarray:
         """A (n + h, 3, p) of the observations; no epoch without a target tells of a trend."""
         trend = self._trend(self.gps_time)

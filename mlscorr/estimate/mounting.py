@@ -191,10 +191,7 @@ def linearized(
     """
     mounting = corrected_mounting(recorded, correction)
     position = georeferenced_anew(
-        equations.trajectory,
-        (recorded, mounting),
-        matched.observations.position,
-        matched.gps_time,
+        equations.trajectory, (recorded, mounting), matched.observations.position, matched.gps_time
     )
     moved = replace(matched, observations=replace(matched.observations, position=position))
     weak = prior_sigma(recorded)

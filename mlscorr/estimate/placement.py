@@ -218,10 +218,7 @@ def _passing(trajectory, equations, row):
     sight = np.sqrt((arms**2).sum(axis=(1, 2)) / 2).max()  # |G|, by Phi(G)
     away = np.linalg.norm(trajectory.position - trajectory.position[row], axis=1)
     near = np.flatnonzero(away <= sight)
-    is_new = (np.diff(near) > 1) | np.isin(near[:-1], _last_rows(trajectory))
+    ends = np.searchsorted(trajectory.gps_time, trajectory.passes[:, 1])
+    is_new = (np.diff(near) > 1) | np.isin(near[:-1], ends)
     parts = np.split(near, np.flatnonzero(is_new) + 1)
     return [int(part[np.argmin(away[part])]) for part in parts]
-
-
-def _last_rows(trajectory):
-    return np.searchsorted(trajectory.gps_time, trajectory.passes[:, 1])

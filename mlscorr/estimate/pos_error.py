@@ -16,12 +16,7 @@ from mlscorr.estimate.equations import NO_TREND, Equations
 from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_warnings
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import prior_sigma
-from mlscorr.estimate.orders import (
-    Alternative,
-    affordable_order,
-    compare_orders,
-    leave_targets_out,
-)
+from mlscorr.estimate.orders import Alternative, affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.posterior import Objective, Posterior
 from mlscorr.estimate.prediction import predict_pose_error, predict_under

@@ -14,11 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.estimate.added_unknowns import AddedUnknowns, misclosures_of, with_misclosures
 from mlscorr.estimate.calibration import SCANNER_COMPONENTS, Calibration, ScannerErrors
-from mlscorr.estimate.mounting import (
-    combined_correction,
-    corrected_mounting,
-    georeferenced_anew,
-)
+from mlscorr.estimate.mounting import combined_correction, corrected_mounting, georeferenced_anew
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import along_ties
 from mlscorr.frames import scanner_partials

@@ -15,12 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from mlscorr.estimate.equations import Equations
-from mlscorr.estimate.posterior import (
-    Objective,
-    Posterior,
-    choose_parameters,
-    most_probable,
-)
+from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters, most_probable
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.target_tests import TargetTest, all_tests, single_test
 
@@ -153,11 +148,7 @@ def _eliminate(equations, parameters, objective):
     while may_go(equations, names | {""}):
         kept = equations.without(names)
         solved = kept.solve(parameters)
-        gains = {
-            name: _gain(solved, rows)
-            for name, rows in kept.target_rows.items()
-            if solved.determined_without(rows)
-        }
+        gains = _gains(solved, kept.target_rows)
         worst = max(gains, key=gains.get, default=None)
         if worst is None or gains[worst] < -np.log(SETTINGS.strong_evidence):
             return
@@ -165,16 +156,28 @@ def _eliminate(equations, parameters, objective):
         yield names, score
 
 
-def _gain(solved, rows):
-    """Log posterior odds of one gross error, the same in all these rows' epochs, against none."""
-    residual, covariance = solved.leave_out(rows)
-    same = np.kron(np.ones((len(rows) // 3,) * 2), np.eye(3))
-    sizes = np.array([0.0, *SETTINGS.gross_sizes])
-    total = covariance + sizes[:, None, None] ** 2 * same
-    squares = np.linalg.solve(total, residual[:, None])[..., 0] @ residual
-    density = -0.5 * (squares + np.linalg.slogdet(total)[1])
-    wrong = np.logaddexp.reduce(density[1:]) - np.log(len(SETTINGS.gross_sizes))
-    return wrong - density[0] + np.log(SETTINGS.gross_share / (1.0 - SETTINGS.gross_share))
+def _gains(solved, rows_of):
+    """Log posterior odds of a gross error, the same in all its rows' epochs, against none.
+
+    By name, of those without whose rows the trend is determined. With b = E^T V^-1 (l - A x) and
+    M = E^T V^-1 E of what the rows see of three axes, E, an error of sigma s has the log odds
+    (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along the eigenvectors of M.
+    """
+    rows_of = {name: rows for name, rows in rows_of.items() if solved.determined_without(rows)}
+    if not rows_of:
+        return {}
+    score = [solved.weights[rows].reshape(-1, 3).sum(axis=0) for rows in rows_of.values()]
+    blocks = [
+        solved.precision_of(rows).reshape(-1, 3, len(rows) // 3, 3) for rows in rows_of.values()
+    ]
+    values, vectors = np.linalg.eigh([block.sum(axis=(0, 2)) for block in blocks])
+    along = np.einsum("nij,ni->nj", vectors, score) ** 2
+    variance = np.square(SETTINGS.gross_sizes)[:, None, None]
+    more = 1.0 + variance * np.maximum(values, 0.0)
+    density = 0.5 * np.sum(variance * along / more - np.log(more), axis=2)
+    odds = SETTINGS.gross_share / (1.0 - SETTINGS.gross_share) / len(SETTINGS.gross_sizes)
+    gains = np.logaddexp.reduce(density, axis=0) + np.log(odds)
+    return dict(zip(rows_of, gains.tolist(), strict=True))
 
 
 def _rejected_groups(equations, rejected):
@@ -205,13 +208,13 @@ def _doubtful_pairs(equations, posterior):
             score = objective(parameters.family, objective.logarithms(parameters))
             none = max(none, score)
             solved = block.solve(parameters)
-            for pair in _neighbours(block):
-                both = np.concatenate([rows[name] for name in pair])
-                if not solved.determined_without(both):
-                    continue
-                gain = score + _gain(solved, both)
-                if gain > pairs.get(pair, -np.inf):
-                    pairs[pair], ways[pair] = gain, solved.leave_out(both)[0].reshape(-1, 3)
+            both = {
+                pair: np.concatenate([rows[name] for name in pair]) for pair in _neighbours(block)
+            }
+            for pair, gain in _gains(solved, both).items():
+                if score + gain > pairs.get(pair, -np.inf):
+                    pairs[pair] = score + gain
+                    ways[pair] = solved.leave_out(both[pair])[0].reshape(-1, 3)
     pair = max(pairs, key=pairs.get, default=None)
     if (
         pair is None

@@ -59,7 +59,7 @@ class StatedSigma:
         """Square root (n, 3, 3) of the attitude's covariance about the map axes. Units: rad."""
         return map_root(self.rotation, self.angles)
 
-    @property
+    @cached_property
     def drift(self) -> np.ndarray:
         """The part (n, 3) of the position's sigma that grows where GNSS is missing. Units: m."""
         return np.sqrt(np.maximum(self.position**2 - self.held**2, 0.0))
@@ -69,7 +69,7 @@ class StatedSigma:
         """The part (n, 3) of the position's sigma that stays. Units: m."""
         return np.minimum(self.position, self.held)
 
-    @property
+    @cached_property
     def gnss(self) -> np.ndarray:
         """Sigma (n, 3) of a POS that GNSS holds: the stated one, else that of RTK. Units: m."""
         held = self.held if self.history.is_stated else SETTINGS.gnss
@@ -91,13 +91,13 @@ class StatedSigma:
         share = (np.maximum(self.since, SOONEST) / SETTINGS.outage) ** power
         return self.largest * np.where(self.since > 0, share, 0.0)[:, None]
 
-    @property
+    @cached_property
     def clock(self) -> np.ndarray:
         """Time (n,) that leaps where drift starts anew. Units: s."""
         first = self.history.trajectory.gps_time[0]
         return self.gps_time - first + LEAP * self.history.segment(self.gps_time)
 
-    @property
+    @cached_property
     def growth_clock(self) -> np.ndarray:
         """Logarithm (n,) of the time since drift began to grow, with leaps where it does."""
         number = 2 * self.history.segment(self.gps_time) + (self.since > 0)

@@ -134,13 +134,16 @@ class Trajectory(Summary):
                 return None
             return np.column_stack([np.interp(gps_time, self.gps_time, v) for v in values.T])
 
-        session = self.session
-        if session is not None:
-            session = session[np.searchsorted(self.gps_time, gps_time, side="right") - 1]
+        before = np.searchsorted(self.gps_time, gps_time, side="right") - 1
+        session = None if self.session is None else self.session[before]
+        near = np.zeros(len(self), dtype=bool)
+        near[before] = True
+        near[1:] |= near[:-1]
+        near[-2:] = True  # the last epoch ends an interval, and no time is asked of none
         return _Epochs(
             gps_time,
             linear(self.position),
-            Slerp(self.gps_time, self.attitude)(gps_time),
+            Slerp(self.gps_time[near], self.attitude[near])(gps_time),
             linear(self.position_sigma),
             linear(self.attitude_sigma),
             session,
