@@ -41,8 +41,7 @@ def correct(
         bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")
     ] = False,
     ties_only: Annotated[
-        bool,
-        typer.Option("--ties-only", help="Bring passes together without any control point."),
+        bool, typer.Option("--ties-only", help="Bring passes together without any control point.")
     ] = False,
     no_report: Annotated[
         bool, typer.Option("--no-report", help="Leave out report.html and the pictures: faster.")

@@ -35,12 +35,11 @@ def diagnose(
         typer.Option(
             help="Clouds that a simulator of your own made of this survey: a survey folder, a "
             "folder of LAS or LAZ files, or a file. Given twice, the second is its next run, and "
-            "tells how far the gap shrinks.",
+            "tells how far the gap shrinks."
         ),
     ] = (),
     effects: Annotated[
-        Path | None,
-        typer.Option(help="Python file that registers effects of your own; it is run."),
+        Path | None, typer.Option(help="Python file that registers effects of your own; it is run.")
     ] = None,
     until_none: Annotated[
         bool,
@@ -53,7 +52,7 @@ def diagnose(
         str,
         typer.Option(
             help="What mistakes cost: careful, default or sensitive; or three numbers, of a false "
-            "alarm, a miss and unknown, where a wrong name costs 1: 4,1,0.9 is the default.",
+            "alarm, a miss and unknown, where a wrong name costs 1: 4,1,0.9 is the default."
         ),
     ] = "default",
     overwrite: Overwrite = False,

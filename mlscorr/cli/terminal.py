@@ -71,8 +71,7 @@ def path_or_url(name: str) -> Path:
 SurveyArgument = Annotated[
     Path,
     typer.Argument(
-        help="survey.toml, or the folder that holds it; a path or a URL.",
-        parser=path_or_url,
+        help="survey.toml, or the folder that holds it; a path or a URL.", parser=path_or_url
     ),
 ]
 Out = Annotated[

@@ -86,10 +86,7 @@ def target_rows(
 
 
 def unseen_rows(
-    survey: Survey,
-    refusals: Iterable[Refusal],
-    candidates: Candidates,
-    scanned: Container[str],
+    survey: Survey, refusals: Iterable[Refusal], candidates: Candidates, scanned: Container[str]
 ) -> list[TargetRow]:
     """One TargetRow for each surveyed point without an observation, with the reason.
 

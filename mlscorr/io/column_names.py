@@ -114,9 +114,7 @@ def is_foreign(unit: str) -> bool:
 
 
 def find_meanings(
-    cells: Sequence[str],
-    names: Mapping[str, str],
-    chosen: Mapping[str, str | int] | None = None,
+    cells: Sequence[str], names: Mapping[str, str], chosen: Mapping[str, str | int] | None = None
 ) -> dict[str, list[int]]:
     """Positions of the columns that each of our names may mean.
 

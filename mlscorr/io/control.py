@@ -80,9 +80,7 @@ def read_control(path: str | Path) -> tuple[ControlPoints, ControlPoints]:
 
 
 def read_control_list(
-    path: str | Path,
-    section: ControlSection = NOTHING_GIVEN,
-    trajectory: Trajectory | None = None,
+    path: str | Path, section: ControlSection = NOTHING_GIVEN, trajectory: Trajectory | None = None
 ) -> ControlList:
     """Points of control.csv, or of a list as total stations and offices write it.
 

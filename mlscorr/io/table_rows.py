@@ -38,7 +38,8 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
     """
     width, last = len(layout.header), max(layout.columns.values())
     for number, cells in _all_rows(layout):
-        if not any(cells) or not (layout.is_own or _is_row(cells)):
+        is_row = layout.is_own or not (is_comment(cells) or "".join(cells).strip("-=_") == "")
+        if not any(cells) or not is_row:
             continue
         if not layout.is_own:
             is_parted_by_blanks = layout.separator == " " and not layout.sheet
@@ -59,10 +60,6 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
         if not layout.is_own and width and len(cells) > width:
             raise ValueError(_too_wide(line, len(cells), width))
         yield line, cells
-
-
-def _is_row(cells):
-    return not is_comment(cells) and "".join(cells).strip("-=_") != ""
 
 
 def _all_rows(layout):

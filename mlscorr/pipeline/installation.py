@@ -171,10 +171,7 @@ def _rendering():
     """Draw in a child process: Open3D aborts its process when the driver is missing."""
     try:
         child = subprocess.run(
-            [sys.executable, "-c", RENDER],
-            capture_output=True,
-            timeout=RENDER_SECONDS,
-            check=False,
+            [sys.executable, "-c", RENDER], capture_output=True, timeout=RENDER_SECONDS, check=False
         )
     except subprocess.TimeoutExpired:
         state = f"no picture within {RENDER_SECONDS} s"

@@ -12,7 +12,7 @@ HEAD = "# Made by mlscorr init. Lines behind # are not known, or need not be: do
 OPTIONAL = {
     "trajectory": ['# accuracy = "smrmsg.out"       # of an SBET, or a POQ of a POF'],
     "control": [
-        '# file = "control.csv"          # surveyed targets; without them passes are only tied',
+        '# file = "control.csv"          # surveyed targets; without them passes are only tied'
     ],
     "mounting": [
         "# How the scanner stands on the POS, by drawing or calibration; calibrate and diagnose",

@@ -153,7 +153,9 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
     while True:
         pairs = pair_features(features, moved, sigma, radius)
-        ties = agreeing_ties(pairs if mountings else pairs[_of_one_scanner(pairs)], moved)
+        if not mountings:  # two scanners tell of their mountings, not of the drift
+            pairs = pairs[pairs.scanner[:, 0] == pairs.scanner[:, 1]]
+        ties = agreeing_ties(pairs, moved)
         if len(ties) == 0:
             return _untied(estimate, features, radius)
         moved = _moved(previewed_correction(estimate, ties, mountings), features)
@@ -162,11 +164,6 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
             unheld = _unheld(estimate, features, ties)
             return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
         radius = max(radius / 2, limit)
-
-
-def _of_one_scanner(ties):
-    """Which ties (n,) are two views of one scanner."""
-    return ties.scanner[:, 0] == ties.scanner[:, 1]
 
 
 def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) -> np.ndarray:

@@ -5,15 +5,7 @@ from matplotlib.figure import Figure
 
 from mlscorr.report.correction_report import CorrectionReport, array, ordered
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.style import (
-    GREY,
-    MARKS,
-    label,
-    legend_above,
-    mark_handles,
-    new_figure,
-    styled,
-)
+from mlscorr.report.style import GREY, MARKS, label, legend_above, mark_handles, new_figure, styled
 
 WORDS = {
     "control": "Control point, 1 sigma",

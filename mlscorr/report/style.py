@@ -142,10 +142,7 @@ def png(figure: Figure) -> bytes:
 
 
 def thin(
-    values: np.ndarray,
-    gps_time: np.ndarray,
-    gaps: np.ndarray,
-    limit: int = SETTINGS.curve_epochs,
+    values: np.ndarray, gps_time: np.ndarray, gaps: np.ndarray, limit: int = SETTINGS.curve_epochs
 ) -> np.ndarray:
     """Rows to draw of curves: each bin's minima and maxima, the ends, the edges of gaps.
 

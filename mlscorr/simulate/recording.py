@@ -110,8 +110,7 @@ def true_mounting(scanner: ScannerScenario) -> Mounting:
     scanner : ScannerScenario
     """
     return Mounting(
-        np.array(scanner.lever_arm),
-        Rotation.from_euler("xyz", scanner.boresight, degrees=True),
+        np.array(scanner.lever_arm), Rotation.from_euler("xyz", scanner.boresight, degrees=True)
     )
 
 

@@ -80,10 +80,7 @@ def _write_cloud(path, survey, blocks, truth, done):
         for block in blocks:
             pulses = block.pulses
             writer.write(
-                block.cloud,
-                pulses.scan_angle,
-                pulses.return_number,
-                pulses.number_of_returns,
+                block.cloud, pulses.scan_angle, pulses.return_number, pulses.number_of_returns
             )
             truth.append("point_xyz", pulses.point)
             truth.append("point_target", survey.scene.target[pulses.triangle].astype(np.int16))

@@ -6,12 +6,7 @@ import numpy as np
 
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Survey, TieFeatures, Ties
-from mlscorr.ties.agreement import (
-    NORMAL_SCATTER,
-    consistent_ties,
-    residuals,
-    weigh_by_time,
-)
+from mlscorr.ties.agreement import NORMAL_SCATTER, consistent_ties, residuals, weigh_by_time
 from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.pairing import pair_features
 from mlscorr.ties.settings import SETTINGS

@@ -68,11 +68,7 @@ def _symmetric(products):
 
 
 def find_shapes(
-    survey: Survey,
-    middle: np.ndarray,
-    begin: np.ndarray,
-    group: np.ndarray,
-    moments: np.ndarray,
+    survey: Survey, middle: np.ndarray, begin: np.ndarray, group: np.ndarray, moments: np.ndarray
 ) -> TieFeatures:
     """The planes and poles among cells.
 

@@ -85,11 +85,7 @@ class _Patch:
 
 
 def collect_beams(
-    survey: Survey,
-    rows: Rows,
-    finding: Any,
-    patches: Patches | None,
-    surroundings: Surroundings,
+    survey: Survey, rows: Rows, finding: Any, patches: Patches | None, surroundings: Surroundings
 ) -> Beams:
     """Beams of the pulses on which rows stand.
 

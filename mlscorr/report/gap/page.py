@@ -2,12 +2,7 @@
 
 from mlscorr.effects.wording import DASH, joined
 from mlscorr.report.gap.accuracy import accuracy_sentence
-from mlscorr.report.gap.channels import (
-    WORDS,
-    channel_rows,
-    channel_statements,
-    distance_rows,
-)
+from mlscorr.report.gap.channels import WORDS, channel_rows, channel_statements, distance_rows
 from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
 from mlscorr.report.gap.first_screen import accuracy, unjudged
 from mlscorr.report.gap.innovations import channel_style

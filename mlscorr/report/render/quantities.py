@@ -6,17 +6,7 @@ import matplotlib
 import numpy as np
 
 from mlscorr.correction import Correction, PointSigma
-from mlscorr.report.style import (
-    AFTER,
-    BEFORE,
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    SKY,
-    VERMILLION,
-)
+from mlscorr.report.style import AFTER, BEFORE, BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION
 from mlscorr.survey import PointCloud, Scanner, Trajectory
 
 COLOURS = ("intensity", "height", "correction", "sigma")

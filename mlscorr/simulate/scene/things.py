@@ -269,10 +269,7 @@ def car(
     skin = four_corners(near, np.roll(near, -1, 0), np.roll(far, -1, 0), far, reflectance)
     sides = [
         np.stack([np.broadcast_to(m, s.shape), s, np.roll(s, -1, 0)], axis=1)
-        for m, s in (
-            (middle - width / 2 * right, near),
-            (middle + width / 2 * right, far),
-        )
+        for m, s in ((middle - width / 2 * right, near), (middle + width / 2 * right, far))
     ]
     sides = np.concatenate(sides)
     return join([skin, Mesh(sides, np.full(len(sides), reflectance))])
