@@ -208,10 +208,10 @@ class Collocation:
 
     def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
-        basis, most = self._leverage[rows], 1.0 - SMALLEST_INFORMATION
-        if np.sum(basis**2) < most:  # of all singular values, which is quick
+        basis, limit = self._leverage[rows], 1.0 - SMALLEST_INFORMATION
+        if np.sum(basis**2) < limit:  # of all singular values, which is quick
             return True
-        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < most)
+        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < limit)
 
     def leave_out(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the other observations say of some: residuals (l - prediction) and covariance.
