@@ -39,7 +39,7 @@ class Neighbourhoods:
         xyz : (n, 3) array
             Units: m.
         """
-        return np.unique(np.concatenate([np.empty(0, int), *self.each(xyz)]))
+        return np.flatnonzero(np.bincount(np.concatenate([np.empty(0, int), *self.each(xyz)])))
 
     def each(self, xyz: np.ndarray) -> list[np.ndarray]:
         """Rows of the points within each ball, in order.

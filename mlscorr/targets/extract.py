@@ -52,8 +52,9 @@ def fit_near_control(
             in_pass, generator = rows[passes[rows] == number], np.random.default_rng(seed)
             for visit in split_visits(cloud.gps_time[in_pass], scanned_from[in_pass]):
                 piece = in_pass[visit]
-                sight = cloud.xyz[piece] - scanned_from[piece]
-                fits = fit_targets(cloud[piece], sight, [shape], survey.scanner, generator)
+                near, sight = cloud[piece], -scanned_from[piece]
+                sight += near.xyz
+                fits = fit_targets(near, sight, [shape], survey.scanner, generator)
                 targets.setdefault(number, []).extend(fits)
     best = [(number, target) for number in sorted(targets) for target in distinct(targets[number])]
     return _with_motion(best, survey)
@@ -67,10 +68,8 @@ def _balls(survey, xyz):
         for index, whole in enumerate(search_radius(survey, surveyed))
         for ball in (SETTINGS.near_radius + surveyed.size[index] / np.sqrt(2), whole)
     ]
-    index, radius = np.array(list(dict.fromkeys(balls))).reshape(-1, 2).T
-    numbers = index.astype(int)
-    near = Neighbourhoods(surveyed.position[numbers], radius)
-    return zip(numbers.tolist(), near.each(xyz), strict=True)
+    for index, radius in dict.fromkeys(balls):  # apart: dense points are in many balls at once
+        yield index, Neighbourhoods(surveyed.position[[index]], np.array([radius])).contains(xyz)
 
 
 def _with_motion(targets, survey):

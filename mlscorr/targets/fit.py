@@ -137,11 +137,12 @@ def fit_targets(
     """
     if len(cloud) < SETTINGS.smallest_count:
         return []
-    order = np.argsort(cloud.gps_time, kind="stable")
-    origin = cloud.xyz.mean(axis=0)
-    time, intensity = cloud.gps_time[order], cloud.intensity[order].astype(float)
+    if (np.diff(cloud.gps_time) < 0).any():
+        order = np.argsort(cloud.gps_time, kind="stable")
+        cloud, sight = cloud[order], sight[order]
+    origin, intensity = cloud.xyz.mean(axis=0), cloud.intensity.astype(float)
     tolerance = max(SETTINGS.thickness, 4 * scanner.range_noise)
-    echoes = Echoes(cloud.xyz[order] - origin, time, intensity, sight[order], tolerance)
+    echoes = Echoes(cloud.xyz - origin, cloud.gps_time, intensity, sight, tolerance)
     blind = why_useless(intensity) is not None
     rough: list[ShapeFit] = []
     for kind, size in shapes:
