@@ -3,8 +3,8 @@
 import re
 import warnings
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +36,7 @@ ROLES = ("control", "check")
 NOTHING_GIVEN = ControlSection(file="")
 
 
-@dataclass(frozen=True)
-class ControlList:
+class ControlList(NamedTuple):
     """The points of a file, and what was understood of it.
 
     Parameters
@@ -53,33 +52,7 @@ class ControlList:
     layout: str | None = None
 
 
-def read_control(path: str | Path) -> tuple[ControlPoints, ControlPoints]:
-    """Control points and check points of a file, either of which may be empty.
-
-    Parameters
-    ----------
-    path : path
-
-    Returns
-    -------
-    control, check : ControlPoints
-
-    Raises
-    ------
-    ValueError
-        For missing columns, names that are missing or doubled, cells that are no numbers, an
-        unknown kind or role, and sizes and sigmas that can't be metres.
-
-    Warns
-    -----
-    UserWarning
-        Of a sigma with which a point hardly counts.
-    """
-    points = read_control_list(path)
-    return points.control, points.check
-
-
-def read_control_list(
+def read_control(
     path: str | Path, section: ControlSection = NOTHING_GIVEN, trajectory: Trajectory | None = None
 ) -> ControlList:
     """Points of control.csv, or of a list as total stations and offices write it.
@@ -99,13 +72,18 @@ def read_control_list(
 
     Raises
     ------
-    ValueError, UserWarning
-        As read_control; also for what can be understood in two ways.
+    ValueError
+        For missing columns, names that are missing or doubled, cells that are no numbers, an
+        unknown kind or role, sizes and sigmas that can't be metres, and what can be understood in
+        two ways.
+
+    Warns
+    -----
+    UserWarning
+        Of a sigma with which a point hardly counts.
     """
-    groups, chosen = (NORMAL,), section.columns.chosen
-    layout = read_layout(
-        path, COLUMNS, groups, CONTROL_NAMES, lacking, chosen, unnamed_columns, HINTS
-    )
+    names = CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns, HINTS
+    layout = read_layout(path, COLUMNS, (NORMAL,), *names)
     layout, given = (layout, {}) if layout.is_own else complete(layout, section, NORMAL)
     lines = list(read_rows(layout, exact=True))
     if not lines:
@@ -121,11 +99,8 @@ def read_control_list(
     control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
-    return ControlList(
-        control,
-        check,
-        None if layout.is_own else sentence_on(layout, has_axes, given, section.check),
-    )
+    sentence = None if layout.is_own else sentence_on(layout, has_axes, given, section.check)
+    return ControlList(control, check, sentence)
 
 
 def holds_points(path: str | Path) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.io.control import NO_POINTS, holds_points, read_control_list
+from mlscorr.io.control import NO_POINTS, holds_points, read_control
 from mlscorr.io.inputs import input_file
 from mlscorr.io.nearness import check_together
 from mlscorr.io.project_sections import ProjectFile
@@ -273,6 +273,6 @@ def _surveyed(path, section, trajectory):
     """Control points, check points, and how their list was understood."""
     if not holds_points(path):
         return NO_POINTS, NO_POINTS, None
-    points = read_control_list(path, section, trajectory)
+    points = read_control(path, section, trajectory)
     check_together(path, points.control + points.check, trajectory)
     return points.control, points.check, points.layout

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mlscorr.io.control import NO_POINTS, holds_points, read_control_list
+from mlscorr.io.control import NO_POINTS, holds_points, read_control
 from mlscorr.io.conversion import conversion_notes
 from mlscorr.io.inputs import input_file
 from mlscorr.io.las import read_chunks, spread_records
@@ -161,7 +161,7 @@ def _surveyed(path, section, trajectory):
     """Control points, check points, and how their list was understood."""
     if path is None or not holds_points(path):
         return NO_POINTS, NO_POINTS, None
-    points = read_control_list(path, section, trajectory)
+    points = read_control(path, section, trajectory)
     check_together(path, points.control + points.check, trajectory)
     return points.control, points.check, points.layout
 

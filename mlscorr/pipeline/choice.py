@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
-from mlscorr.io.control import ControlList, holds_points, read_control_list
+from mlscorr.io.control import ControlList, holds_points, read_control
 from mlscorr.io.folder_roles import FileRole
 from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
 from mlscorr.io.nearness import check_together, far_cloud
@@ -39,7 +39,7 @@ def choose_control(
         section = ControlSection.model_validate({**given, "file": path.name})
         try:
             with warnings.catch_warnings(action="ignore"):
-                read = read_control_list(path, section, trajectory)
+                read = read_control(path, section, trajectory)
         except ValueError as error:
             problems[path] = str(error)
             continue

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from mlscorr.io.control import holds_points, read_control_list
+from mlscorr.io.control import holds_points, read_control
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
@@ -167,12 +167,12 @@ def _control(path, section, trajectory: Trajectory | None, faults):
         return
     if trajectory is None:  # which tells X from Y in a list that does not
         problems = Faults()
-        problems.of("data", read_control_list, path, section)
+        problems.of("data", read_control, path, section)
         for fault in problems.faults:
             if "km of the trajectory" not in fault.sentence:
                 faults.add(fault.where, fault.sentence)
         return
-    points = faults.of("data", read_control_list, path, section, trajectory)
+    points = faults.of("data", read_control, path, section, trajectory)
     if points is not None:
         faults.of("data", check_together, path, points.control + points.check, trajectory)
 

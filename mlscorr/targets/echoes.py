@@ -117,12 +117,11 @@ def missed_points(echoes: Echoes, rows: np.ndarray, plane: Plane) -> np.ndarray:
         return np.empty((0, 2))
     step = np.median(np.concatenate([np.diff(uv[line], axis=0) for line in lines]), axis=0)
     period, advance = _line_advance(echoes.gps_time[rows], uv, lines, step)
-    first, last = lines[0], lines[-1]
     ends = np.array([line[-1] for line in lines])
     starts = np.array([line[0] for line in lines])
     neighbours = [(ends, pulse, step), (starts, -pulse, -step)]
     if np.linalg.norm(advance) > np.linalg.norm(step) / 4:  # else the vehicle stands
-        neighbours += [(last, period, advance), (first, -period, -advance)]
+        neighbours += [(lines[-1], period, advance), (lines[0], -period, -advance)]
     missed = [
         uv[at][~_returned(echoes, echoes.gps_time[rows[at]] + lag, pulse)] + move
         for at, lag, move in neighbours
@@ -164,5 +163,4 @@ def _line_advance(gps_time, uv, lines, step):
     if len(times) == 0:
         return 0.0, np.zeros(2)
     period = np.median(times)
-    single = times < 1.5 * period  # lines that were skipped would make the move longer
-    return float(period), np.median(moves[single], axis=0)
+    return float(period), np.median(moves[times < 1.5 * period], axis=0)  # no line was skipped

@@ -134,7 +134,8 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
     """
     if len(xyz) < 3:
         raise ValueError(f"A plane needs 3 points, there are {len(xyz)}.")
-    local = xyz - xyz.mean(axis=0)
+    middle = xyz.mean(axis=0)
+    local = xyz - middle
     corners = local[(quasi_random(SETTINGS.plane_trials, 3) * len(local)).astype(int)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
@@ -145,13 +146,26 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
         best = most_common(local, corners[:, 0], normals, tolerance)
         inside = np.abs((local - corners[best, 0]) @ normals[best]) <= tolerance
     for _ in range(2):
-        centre = local[inside].mean(axis=0)
-        square, axes = np.linalg.eigh((local[inside] - centre).T @ (local[inside] - centre))
+        centre, square, axes = _least_squares(local, inside)
         sigma = np.sqrt(max(square[0], 0.0) / max(inside.sum() - 3, 1))
         height = np.abs((local - centre) @ axes[:, 0])
-        inside = height <= np.clip(3 * sigma, 1e-3, tolerance)
-    axes = axes.T[::-1]
-    return Plane(xyz.mean(axis=0) + centre, axes, float(sigma), inside)
+        inside = height <= min(max(3 * sigma, 1e-3), tolerance)
+    return Plane(middle + centre, axes.T[::-1], float(sigma), inside)
+
+
+@njit(cache=True, nogil=True)
+def _least_squares(xyz, inside):
+    """Centre of the points that are inside, squares about it along its axes, and these."""
+    centre, squares = np.zeros(3), np.zeros((3, 3))
+    for i in range(len(xyz)):
+        for a in range(3 * inside[i]):
+            centre[a] += xyz[i, a]
+    centre /= inside.sum()
+    for i in range(len(xyz)):
+        for a in range(3 * inside[i]):
+            for b in range(a + 1):
+                squares[a, b] += (xyz[i, a] - centre[a]) * (xyz[i, b] - centre[b])
+    return centre, *np.linalg.eigh(squares)
 
 
 @dataclass(frozen=True)

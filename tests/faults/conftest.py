@@ -31,7 +31,7 @@ def tiny(street, tmp_path_factory):
     folder = tmp_path_factory.mktemp("tiny") / "survey"
     shutil.copytree(street, folder, ignore=shutil.ignore_patterns("truth.*"))
     cloud = laspy.read(folder / "pass-1.laz")
-    control, check = read_control(folder / "control.csv")
+    control, check, _ = read_control(folder / "control.csv")
     places = np.vstack([control.position, check.position])
     away = np.linalg.norm(cloud.xyz[:, None] - places, axis=2).min(axis=1)
     cloud.points = cloud.points[away < NEAR]

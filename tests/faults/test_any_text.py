@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.control import read_control, read_control_list
+from mlscorr.io.control import read_control
 from mlscorr.io.survey_sections import ControlSection, SurveyFile
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory import read_trajectory, write_trajectory_csv
@@ -27,7 +27,7 @@ SURVEY = '[cloud]\nfiles = ["a.las"]\n[trajectory]\nfile = "a.csv"\n[control]\nf
 LIST = "Punkt;Ostwert;Nordwert;Höhe\n"
 OF_ALL = ControlSection(file="", kind="circle", size=0.6, sigma=[0.003, 0.004])
 READERS = {
-    "list.txt": (LIST, lambda path: read_control_list(path, OF_ALL)),
+    "list.txt": (LIST, lambda path: read_control(path, OF_ALL)),
     "drive.txt": (TRAJECTORY.replace(",", "\t"), read_trajectory),
     "control.csv": (CONTROL, read_control),
     "trajectory.csv": (TRAJECTORY, read_trajectory),
@@ -65,7 +65,7 @@ def test_control_is_read_as_it_was_written(tmp_path, rows):
     lines = [f"{','.join(map(str, row))},circle,0.6,control\n" for row in rows]
     path.write_text(CONTROL + "".join(lines), encoding="utf-8")
     with warnings.catch_warnings(action="ignore"):
-        control, check = read_control(path)
+        control, check, _ = read_control(path)
     assert len(check) == 0
     assert list(control.name) == [row[0] for row in rows]
     assert np.array_equal(control.position, np.array([row[1:4] for row in rows], float))

@@ -7,7 +7,7 @@ import openpyxl
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.control import holds_points, read_control_list
+from mlscorr.io.control import holds_points, read_control
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.toml_file import read_toml
 from mlscorr.survey import Trajectory
@@ -28,7 +28,7 @@ def drive():
 def read(folder, content, drive=None, encoding="utf-8", **section):
     path = folder / "list.txt"
     path.write_text(content, encoding=encoding)
-    return read_control_list(path, ControlSection(file="", **{**ALL, **section}), drive)
+    return read_control(path, ControlSection(file="", **{**ALL, **section}), drive)
 
 
 LISTS = {  # what writes such a file: content, its letters, and what is understood
@@ -123,7 +123,7 @@ def test_a_workbook_is_read_from_the_sheet_that_holds_the_table(drive, tmp_path)
     book.create_sheet("leer").append([datetime.datetime(2026, 5, 1), None])
     book.save(tmp_path / "list.xlsx")
     section = ControlSection(file="", **ALL, check=["P*"])
-    points = read_control_list(tmp_path / "list.xlsx", section, drive)
+    points = read_control(tmp_path / "list.xlsx", section, drive)
     assert points.control.name == ("101",) and points.check.name == ("P2",)
     assert points.control.position.tolist() == PLACES[:1]
     assert "(sheet Sheet, decimal point); " in points.layout
@@ -131,10 +131,10 @@ def test_a_workbook_is_read_from_the_sheet_that_holds_the_table(drive, tmp_path)
     book.copy_worksheet(book.active)
     book.save(tmp_path / "list.xlsx")
     with pytest.raises(ValueError, match=r"a table in 2 sheets \(Sheet, Sheet Copy\)"):
-        read_control_list(tmp_path / "list.xlsx", section, drive)
+        read_control(tmp_path / "list.xlsx", section, drive)
     (tmp_path / "list.xlsx").write_text("no zip")
     with pytest.raises(ValueError, match="no workbook of Excel"):
-        read_control_list(tmp_path / "list.xlsx", section, drive)
+        read_control(tmp_path / "list.xlsx", section, drive)
 
 
 @pytest.mark.parametrize("columns", [{"height": "Elevation"}, {

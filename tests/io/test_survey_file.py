@@ -370,7 +370,7 @@ def control(tmp_path, old="", new="", text=CONTROL):
 
 def test_control_is_split_by_role(tmp_path):
     "Control and check points: names, positions, sigmas of E, N, H, kinds, sizes"
-    points, check = read_control(control(tmp_path))
+    points, check, _ = read_control(control(tmp_path))
     assert points.position[1] == pytest.approx([532060.0, 3374008.1746, 42.5047], abs=1e-9)
     assert points.sigma[1].tolist() == [0.002, 0.002, 0.005]
     assert (points.kind, check.kind) == (("circle", "circle"), ("square",))
@@ -383,14 +383,14 @@ def test_control_tolerates_how_tables_are_typed(tmp_path):
     "A byte order mark, blank lines, spaces, quotes, capitals and empty lines of commas are free"
     text = "\ufeff\n" + CONTROL.replace(",", " , ").replace("T01", '"T01, gate"').upper()
     (tmp_path / "control.csv").write_text(text + "\n\n,,,,,,,,\n", encoding="utf-8")
-    points, check = read_control(tmp_path / "control.csv")
+    points, check, _ = read_control(tmp_path / "control.csv")
     assert points.name == ("T01, GATE", "T03")
     assert check.kind == ("square",)
 
 
 def test_control_may_be_of_one_role_only(tmp_path):
     "No check points: an empty ControlPoints, not None"
-    points, check = read_control(control(tmp_path, text=CONTROL.replace("check", "control")))
+    points, check, _ = read_control(control(tmp_path, text=CONTROL.replace("check", "control")))
     assert (len(points), len(check)) == (3, 0)
     assert (points + check).position.shape == (3, 3)
 
@@ -399,7 +399,7 @@ def test_normals_are_optional_by_point(tmp_path):
     "Given normals come out with length one, others as NaN"
     lines = CONTROL.strip().splitlines()
     lines = [lines[0] + ",normal_e,normal_n,normal_h", lines[1] + ",3,0,4", lines[3] + ",,,"]
-    points, _ = read_control(control(tmp_path, text="\n".join([*lines, ""])))
+    points, _, _ = read_control(control(tmp_path, text="\n".join([*lines, ""])))
     assert points.normal[0] == pytest.approx([0.6, 0.0, 0.8])
     assert np.isnan(points.normal[1]).all()
     with pytest.raises(ValueError, match=r"T01 .* normal .*not all zero"):

@@ -28,7 +28,7 @@ def small(street, tmp_path_factory):
     rows = [row for row in rows if row not in checks][:2] + checks[:1]
     (folder / "control.csv").write_text("\n".join([header, *rows]) + "\n")
     cloud = laspy.read(folder / "pass-1.laz")
-    control, check = read_control(folder / "control.csv")
+    control, check, _ = read_control(folder / "control.csv")
     places = (control + check).position
     away = np.linalg.norm(cloud.xyz[:, None] - places, axis=2).min(axis=1)
     cloud.points = cloud.points[away < NEAR]
