@@ -114,10 +114,8 @@ def covariance_given(
     >>> np.sqrt(covariance_given([at_0], [at_15])).round(3)
     array([[0.795]])
     """
-    solved, m = (
-        collocate_rows_dense(observations),
-        sum(part.misclosure.size for part in observations),
-    )
+    solved = collocate_rows_dense(observations)
+    m = len(solved.misclosure)
     size = m + sum(part.misclosure.size for part in sought)
     total = _covariance(_all_sides([*observations, *sought]), np.zeros((size, size)))
     half = solved.solver.whiten(total[m:, :m].T)

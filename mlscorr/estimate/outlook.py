@@ -137,13 +137,9 @@ def with_fewer_rows(equations: Equations) -> Equations:
 def _shown(equations, parameters, rows, partials):
     """SparseRows of what is corrected of points with partials (n, 3, 6) at epochs."""
     times, n = equations.trajectory.gps_time[rows], len(rows)
-    return SparseRows(
-        times[:, None],
-        np.zeros((n, 3)),
-        Noise(np.zeros((n, 3, 3))),
-        equations.pose_design(times)[:, :3],
-        pose_signals(equations.stated_epochs.at(rows), parameters, partials),
-    )
+    noise, design = Noise(np.zeros((n, 3, 3))), equations.pose_design(times)[:, :3]
+    signals = pose_signals(equations.stated_epochs.at(rows), parameters, partials)
+    return SparseRows(times[:, None], np.zeros((n, 3)), noise, design, signals)
 
 
 def _target_partials(equations, rows):
@@ -152,9 +148,8 @@ def _target_partials(equations, rows):
     turned = stated_sigma(trajectory, equations.pos, equations.observed).rotation.as_matrix()
     arm = np.median(turned.swapaxes(1, 2) @ equations.partials[:n, :, 3:] @ turned, axis=0)
     attitude = trajectory.attitude[rows].as_matrix()
-    return np.concatenate(
-        [np.tile(np.eye(3), (len(rows), 1, 1)), attitude @ arm @ attitude.swapaxes(1, 2)], axis=2
-    )
+    still = np.tile(np.eye(3), (len(rows), 1, 1))
+    return np.concatenate([still, attitude @ arm @ attitude.swapaxes(1, 2)], axis=2)
 
 
 def _target_noise(noise, n, sights):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation.covariance import FAMILIES
 from mlscorr.estimate.assembly import position_equations
@@ -130,6 +131,7 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
     return PlannedAccuracy(filled.gps_time[rows], sigma, _places(equations, families, along))
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # the last digit depends on their number
 def _places(equations, families, sigma):
     """NextControl, at most PLACES, by the 3D sigma (n,) at all epochs of the trajectory."""
     families = [family for family in families if family[1] > SETTINGS.smallest_share]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation import leave_each_out
 from mlscorr.estimate.equations import Equations
@@ -31,6 +32,7 @@ class TieValue:
     sufficient: int | None
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # the last digit depends on their number
 def tie_value(estimate: Estimate) -> TieValue:
     """What control points and ties each bring to an estimate.
 

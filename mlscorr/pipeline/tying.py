@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction, PointSigma
 from mlscorr.estimate import (
@@ -94,6 +95,7 @@ def estimate_survey(
     return survey, control, check, finding, estimate
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # the last digit depends on their number
 def estimate_together(
     survey: Survey, control: Matched, features: TieFeatures | None, order: int
 ) -> Estimate:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from mlscorr.estimate import estimate_correction, place_control, predict_accuracy
 from tests.estimate.test_outages import BELIEVED, START, TIME, survey
@@ -35,6 +36,15 @@ def test_the_first_place_lies_in_the_gap_of_control(gapped):
     assert len(others) == 2
     assert others[0].drive_before == first.drive_after
     assert "Between T09" in first.why and "and T10" in first.why
+
+
+def test_places_are_the_same_with_any_number_of_threads(gapped):
+    "Every digit of them by one thread of BLAS and by four"
+    places = []
+    for number in (1, 4):
+        with threadpool_limits(number, user_api="blas"):
+            places.append(place_control(gapped))
+    assert places[0] == places[1]
 
 
 def test_a_target_there_gives_the_sigma_that_was_promised(gapped):
