@@ -131,7 +131,7 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
     return PlannedAccuracy(filled.gps_time[rows], sigma, _places(equations, families, along))
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # the last digit depends on their number
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
 def _places(equations, families, sigma):
     """NextControl, at most PLACES, by the 3D sigma (n,) at all epochs of the trajectory."""
     families = [family for family in families if family[1] > SETTINGS.smallest_share]

@@ -32,7 +32,7 @@ class TieValue:
     sufficient: int | None
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # the last digit depends on their number
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
 def tie_value(estimate: Estimate) -> TieValue:
     """What control points and ties each bring to an estimate.
 

@@ -82,8 +82,8 @@ def read_control(
     UserWarning
         Of a sigma with which a point hardly counts.
     """
-    names = CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns, HINTS
-    layout = read_layout(path, COLUMNS, (NORMAL,), *names)
+    rules = CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns, HINTS
+    layout = read_layout(path, COLUMNS, (NORMAL,), *rules)
     layout, given = (layout, {}) if layout.is_own else complete(layout, section, NORMAL)
     lines = list(read_rows(layout, exact=True))
     if not lines:

@@ -95,7 +95,7 @@ def estimate_survey(
     return survey, control, check, finding, estimate
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # the last digit depends on their number
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
 def estimate_together(
     survey: Survey, control: Matched, features: TieFeatures | None, order: int
 ) -> Estimate:

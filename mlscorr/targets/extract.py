@@ -69,7 +69,7 @@ def _balls(survey, xyz):
         for ball in (SETTINGS.near_radius + surveyed.size[index] / np.sqrt(2), whole)
     ]
     for index, radius in dict.fromkeys(balls):  # apart: dense points are in many balls at once
-        yield index, Neighbourhoods(surveyed.position[[index]], np.array([radius])).contains(xyz)
+        yield index, Neighbourhoods(surveyed.position[[index]], np.array([radius])).each(xyz)[0]
 
 
 def _with_motion(targets, survey):

@@ -137,7 +137,7 @@ def fit_targets(
     """
     if len(cloud) < SETTINGS.smallest_count:
         return []
-    if (np.diff(cloud.gps_time) < 0).any():
+    if not (np.diff(cloud.gps_time) >= 0).all():
         order = np.argsort(cloud.gps_time, kind="stable")
         cloud, sight = cloud[order], sight[order]
     origin, intensity = cloud.xyz.mean(axis=0), cloud.intensity.astype(float)

@@ -157,12 +157,12 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
 def _least_squares(xyz, inside):
     """Centre of the points that are inside, squares about it along its axes, and these."""
     centre, squares = np.zeros(3), np.zeros((3, 3))
-    for i in range(len(xyz)):
-        for a in range(3 * inside[i]):
+    for i in np.flatnonzero(inside):
+        for a in range(3):
             centre[a] += xyz[i, a]
     centre /= inside.sum()
-    for i in range(len(xyz)):
-        for a in range(3 * inside[i]):
+    for i in np.flatnonzero(inside):
+        for a in range(3):
             for b in range(a + 1):
                 squares[a, b] += (xyz[i, a] - centre[a]) * (xyz[i, b] - centre[b])
     return centre, *np.linalg.eigh(squares)
