@@ -5,9 +5,12 @@ from io import BytesIO
 import laspy
 import numpy as np
 import pytest
+from laspy import CopcReader
 
 from mlscorr.pipeline.project import Options, correct_project, project_status
 from tests.beds import project_street as bed
+from tests.beds.copc_files import write_copc
+from tests.beds.las_1_5 import as_las_1_5
 from tests.beds.object_store import object_store
 
 PROJECT, OUT = "s3://city/project.toml", "s3://city/out"
@@ -80,3 +83,26 @@ def test_a_connection_that_is_lost_fails_a_single_file(store, lost):
     assert not result.is_whole
     assert not store.files.exists("city/out/second/tile-1.laz")
     assert resumed(store)[1] == ["second/tile-1.laz"]
+
+
+def test_copc_and_las_1_5_in_a_store_are_corrected_as_on_a_disk(store, tmp_path):
+    "The same bytes from a store into it: an octree that is read by ranges, and LAS 1.5 with offset"
+    folder = bed.write_project(tmp_path, duration=6.0, tiles=2).parent
+    old, older = (folder / "second" / f"tile-{number}.laz" for number in (1, 2))
+    write_copc(old, old.with_suffix(".copc.laz"))
+    as_las_1_5(older, folder / "second" / "new.laz", laspy.read(older).gps_time, flags=0)
+    old.unlink()
+    older.unlink()
+    store.files.put(f"{folder}/", "city/new/", recursive=True)
+    options = Options(page=False)
+    here = correct_project(folder / "project.toml", tmp_path / "out", options)
+    there = correct_project("s3://city/new/project.toml", "s3://city/new/out", options)
+    assert here.document["faults"] == there.document["faults"] == []
+    names = ["first/tile-1.laz", "first/tile-2.laz", "second/new.laz", "second/tile-1.copc.laz"]
+    for name in names:
+        whole = (tmp_path / "out" / name).read_bytes()
+        assert store.files.cat_file(f"city/new/out/{name}") == whole, name
+    assert whole[25] == 4
+    assert (tmp_path / "out" / "second" / "new.laz").read_bytes()[25] == 5
+    with CopcReader(BytesIO(whole)) as reader:
+        assert len(reader.query()) == reader.header.point_count
