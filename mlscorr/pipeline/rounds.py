@@ -49,7 +49,7 @@ class DiagnosedRounds:
     @property
     def document(self) -> dict:
         """That of gap.json of the first round, with ``ablation``."""
-        rounds = []
+        rounds, closed = [], ("before", "after", "unit", "shrink", "kind")
         for number, each in enumerate(self.rounds, start=1):
             verdict, closure = each.inference.verdict, each.closure
             rounds.append(
@@ -58,12 +58,8 @@ class DiagnosedRounds:
                     "label": verdict.label,
                     "probability": float(verdict.probability),
                     "parameters": [asdict(size) for size in each.inference.cause.parameters],
-                    "before": closure.before,
-                    "after": closure.after,
-                    "unit": closure.unit,
-                    "shrink": closure.shrink,
-                    "kind": closure.kind,
                 }
+                | {name: getattr(closure, name) for name in closed}
             )
         lone = [vars(effect) | {"unit": "mm"} for effect in self.lone]
         ablation = {"rounds": rounds, "alone": lone, "ended": self.ended}

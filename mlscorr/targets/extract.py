@@ -43,21 +43,29 @@ def fit_near_control(
     if len(cloud) == 0:
         return []
     _warn_of_intensity(cloud.intensity, surveyed.kind)
-    scanned_from = scanner_path(cloud.gps_time, survey.trajectory, survey.lever_arm)
     seed = rng.integers(2**63)  # of each piece alike: no target depends on another
     targets: dict[int, list[FittedTarget]] = {}
     for index, rows in _balls(survey, cloud.xyz):
         shape = surveyed.kind[index], float(surveyed.size[index])
         for number in np.unique(passes[rows]).tolist():
-            in_pass, generator = rows[passes[rows] == number], np.random.default_rng(seed)
-            for visit in split_visits(cloud.gps_time[in_pass], scanned_from[in_pass]):
-                piece = in_pass[visit]
-                near, sight = cloud[piece], -scanned_from[piece]
-                sight += near.xyz
-                fits = fit_targets(near, sight, [shape], survey.scanner, generator)
+            generator = np.random.default_rng(seed)
+            for piece in _visits(cloud.gps_time, rows[passes[rows] == number], survey):
+                fits = _fit_piece(cloud[piece], shape, survey, generator)
                 targets.setdefault(number, []).extend(fits)
     best = [(number, target) for number in sorted(targets) for target in distinct(targets[number])]
     return _with_motion(best, survey)
+
+
+def _visits(gps_time, rows, survey):
+    """Rows of each visit, of the rows of a pass."""
+    scanned_from = scanner_path(gps_time[rows], survey.trajectory, survey.lever_arm)
+    return [rows[visit] for visit in split_visits(gps_time[rows], scanned_from)]
+
+
+def _fit_piece(cloud, shape, survey, rng):
+    """FittedTargets of one visit; of dense clouds its path is large, and made anew for each."""
+    sight = cloud.xyz - scanner_path(cloud.gps_time, survey.trajectory, survey.lever_arm)
+    return fit_targets(cloud, sight, [shape], survey.scanner, rng)
 
 
 def _balls(survey, xyz):

@@ -76,11 +76,13 @@ def scanner_path(gps_time: np.ndarray, trajectory: Trajectory, lever_arm: np.nda
         spares slerps. Units: m.
     """
     time = trajectory.gps_time
-    after = np.clip(np.searchsorted(time, gps_time), 1, len(time) - 1)
-    epoch = after - (gps_time - time[after - 1] < time[after] - gps_time)
-    epochs, which = np.unique(epoch, return_inverse=True)
-    position = [np.interp(gps_time, time, axis) for axis in trajectory.position.T]
-    return np.column_stack(position) + trajectory.attitude[epochs].apply(lever_arm)[which]
+    epoch = np.clip(np.searchsorted(time, gps_time), 1, len(time) - 1)
+    epoch -= gps_time - time[epoch - 1] < time[epoch] - gps_time
+    epochs = np.unique(epoch)
+    path = trajectory.attitude[epochs].apply(lever_arm)[np.searchsorted(epochs, epoch)]
+    for axis, position in enumerate(trajectory.position.T):
+        path[:, axis] += np.interp(gps_time, time, position)
+    return path
 
 
 def motion_covariance(
