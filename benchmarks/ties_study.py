@@ -147,7 +147,7 @@ def main():
                 ties = feature_ties(survey, seed, STREETS[street], arguments.wrong)
                 with warnings.catch_warnings(action="ignore"):
                     correction = (
-                        previewed_correction(estimate, ties)
+                        previewed_correction(estimate, ties, with_sigmas=True)
                         if arguments.preview
                         else with_ties(estimate, ties).correction
                     )

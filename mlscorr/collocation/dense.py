@@ -259,6 +259,7 @@ class DenseSolver:
         columns : (m, p + 1) array
             [A, l - A x].
         trend, trend_root : (p,), (p, p) array
+            The root is None where only means are asked for.
         """
         whitened = self.whiten(columns)
 
@@ -273,6 +274,8 @@ class DenseSolver:
             cross = np.add.reduceat(cross, self.first, axis=2)  # D_Lambda'Lambda B^T
             half = self.whiten(cross.reshape(-1, cross.shape[2]).T).T.reshape(cross.shape)
             mean = design @ trend + half @ whitened[:, -1]  # Eq. 15
+            if trend_root is None:
+                return (mean,)
             # Covariance of the error: signal, less what was observed of it, plus trend
             left = (design - half @ whitened[:, :-1]) @ trend_root
             return mean, prior - half @ half.swapaxes(1, 2) + left @ left.swapaxes(1, 2)
@@ -286,7 +289,6 @@ class DenseSolver:
                 )
                 for i in starts
             ]
-            mean, covariance = zip(*parts, strict=True)
-            return np.concatenate(mean), np.concatenate(covariance)
+            return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
         return in_chunks

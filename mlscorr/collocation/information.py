@@ -157,7 +157,8 @@ class InformationSolver:
         """The predictor of the rows' own columns, whatever is given; see Collocation.predict."""
         states = self._own_states.copy()
         states[:, -1] -= states[:, :-1] @ trend
-        table = self.layout, self.knots, self.pattern, self._cells, states, self._inverse
+        inverse = np.empty(0) if trend_root is None else self._inverse
+        table = self.layout, self.knots, self.pattern, self._cells, states, inverse
         return predictor_by(
             lambda epochs: interpolate_knots(*table, epochs), self.layout, trend, trend_root
         )

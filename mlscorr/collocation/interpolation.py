@@ -123,7 +123,8 @@ def _gather_knots(pattern, nodes, slots, states, inverse, about):
     columns, joint = about.columns, about.joint
     slot, local = slots
     positions = np.zeros((nodes.size, nodes.size), dtype=np.int64)
-    for a in range(nodes.size):
+    is_known = inverse.size > 0
+    for a in range(nodes.size if is_known else 0):
         for b in range(nodes.size):
             if nodes[a] >= nodes[b] >= 0:
                 positions[a, b] = locate(pattern, nodes[a], nodes[b])
@@ -133,7 +134,7 @@ def _gather_knots(pattern, nodes, slots, states, inverse, about):
             columns[u, c] = 0.0 if node < 0 else states[pattern.first[node] + local[u], c]
         for v in range(slot.size):
             other = nodes[slot[v]]
-            if node < 0 or other < 0:
+            if node < 0 or other < 0 or not is_known:
                 joint[u, v] = 0.0
             elif node >= other:
                 width = panel_width(pattern, other)
@@ -163,7 +164,7 @@ def interpolate_knots(
     states : (n, p + 1) array
         Estimated from the columns [A, l - A x].
     inverse : (v,) array
-        Values of the selected inverse.
+        Values of the selected inverse; none where only means are asked for.
     epochs : Epochs
     """
     size = layout.states[layout.signal].sum()
@@ -182,7 +183,7 @@ def interpolate_knots(
 def predictor_by(
     fill: Callable, layout: Layout, trend: np.ndarray, trend_root: np.ndarray
 ) -> Callable:
-    """A predictor as ``Collocation.predict`` calls it, in chunks.
+    """A predictor as ``Collocation.predict`` calls it, in chunks: mean and covariance.
 
     Parameters
     ----------
@@ -190,7 +191,9 @@ def predictor_by(
         Which fills them.
     layout : Layout
     trend, trend_root : (p,), (p, p) array
+        The root is None where only means are asked for.
     """
+    root = np.zeros((len(trend), len(trend))) if trend_root is None else trend_root
     processes = np.bincount(layout.signal, minlength=layout.states.size).tolist()
 
     def predict(gps_time, clocks, design, mixings):
@@ -212,11 +215,11 @@ def predictor_by(
                 np.ascontiguousarray(design[part], dtype=float),
                 np.concatenate(blocks, axis=2),
                 trend,
-                trend_root,
+                root,
                 mean[part],
                 covariance[part],
             )
             fill(epochs)
-        return mean, covariance
+        return (mean,) if trend_root is None else (mean, covariance)
 
     return predict

@@ -207,6 +207,7 @@ class MarkovSolver:
         columns : (m, p + 1) array
             [A, l - A x].
         trend, trend_root : (p,), (p, p) array
+            The root is None where only means are asked for.
         """
         nodes = self._smooth(self._without_shared(columns))[1]
         table = (self.gps_time, self.clocks, self.layout, nodes, *self._node_covariances)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,9 +11,7 @@ import numpy as np
 
 from mlscorr.collocation.covariance import Covariance
 
-SMALLEST_INFORMATION = (
-    1e-9  # least share of the trend's information that must remain without some rows
-)
+SMALLEST_INFORMATION = 1e-9  # least share of the trend's that must remain without some rows
 LARGEST_ERROR = 0.01  # of the log-likelihood by rounding: parameters differ by more than that
 NOT_POSITIVE = (
     "The covariance of the {} misclosures is not positive definite: two observations of one time "
@@ -191,6 +189,17 @@ class Collocation:
         )
         return self._predictor(gps_time, clocks, design, mixings)
 
+    def predict_mean(
+        self,
+        gps_time: np.ndarray,
+        design: np.ndarray,
+        mixings: Sequence[np.ndarray],
+        clocks: Sequence[np.ndarray | None] | None = None,
+    ) -> np.ndarray:
+        """The mean (q, r) of ``predict`` by itself, which sparse rows know without an inverse."""
+        without_sigmas = replace(self, trend_root=None)
+        return without_sigmas.predict(gps_time, design, mixings, clocks)[0]
+
     @cached_property
     def _predictor(self):
         columns = np.column_stack([self.design, self.misclosure - self.design @ self.trend])
@@ -254,7 +263,7 @@ def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Coll
     solver : DenseSolver or MarkovSolver
         Of V. It has ``whiten(columns)``, of which W^T W = c^T V^-1 c; ``log_determinant``;
         ``solve(columns)``, V^-1 c; ``precision(rows)``, a block of V^-1; ``predictor(columns,
-        trend, root)``.
+        trend, root)``, of means alone where the root is None.
     misclosure, design : (m,), (m, p) array
 
     Raises

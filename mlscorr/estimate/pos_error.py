@@ -19,7 +19,7 @@ from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.orders import Alternative, affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.posterior import Objective, Posterior
-from mlscorr.estimate.prediction import predict_pose_error, predict_under
+from mlscorr.estimate.prediction import pose_rows, predict_pose_error
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.runs import find_windows, with_windows
 from mlscorr.estimate.screening import Outlier, Screening, screen
@@ -210,7 +210,7 @@ def with_ties(estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def previewed_correction(
-    estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
+    estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = (), with_sigmas: bool = False
 ) -> Correction:
     """The correction with ties that were paired so far, under parameters that they didn't choose.
 
@@ -220,10 +220,13 @@ def previewed_correction(
         By control points alone.
     ties, mountings : Ties, sequence of Mounting
         As of with_ties.
+    with_sigmas : bool
+        They cost as much as the correction itself.
     """
     before, rows = _tie_equations(estimate.equations, ties, mountings)
     weighed = robust_ties(before, estimate.parameters, rows)
-    pose = predict_under(weighed.equations, weighed.parameters, solved=weighed.solved)
+    asked, solved = pose_rows(weighed.equations, weighed.parameters), weighed.solved
+    pose = solved.predict(*asked) if with_sigmas else (solved.predict_mean(*asked),)
     return Correction.by_pose_error(estimate.correction.recorded, *pose)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from mlscorr.collocation import Collocation
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Posterior
 from mlscorr.estimate.settings import SETTINGS
@@ -103,10 +102,7 @@ def _interpolated(gps_time, rows, values):
 
 
 def predict_under(
-    equations: Equations,
-    parameters: SignalParameters,
-    rows: slice | np.ndarray = slice(None),
-    solved: Collocation | None = None,
+    equations: Equations, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pose error (k, 6) and covariance (k, 6, 6) at some epochs under given parameters.
 
@@ -116,14 +112,22 @@ def predict_under(
     parameters : SignalParameters
     rows : slice or (k,) int array
         Of the trajectory's epochs; all by default.
-    solved : Collocation, optional
-        Of the equations under these parameters, where it is known.
+    """
+    return equations.solve(parameters).predict(*pose_rows(equations, parameters, rows))
+
+
+def pose_rows(
+    equations: Equations, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
+) -> tuple:
+    """What a Collocation is asked for the pose at some epochs: times, design, mixings, clocks.
+
+    Parameters
+    ----------
+    equations, parameters, rows
+        As of predict_under.
     """
     gps_time = equations.trajectory.gps_time[rows]
     partials = np.broadcast_to(np.eye(6), (len(gps_time), 6, 6))
     signals = pose_signals(equations.stated_epochs.at(rows), parameters, partials)
     mixings = [signal.mixing for signal in signals]
-    clocks = [signal.clock for signal in signals]
-    design = equations.pose_design(gps_time)
-    solved = equations.solve(parameters) if solved is None else solved
-    return solved.predict(gps_time, design, mixings, clocks)
+    return gps_time, equations.pose_design(gps_time), mixings, [s.clock for s in signals]

@@ -22,7 +22,7 @@ from mlscorr.estimate.mounting import (
     georeferenced_anew,
     linearized,
 )
-from mlscorr.estimate.prediction import predict_under
+from mlscorr.estimate.prediction import pose_rows
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.estimate.tie_weights import WeighedTies, graduated
@@ -71,7 +71,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
 def previewed_mounting(calibration: Calibration, matched: Matched, ties: Ties) -> Correction:
     """The correction by mounting and POS error with ties that were paired so far.
 
-    Under the parameters of the control points alone.
+    Under the parameters of the control points alone, and without sigmas.
 
     Parameters
     ----------
@@ -83,8 +83,9 @@ def previewed_mounting(calibration: Calibration, matched: Matched, ties: Ties) -
     parameters = calibration.parameters[0][0]
     tied, correction = _converged(calibration, matched, ties, parameters)
     mounting = corrected_mounting(calibration.recorded, correction)
-    pose = predict_under(tied.equations, parameters, solved=tied.solved)
-    return Correction.by_pose_error(calibration.trajectory, *pose, calibration.recorded, mounting)
+    pose = tied.solved.predict_mean(*pose_rows(tied.equations, parameters))
+    trajectory, recorded = calibration.trajectory, calibration.recorded
+    return Correction.by_pose_error(trajectory, pose, None, recorded, mounting)
 
 
 def _converged(calibration, matched, ties, parameters) -> tuple[WeighedTies, np.ndarray]:

@@ -138,13 +138,16 @@ class Street:
         "Signals of the pose at the epochs that are asked"
         return self.signals(self.asked, np.tile(np.eye(6), (len(self.asked), 1, 1)))
 
-    def predict(self, solved):
-        "Mean (q, 6) and sigma (q, 6) by a solved collocation"
+    @property
+    def asked_rows(self):
+        "Times, design, mixings and clocks of the pose at the epochs that are asked"
         signals = self.asked_signals
         design = np.tile(np.eye(6, 3), (len(self.asked), 1, 1))
-        mean, covariance = solved.predict(
-            self.asked, design, [s.mixing for s in signals], [s.clock for s in signals]
-        )
+        return self.asked, design, [s.mixing for s in signals], [s.clock for s in signals]
+
+    def predict(self, solved):
+        "Mean (q, 6) and sigma (q, 6) by a solved collocation"
+        mean, covariance = solved.predict(*self.asked_rows)
         return mean, np.sqrt(np.einsum("qii->qi", covariance))
 
 

@@ -24,6 +24,14 @@ def test_weights_divide_the_variance_of_the_noise():
         assert np.abs(here - there).max() < 1e-9
 
 
+def test_means_are_known_without_an_inverse_and_are_those_with_sigmas():
+    "Means alone are those that come with covariances to the last digit, and no L^-1 is worked out"
+    solved = collocate_rows(STREET.rows)
+    mean = solved.predict_mean(*STREET.asked_rows)
+    assert "_inverse" not in solved.solver.__dict__
+    assert (mean == solved.predict(*STREET.asked_rows)[0]).all()
+
+
 def test_a_millionth_of_weight_leaves_a_wrong_tie_out():
     "A tie that is wrong by 5 m moves the result by less than 0.1 mm"
     control, ties = STREET.rows

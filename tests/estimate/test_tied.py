@@ -121,7 +121,7 @@ def test_what_ties_of_a_second_share_is_held_down_by_their_weights():
         survey = tied_passes(seed, shared=0.01)
         alone = estimate_correction(survey.trajectory, survey.matched)
         for column, ties in enumerate((survey.ties, weigh_by_time(survey.ties))):
-            correction = previewed_correction(alone, ties)
+            correction = previewed_correction(alone, ties, with_sigmas=True)
             harm[row, column] = rms(survey.left(correction))
             after = TieResiduals.of(ties, np.ones(len(ties), bool), correction).after
             residual[row, column] = np.median(np.abs(after))

@@ -255,9 +255,7 @@ def _with_noise(cause, rows, signatures, evidence, name):
     detectable = detectable_size(rows, evidence.observations, kind)
     more = CauseParameter("magnitude", kind.units[0], size, sigma, detectable)
     cause = replace(
-        cause,
-        parameters=(*cause.parameters, more),
-        parts=(*cause.parts, (kind, np.array([size]))),
+        cause, parameters=(*cause.parameters, more), parts=(*cause.parts, (kind, np.array([size])))
     )
     if kind.is_common:
         return replace(cause, model=replace(cause.model, fixes=size))

@@ -84,10 +84,7 @@ class ColumnTable:
 
 
 def column_table(
-    rows: Rows,
-    signatures: Sequence[Signature],
-    unknown: Sequence[UnknownBlock],
-    sigma: np.ndarray,
+    rows: Rows, signatures: Sequence[Signature], unknown: Sequence[UnknownBlock], sigma: np.ndarray
 ) -> ColumnTable:
     """Columns of the signatures that shift the metric rows, and of unknown blocks.
 

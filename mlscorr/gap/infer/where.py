@@ -235,11 +235,7 @@ def _bins(rows, row, by):
     if len(edges) < 2:
         return None, (), None
     number = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-    return (
-        edges,
-        tuple(f"{a:.4g} to {b:.4g}" for a, b in pairwise(edges)),
-        number,
-    )
+    return edges, tuple(f"{a:.4g} to {b:.4g}" for a, b in pairwise(edges)), number
 
 
 def _of_headline(splits, acts):
