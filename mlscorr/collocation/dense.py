@@ -282,13 +282,8 @@ class DenseSolver:
 
         def in_chunks(gps_time, clocks, design, mixings):
             step = max(CHUNK // (design.shape[1] * len(self.clocks)), 1)
-            starts = range(0, max(len(gps_time), 1), step)
-            parts = [
-                predict(
-                    clocks[i : i + step], design[i : i + step], [m[i : i + step] for m in mixings]
-                )
-                for i in starts
-            ]
+            chunks = [slice(i, i + step) for i in range(0, max(len(gps_time), 1), step)]
+            parts = [predict(clocks[c], design[c], [m[c] for m in mixings]) for c in chunks]
             return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
         return in_chunks

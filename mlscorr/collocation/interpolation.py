@@ -123,8 +123,7 @@ def _gather_knots(pattern, nodes, slots, states, inverse, about):
     columns, joint = about.columns, about.joint
     slot, local = slots
     positions = np.zeros((nodes.size, nodes.size), dtype=np.int64)
-    is_known = inverse.size > 0
-    for a in range(nodes.size if is_known else 0):
+    for a in range(nodes.size):
         for b in range(nodes.size):
             if nodes[a] >= nodes[b] >= 0:
                 positions[a, b] = locate(pattern, nodes[a], nodes[b])
@@ -134,7 +133,7 @@ def _gather_knots(pattern, nodes, slots, states, inverse, about):
             columns[u, c] = 0.0 if node < 0 else states[pattern.first[node] + local[u], c]
         for v in range(slot.size):
             other = nodes[slot[v]]
-            if node < 0 or other < 0 or not is_known:
+            if node < 0 or other < 0 or inverse.size == 0:
                 joint[u, v] = 0.0
             elif node >= other:
                 width = panel_width(pattern, other)

@@ -197,8 +197,7 @@ class Collocation:
         clocks: Sequence[np.ndarray | None] | None = None,
     ) -> np.ndarray:
         """The mean (q, r) of ``predict`` by itself, which sparse rows know without an inverse."""
-        without_sigmas = replace(self, trend_root=None)
-        return without_sigmas.predict(gps_time, design, mixings, clocks)[0]
+        return replace(self, trend_root=None).predict(gps_time, design, mixings, clocks)[0]
 
     @cached_property
     def _predictor(self):

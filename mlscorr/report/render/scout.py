@@ -42,11 +42,15 @@ def scout(
     ValueError
         For a cloud without points.
     """
-    near, sample = [[] for _ in targets], EvenSample(SETTINGS.sample_points)
+    near = [[np.empty((0, 4))] for _ in targets]
+    sample, radii = EvenSample(SETTINGS.sample_points), 0.4 * sizes
+    centres = np.array([row.observed for row in targets]).reshape(-1, 3)
     for cloud in chunks:
         sample.add(cloud)
-        for parts, row, size in zip(near, targets, sizes, strict=True):
-            parts.append(_around(cloud, row.observed, 0.4 * size))
+        low, high = cloud.xyz.min(axis=0, initial=np.inf), cloud.xyz.max(axis=0, initial=-np.inf)
+        apart = np.maximum(low - centres, centres - high).max(axis=1)
+        for k in np.flatnonzero(apart <= radii):  # not every target in every chunk
+            near[k].append(_around(cloud, centres[k], radii[k]))
     if not sample.count:
         raise ValueError("The cloud has no points: there is nothing to draw.")
     before = PointCloud.concatenate(sample.parts)
