@@ -11,7 +11,7 @@ import numpy as np
 
 from mlscorr.collocation.covariance import Covariance
 
-SMALLEST_INFORMATION = 1e-9  # least share of the trend's that must remain without some rows
+SMALLEST_INFORMATION = 1e-9  # least share of the trend's information left without some rows
 LARGEST_ERROR = 0.01  # of the log-likelihood by rounding: parameters differ by more than that
 NOT_POSITIVE = (
     "The covariance of the {} misclosures is not positive definite: two observations of one time "

@@ -221,7 +221,7 @@ def previewed_correction(
     ties, mountings : Ties, sequence of Mounting
         As of with_ties.
     with_sigmas : bool
-        They cost as much as the correction itself.
+        Of the corrected trajectory: they need the inverse of the normal equations.
     """
     before, rows = _tie_equations(estimate.equations, ties, mountings)
     weighed = robust_ties(before, estimate.parameters, rows)

@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Noise, collocate_rows, leave_each_out, reweight
+from mlscorr.collocation import (
+    Noise,
+    collocate_rows,
+    collocate_rows_dense,
+    leave_each_out,
+    reweight,
+)
 from tests.beds.linked_rows import Street
 
 STREET = Street("matern32", 60.0, targets=5, ties=30)
@@ -30,6 +36,8 @@ def test_means_are_known_without_an_inverse_and_are_those_with_sigmas():
     mean = solved.predict_mean(*STREET.asked_rows)
     assert "_inverse" not in solved.solver.__dict__
     assert (mean == solved.predict(*STREET.asked_rows)[0]).all()
+    dense = collocate_rows_dense(STREET.rows)
+    assert (dense.predict_mean(*STREET.asked_rows) == STREET.predict(dense)[0]).all()
 
 
 def test_a_millionth_of_weight_leaves_a_wrong_tie_out():

@@ -70,6 +70,8 @@ def test_recursion_equals_the_dense_formula(seed, families):
     assert_same(solved, expected, 1e-9)
     for here, there in zip(survey.predict(solved), survey.predict(expected), strict=True):
         assert np.abs(here - there).max() < 1e-9
+    asked = survey.asked, survey.asked_design, survey.asked_mixing
+    assert np.array_equal(solved.predict_mean(*asked), solved.predict(*asked)[0])
     for rows in ([0, 1, 2], [9], [40, 3, 16, 17], list(range(6, 18))):
         assert solved.determined_without(rows) == expected.determined_without(rows)
         for here, there in zip(solved.leave_out(rows), expected.leave_out(rows), strict=True):
