@@ -109,6 +109,8 @@ def exact_fit(echoes: Echoes, fit: ShapeFit, scanner: Scanner) -> ShapeFit | Non
     if 2 * fit.on_target.sum() < SETTINGS.smallest_count:
         return None
     fit = _refined(echoes, fit)
+    if not fit.on_target.any():
+        return None
     seed, kind, ring = fit.seed, fit.kind, fit.outline.inner > 0
     points, state, rows = fit.beams
     blur, footprint = _blur(echoes, fit, scanner)
@@ -138,8 +140,9 @@ def _refined(echoes, fit):
         inside = distance_inside(points, fit.outline.row, form_of(fit.kind, False))
         beyond = inside < -2 * SETTINGS.rough_blur * fit.outline.size
         bright = echoes.intensity[rows[(state != MISS) & (inside > 0)]]
-        beams, level = _with_threshold(echoes.intensity, beams, bright, beyond, seed.threshold)
-        seed = replace(seed, threshold=float(level))
+        if len(bright):
+            beams, level = _with_threshold(echoes.intensity, beams, bright, beyond, seed.threshold)
+            seed = replace(seed, threshold=float(level))
     return replace(fit, seed=seed, beams=beams)
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from target_rays import SCANNER, TARGETS, view
 
+from mlscorr.survey import PointCloud
 from mlscorr.targets.fit import fit_targets
 
+UTM = np.array([532_000.0, 3_374_000.0, 40.0])  # m
 SIZE = 0.6  # m
 VIEWS = 6
 STEP = 1.5e-3  # rad between pulses: sparse, which is quick
@@ -100,3 +102,22 @@ def test_the_view_holds_what_a_figure_shows():
     assert len(shown.points) == len(shown.state) == len(shown.bright)
     assert np.mean((radius < SIZE / 2) == shown.bright) > 0.97
     assert shown.covariance.shape == (2, 2)
+
+
+@pytest.mark.parametrize("seed", [129, 930, 1058])
+def test_a_twig_whose_plane_turns_away_from_it_is_no_target(seed):
+    "A bright thin twig that a beam grazes: on the plane through its points none is left, nor found"
+    rng = np.random.default_rng(seed)
+    count = rng.integers(30, 80)
+    axes = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    extent = [0.17, rng.uniform(0.02, 0.06), rng.uniform(0.01, 0.03)]  # m
+    twig = rng.standard_normal((count, 3)) * extent @ axes.T
+    xyz = np.vstack([twig, rng.uniform(-1.5, 1.5, (300, 3))])
+    intensity = np.r_[rng.uniform(10_000, 30_000, count), rng.uniform(500, 3000, 300)]
+    order = rng.permutation(len(xyz))
+    across = rng.choice([-1, 1]), rng.uniform(0.0, 0.4), rng.uniform(-1, 1)
+    beam = across @ axes[:, [1, 2, 0]].T
+    sight = xyz + 8 * beam / np.linalg.norm(beam)
+    time = 357_700.0 + np.arange(len(xyz)) * 1e-5
+    cloud = PointCloud(xyz[order] + UTM, time, intensity[order].astype(np.uint16))
+    assert fit_targets(cloud, sight[order], [("square", SIZE)], SCANNER, rng) == []
