@@ -67,9 +67,8 @@ def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
     """
     for s in range(layout.states.size):
         f = transition(layout.kinds[s], spans[s] * layout.rates[s])
-        out[s, 0, 0], out[s, 0, 1], out[s, 0, 2] = f[0], f[1], f[2]
-        out[s, 1, 0], out[s, 1, 1], out[s, 1, 2] = f[3], f[4], f[5]
-        out[s, 2, 0], out[s, 2, 1], out[s, 2, 2] = f[6], f[7], f[8]
+        for k in range(9):
+            out[s, k // 3, k % 3] = f[k]
 
 
 @njit(cache=True, nogil=True)

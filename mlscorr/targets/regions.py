@@ -60,7 +60,7 @@ def bright_regions(xyz: np.ndarray, intensity: np.ndarray) -> list[BrightRegion]
     edge = 2 * SETTINGS.largest_size / 3  # of a third of a neighbourhood
     cell, keys_of, keys, number = number_voxels(xyz, low, edge)
     dark = _background(cell, keys_of, keys, number, level)
-    bright = _bright_rows(cell, level, dark)
+    bright = np.flatnonzero(level > dark[cell])
     thick, long = SETTINGS.thickness, 1 / SETTINGS.smallest_width
     limits = SETTINGS.smallest_count, np.sqrt(2) * SETTINGS.largest_size, thick, long
     table = _component_tree(xyz[bright] - low, level[bright], SETTINGS.largest_size / 10, limits)
@@ -98,17 +98,6 @@ def _background(cell, keys_of, keys, number, level):
         # a road or wall passes through 9 of the 27 cells; a plate in the air is all there is
         dark[c] = step if occupied >= 9 else -1
     return dark
-
-
-@njit(cache=True)
-def _bright_rows(cell, level, dark):
-    """Rows (k,) of the points brighter than the background of their cell."""
-    rows, count = np.empty(len(cell), np.int64), 0
-    for i in range(len(cell)):
-        if level[i] > dark[cell[i]]:
-            rows[count] = i
-            count += 1
-    return rows[:count].copy()
 
 
 @njit(cache=True)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numba import njit
+from scipy.sparse import coo_array
 
 EMPTY = -1
 
@@ -77,7 +78,6 @@ def number_voxels(xyz: np.ndarray, low: np.ndarray, edge: float) -> tuple[np.nda
     return of_point, known[:count].copy(), keys, number
 
 
-@njit(cache=True)
 def sort_by_voxel(cell: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Rows (n,) sorted by cell, and where each cell starts among them (count + 1,).
 
@@ -88,15 +88,9 @@ def sort_by_voxel(cell: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]
     count : int
         Of cells.
     """
-    starts = np.zeros(count + 1, np.int64)
-    for i in range(len(cell)):
-        starts[cell[i] + 1] += 1
-    starts = np.cumsum(starts)
-    free, order = starts[:-1].copy(), np.empty(len(cell), np.int64)
-    for i in range(len(cell)):
-        order[free[cell[i]]] = i
-        free[cell[i]] += 1
-    return order, starts
+    rows = np.arange(len(cell))  # a matrix sorts its entries by counting
+    matrix = coo_array((rows, (cell, rows)), shape=(count, len(cell))).tocsr()
+    return matrix.indices, matrix.indptr
 
 
 @njit  # numba can't call a generator that it read from its cache
