@@ -25,6 +25,7 @@ import mlscorr
 from mlscorr.io.control import NO_POINTS
 from mlscorr.io.las import read_chunks
 from mlscorr.simulate import Scenario, simulate
+from mlscorr.survey import PointCloud
 from mlscorr.targets import collect
 from mlscorr.targets.clusters import connected
 
@@ -129,7 +130,10 @@ def cluster_table(folder):
     import open3d
 
     survey = mlscorr.read_survey(folder)
-    near = collect(survey, read_chunks).cloud
+    parts = []
+    nothing = [lambda *_: None] * 3
+    collect(survey, read_chunks, nothing[0], parts.append, *nothing[1:])
+    near = PointCloud.concatenate(parts)
     bright = near.xyz[near.intensity >= np.percentile(near.intensity, 90)]
     bright -= bright.mean(axis=0)
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(bright))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.survey import PointCloud, Scanner
+from mlscorr.targets import ScannerPath
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM
 START = 413_200.0  # s
@@ -35,10 +36,10 @@ class Surface:
 
 @dataclass(frozen=True)
 class View:
-    "One piece of cloud, the beams, and the truth"
+    "One piece of cloud, the way of the scanner, and the truth"
 
     cloud: PointCloud
-    sight: np.ndarray
+    path: ScannerPath
     centre: np.ndarray
     gps_time: float
     on_target: int
@@ -158,10 +159,12 @@ def _scan(surfaces, centre, sight, size, step, rng, own):
     near = seen & (np.linalg.norm(xyz - centre, axis=1) < 3.0)
     order = np.flatnonzero(near)[np.argsort(time[near], kind="stable")]
     cloud = PointCloud(np.round(xyz[order] + ORIGIN, 3), START + time[order], counts[order])
+    line_time = START + np.arange(len(lines)) * period + 0.01
+    path = ScannerPath(line_time, np.outer(lines, [0.0, 1.0, 0.0]) + ORIGIN)
     middle = (0.0 - lines[0]) / LINES * period + 0.01
     return View(
         cloud,
-        measured[order, None] * beam[order],
+        path,
         centre + ORIGIN,
         START + middle,
         int((hit[order] < own - (own > 1)).sum()),

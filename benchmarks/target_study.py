@@ -32,7 +32,7 @@ def look_at(look, size, condition, seed, known=True):
     rng = np.random.default_rng([seed, len(look), int(1000 * size)])
     seen = view(look, size, rng, *CONDITIONS[condition])
     shape = TARGETS[look][0], size if known else None
-    found = fit_targets(seen.cloud, seen.sight, [shape], SCANNER, rng)
+    found = fit_targets(seen.cloud, seen.path, [shape], SCANNER, rng)
     off = [np.linalg.norm(target.position - seen.centre) for target in found]
     false = sum(distance > size / 2 for distance in off)
     if len(found) == 0 or min(off) > size / 2:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from mlscorr.targets import (
     PassTarget,
     as_observations,
     collect,
+    distinct,
     fit_near_control,
 )
 
@@ -91,8 +93,8 @@ def _checked(survey, targets, candidates, near):
         reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
         raise ValueError(
             f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
-            f"were found (intensity {near.darkest:.0f} to {near.brightest:.0f} there). {reasons} "
-            "Are control and cloud in the same CRS?"
+            f"were found ({near.intensities} there). {reasons} Are control and cloud in the same "
+            "CRS?"
         )
     names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
     return replace(finding, scanned=names, warnings=sentences)
@@ -115,35 +117,43 @@ def fit_while_reading(
     rng, progress
         As of ``find_targets``, progress already with its title.
     settle : function, optional
-        ``settle(fitted, since)`` is told of each FittedTarget, and of the time (s) before which
-        no other will have points.
+        ``settle(fitted, since)`` is given the FittedTargets since its last call, and the time (s)
+        before which none to come will have points.
 
     Returns
     -------
     targets : list of (pass number, FittedTarget)
-        In order of pass and time.
+        In order of pass and time. Of fits that overlap, the best: the order of the surveyed points
+        decides nothing.
     candidates : Candidates
-        Those that are left, which hold the passes and the points without a pose.
+        None, with the passes and the points without a pose.
     near : NearPoints
+
+    Warns where the intensity tells nothing.
     """
-    rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
-    seed = rng.integers(2**63)
-    fitted, near = [], NearPoints.of(survey)
+    seed = (rng or np.random.default_rng(SETTINGS.seed)).integers(2**63)
+    fits, latest, near = [], [], NearPoints(survey)
 
-    def finished(file, cloud, segment, since):
-        targets = []
-        if len(cloud):
-            near.add(cloud)
-            generator = np.random.default_rng(seed)  # whatever was looked at before
-            part = Candidates(cloud, segment, NO_POINTS, {})
-            targets = fit_near_control(part, survey.of(survey.clouds[file]), generator)
-        fitted.extend((file, *target) for target in targets)
+    def fit(file, index, cloud):
+        near.add_ball(index, cloud)
+        generator = np.random.default_rng(seed)  # whatever was looked at before
+        targets = fit_near_control(index, cloud, survey.of(survey.clouds[file]), generator)
+        latest.extend(target for _, target in targets)
+        fits.extend((index, (file, number), target) for number, target in targets)
+
+    def settled(since):
         if settle is not None:
-            settle([target for _, target in targets], since)
+            settle(distinct(latest), since)
+        latest.clear()
 
-    candidates = collect(survey, near.beams.watched(read), progress, finished)
-    targets = [(candidates.passes[file, segment], target) for file, segment, target in fitted]
-    return sorted(targets, key=lambda pair: (pair[0], pair[1].gps_time)), candidates, near
+    progress = progress or silent("", 0)
+    candidates = collect(survey, near.beams.watched(read), fit, near.add, settled, progress)
+    near.warn_of_intensity(survey)
+    of_pass = {number: [] for number in sorted(candidates.passes.values())}
+    for _, key, target in sorted(fits, key=itemgetter(0)):  # not in the order of their points
+        of_pass[candidates.passes[key]].append(target)
+    targets = [(number, t) for number, some in of_pass.items() for t in distinct(some)]
+    return targets, candidates, near
 
 
 def match_targets(targets: list[PassTarget], candidates: Candidates, survey: Survey) -> Finding:

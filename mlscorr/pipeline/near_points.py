@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import warnings
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -10,37 +10,36 @@ from scipy.spatial import cKDTree
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import PointCloud, Survey
-from mlscorr.targets import Candidates, Neighbourhoods, search_radius
+from mlscorr.targets import BY_EDGES, Candidates, search_radius, why_useless
 
 
-@dataclass
 class NearPoints:
-    """Points near surveyed points that were looked at: their number and range of intensity.
+    """Points near surveyed points that were looked at: their number and intensities.
+
+    Attributes
+    ----------
+    beams : BeamCheck
+    is_scanned : (b,) bool array
+        Which surveyed points have points about them.
+    is_present : (65536,) bool array
+        Which intensities they have.
+    points : int
 
     Parameters
     ----------
-    balls : Neighbourhoods
-        About the surveyed points.
-    beams : BeamCheck
-    is_scanned : (b,) bool array
-        Which balls hold points.
-    points : int
-    darkest, brightest : float
+    survey : Survey
     """
 
-    balls: Neighbourhoods
-    beams: BeamCheck
-    is_scanned: np.ndarray
-    points: int = 0
-    darkest: float = np.inf
-    brightest: float = -np.inf
+    def __init__(self, survey: Survey):
+        self.beams, self.points = BeamCheck(survey), 0
+        self.is_scanned = np.zeros(len(survey.surveyed), bool)
+        self.is_present = np.zeros(1 << 16, bool)
 
-    @classmethod
-    def of(cls, survey: Survey) -> NearPoints:
-        """None yet of a survey."""
-        places = survey.surveyed.position
-        balls = Neighbourhoods(places, np.full(len(places), SETTINGS.scanned_radius))
-        return cls(balls, BeamCheck(survey), np.zeros(len(places), bool))
+    @property
+    def intensities(self) -> str:
+        """The darkest and the brightest, in words."""
+        present = np.flatnonzero(self.is_present)
+        return f"intensity {present[0]} to {present[-1]}"
 
     def add(self, cloud: PointCloud) -> None:
         """Count more of them.
@@ -48,14 +47,30 @@ class NearPoints:
         Parameters
         ----------
         cloud : PointCloud
-            At least one point.
         """
-        if not self.is_scanned.all():
-            some = cloud.xyz[:: SETTINGS.scanned_stride]
-            self.is_scanned |= [len(rows) > 0 for rows in self.balls.each(some)]
         self.points += len(cloud)
-        self.darkest = min(self.darkest, float(cloud.intensity.min()))
-        self.brightest = max(self.brightest, float(cloud.intensity.max()))
+        self.is_present[cloud.intensity.astype(np.uint16)] = True
+
+    def add_ball(self, index: int, cloud: PointCloud) -> None:
+        """Look whether any of the points of a surveyed point, from there (m), lies about it."""
+        some = cloud.xyz[:: SETTINGS.scanned_stride]
+        self.is_scanned[index] |= (np.linalg.norm(some, axis=1) < SETTINGS.scanned_radius).any()
+
+    def warn_of_intensity(self, survey: Survey) -> None:
+        """Warn where bright targets are surveyed and the intensity can't tell them.
+
+        Parameters
+        ----------
+        survey : Survey
+        """
+        reason = why_useless(np.flatnonzero(self.is_present)) if self.points else None
+        if reason is not None and not set(survey.surveyed.kind) <= set(BY_EDGES):
+            warnings.warn(
+                f"{reason} Bright targets can't be told by it: only plates that stand free are "
+                "found, by their edges, and painted ones are not. Export the cloud with its "
+                "intensity.",
+                stacklevel=3,
+            )
 
 
 def check_control(survey: Survey) -> None:
@@ -120,7 +135,7 @@ def nothing_found(survey: Survey, candidates: Candidates, near: NearPoints) -> s
         )
     return (
         f"None of the {len(surveyed)} surveyed targets was found among {near.points} points "
-        f"within {radius:.1f} m of them (intensity {near.darkest:.0f} to "
-        f"{near.brightest:.0f}). Targets are circles or squares of the surveyed size, brighter "
-        "than what surrounds them: check kind and size in the control file, and the intensity."
+        f"within {radius:.1f} m of them ({near.intensities}). Targets are circles or squares of "
+        "the surveyed size, brighter than what surrounds them: check kind and size in the control "
+        "file, and the intensity."
     )

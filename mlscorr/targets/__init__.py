@@ -6,7 +6,7 @@ from mlscorr.targets.extract import PassTarget, as_observations, fit_near_contro
 from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
 from mlscorr.targets.intensity import why_useless
 from mlscorr.targets.regions import BrightRegion
+from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.search import search_targets
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import BY_EDGES, diameter
-from mlscorr.targets.visits import scanner_path

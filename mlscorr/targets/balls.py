@@ -2,11 +2,7 @@
 
 import numpy as np
 from numba import njit
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from mlscorr.survey import PointCloud
 from mlscorr.targets.settings import SETTINGS
 
 
@@ -30,6 +26,9 @@ class Neighbourhoods:
         first, last = (np.floor((end - low) / edge).astype(int) for end in ends)
         shape = last.max(axis=0, initial=-1) + 1
         self._raster = low, edge, shape, *_reaching(first, last, shape)
+
+    def __getitem__(self, numbers: np.ndarray) -> "Neighbourhoods":
+        return Neighbourhoods(self.position[numbers], self.radius[numbers])
 
     def contains(self, xyz: np.ndarray) -> np.ndarray:
         """Rows (k,) of the points in any ball, in order.
@@ -56,27 +55,6 @@ class Neighbourhoods:
         rows = np.empty(counts.sum(), int)
         _enter(xyz, *balls, ends - counts, rows)
         return np.split(rows, ends[:-1]) if len(ends) else []
-
-    def passed(self, cloud: PointCloud, before: float) -> np.ndarray:
-        """Points (n,) in balls that no later point is in, nor in balls that overlap with these.
-
-        Parameters
-        ----------
-        cloud : PointCloud
-        before : float
-            Time from which on a point is later. Units: s.
-        """
-        pairs = cKDTree(self.position).query_pairs(2 * self.radius.max(), output_type="ndarray")
-        apart = np.linalg.norm(np.diff(self.position[pairs], axis=1)[:, 0], axis=1)
-        pairs = pairs[apart < self.radius[pairs].sum(axis=1)].T
-        graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(len(self.position),) * 2)
-        groups = connected_components(graph, directed=False)[1]
-        group = np.zeros(len(cloud), int)
-        for label, rows in zip(groups, self.each(cloud.xyz), strict=True):
-            group[rows] = label
-        latest = np.full(len(groups), -np.inf)
-        np.maximum.at(latest, group, cloud.gps_time)
-        return latest[group] < before
 
 
 def _reaching(first, last, shape):

@@ -1,4 +1,4 @@
-"""Pass 1 over the cloud: keep the points near control points, whatever the file's size."""
+"""Pass 1 over the cloud: the points near each control point, whatever the file's size."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -51,33 +51,101 @@ def search_radius(survey: Survey, points: ControlPoints) -> np.ndarray:
     return survey.search_radius + points.size / np.sqrt(2)
 
 
+class PointsInBalls:
+    """Points of a file in balls, in the parts in which they were read, until a ball is passed.
+
+    Parameters
+    ----------
+    balls : Neighbourhoods
+    """
+
+    def __init__(self, balls: Neighbourhoods):
+        self._balls, self._parts = balls, []
+        self._first = np.full(len(balls.position), np.inf)
+        self._last = -self._first
+
+    def __len__(self):
+        return sum(map(len, self._parts))
+
+    def add(self, cloud: PointCloud) -> None:
+        """Hold points, each in a ball at least."""
+        self._parts.append(cloud)
+        for ball, rows in enumerate(self._balls.each(cloud.xyz)):
+            time = cloud.gps_time[rows]
+            self._first[ball] = min(self._first[ball], time.min(initial=np.inf))
+            self._last[ball] = max(self._last[ball], time.max(initial=-np.inf))
+
+    def since(self) -> float:
+        """Time of the oldest point. Units: s."""
+        return float(self._first.min(initial=np.inf))
+
+    def passed(self, before: float) -> np.ndarray:
+        """Numbers (k,) of the balls with points of which none is later than a time (s)."""
+        return np.flatnonzero((self._last > -np.inf) & (self._last < before))
+
+    def inside(self, number: int) -> PointCloud:
+        """Points in a ball from its middle (m), as they were read."""
+        ball = self._balls[np.array([number])]
+        rows = [ball.contains(part.xyz) for part in self._parts]
+        ends = np.cumsum([len(k) for k in rows])
+        xyz = np.empty((ends[-1], 3))  # filled by parts, as those of dense balls are large
+        for part, k, places in zip(self._parts, rows, np.split(xyz, ends[:-1]), strict=True):
+            np.subtract(part.xyz[k], ball.position, out=places)
+        columns = [
+            (part.gps_time[k], part.intensity[k]) for part, k in zip(self._parts, rows, strict=True)
+        ]
+        return PointCloud(xyz, *map(np.concatenate, zip(*columns, strict=True)))
+
+    def release(self, numbers: np.ndarray) -> None:
+        """Let go of what is in these balls (k,) alone."""
+        self._first[numbers], self._last[numbers] = np.inf, -np.inf
+        others = self._balls[np.isfinite(self._last)]
+        for number, part in enumerate(self._parts):
+            self._parts[number] = part[others.contains(part.xyz)]
+        self._parts = list(filter(len, self._parts))
+
+
 def collect(
     survey: Survey,
     read: Callable,
-    progress: Callable | None = None,
-    finished: Callable | None = None,
+    fit: Callable,
+    count: Callable,
+    settled: Callable,
+    progress: Callable,
 ) -> Candidates:
-    """Stream a survey's cloud files and keep the points near its surveyed points.
+    """Stream a survey's cloud files and hand on the points near each of its surveyed points.
+
+    Memory does not grow with a file, as long as its points come about in order of time: a surveyed
+    point that was passed has its points handed on where many are held.
 
     Parameters
     ----------
     survey : Survey
     read : function of a CloudFile
         Gives an iterator of PointCloud.
-    progress : function of a number of points, optional
-    finished : function, optional
-        ``finished(file, cloud, segment, since)`` is given the number of a file, points of it near
-        control points, and the segment of the trajectory of each, when the file has ended, or
-        earlier, where many points are held, those near control points that were passed. What it
-        will still be given of the file so far is not older than since (s). Points that it was
-        given are not kept: memory does not grow with the files, as long as their points come about
-        in order of time.
+    fit : function
+        ``fit(file, index, cloud)`` is given points near a surveyed point, from there (m), by the
+        numbers of the file and of this point.
+    count : function of a PointCloud
+        Is given the points near surveyed points that have a pose, as they are read.
+    settled : function
+        ``settled(since)`` follows some calls of fit: what is still to come of the file is not older
+        than since (s).
+    progress : function of a number of points
     """
     trajectory, points = survey.trajectory, survey.surveyed
     near = Neighbourhoods(points.position, search_radius(survey, points))
-    kept, numbers, unplaced, starts = [NO_POINTS], [np.empty((0, 2), int)], [NO_POINTS], {}
+    unplaced, starts = [NO_POINTS], {}
+
+    def hand_on(file, held, before, latest):
+        passed = held.passed(before)
+        for index in passed:
+            fit(file, index, held.inside(index))
+        held.release(passed)
+        settled(min(held.since(), latest))
+
     for number, file in enumerate(survey.clouds):
-        held, segments, limit = NO_POINTS, np.empty(0, int), SETTINGS.held_points
+        held, limit = PointsInBalls(near), SETTINGS.held_points
         for chunk in read(file):
             segment = trajectory.segment(chunk.gps_time)
             for part in np.unique(segment[segment >= 0]).tolist():
@@ -85,28 +153,19 @@ def collect(
                 starts[number, part] = min(starts.get((number, part), np.inf), start)
             rows = near.contains(chunk.xyz)
             has_pose = segment[rows] >= 0
-            held = PointCloud.concatenate([held, chunk[rows[has_pose]]])
-            segments = np.append(segments, segment[rows[has_pose]])
             unplaced.append(chunk[rows[~has_pose]])
-            if finished is not None and len(held) > limit:
-                passed = near.passed(held, chunk.gps_time.max() - MATCHING.pause)
-                late = held[~passed]
-                since = late.gps_time.min(initial=chunk.gps_time.max())
-                finished(number, held[passed], segments[passed], since)
-                held, segments = late, segments[~passed]
+            held.add(chunk[rows[has_pose]])
+            count(chunk[rows[has_pose]])
+            if len(held) > limit:
+                latest = chunk.gps_time.max()
+                hand_on(number, held, latest - MATCHING.pause, latest)
                 limit = max(SETTINGS.held_points, 2 * len(held))
-            if progress is not None:
-                progress(len(chunk))
-        if finished is not None:
-            finished(number, held, segments, np.inf)
-        else:
-            kept.append(held)
-            numbers.append(np.column_stack([np.full(len(segments), number), segments]))
-    passes = number_passes(starts)
-    keys = map(tuple, np.concatenate(numbers).tolist())
-    pass_number = np.array([passes[key] for key in keys], int)
-    clouds = map(PointCloud.concatenate, (kept, unplaced))
-    return Candidates(next(clouds), pass_number, next(clouds), passes, starts)
+            progress(len(chunk))
+            del chunk, segment, rows, has_pose  # large, and needed no more
+        hand_on(number, held, np.inf, np.inf)
+    return Candidates(
+        NO_POINTS, np.empty(0, int), PointCloud.concatenate(unplaced), number_passes(starts), starts
+    )
 
 
 def number_passes(starts: dict[tuple[int, int], float]) -> dict[tuple[int, int], int]:

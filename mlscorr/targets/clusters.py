@@ -14,26 +14,6 @@ from scipy.spatial import cKDTree
 from mlscorr.targets.settings import SETTINGS
 
 
-def split_by_time(gps_time: np.ndarray, pause: float) -> list[np.ndarray]:
-    """Runs of points without a longer pause.
-
-    Parameters
-    ----------
-    gps_time : (n,) array
-        Units: s.
-    pause : float
-        Units: s.
-
-    Returns
-    -------
-    list of int arrays
-        Rows, in time.
-    """
-    order = np.argsort(gps_time, kind="stable")
-    breaks = np.flatnonzero(np.diff(gps_time[order]) > pause) + 1
-    return np.split(order, breaks)
-
-
 def bright_components(
     xyz: np.ndarray, intensity: np.ndarray, size: float
 ) -> Iterator[tuple[float, np.ndarray]]:

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from mlscorr.targets.plane import Plane
+from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
 
 
@@ -26,8 +27,8 @@ class Echoes:
     gps_time : (n,) array
         Units: s.
     intensity : (n,) array
-    sight : (n, 3) array
-        Scanner to point. Units: m.
+    path : ScannerPath
+        Of the scanner, from the same origin.
     tolerance : float
         Points as near to a plane as this are on it. Units: m.
     """
@@ -35,8 +36,12 @@ class Echoes:
     xyz: np.ndarray
     gps_time: np.ndarray
     intensity: np.ndarray
-    sight: np.ndarray
+    path: ScannerPath
     tolerance: float
+
+    def sight(self, rows: np.ndarray | slice) -> np.ndarray:
+        """Scanner to point (k, 3) of some rows. Units: m."""
+        return self.xyz[rows] - self.path.at(self.gps_time[rows])
 
 
 def beams_at_plane(
@@ -63,31 +68,40 @@ def beams_at_plane(
         BRIGHT, DARK or MISS.
     rows : (k,) int array
     """
-    rows, on_plane = _beams_near(
-        echoes.xyz, echoes.sight, echoes.tolerance, plane.origin, plane.axes, middle, radius
-    )
-    points = plane.crossing(echoes.xyz[rows], echoes.sight[rows])
+    path = echoes.path.gps_time, np.ascontiguousarray(echoes.path.position)
+    place = plane.origin, plane.axes, middle, radius
+    rows, on_plane = _beams_near(echoes.xyz, echoes.gps_time, path, echoes.tolerance, place)
+    points = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
     state = np.where(echoes.intensity[rows] >= threshold, BRIGHT, DARK)
     return points, np.where(on_plane, state, MISS), rows
 
 
 @njit(cache=True, error_model="numpy")
-def _beams_near(xyz, sight, tolerance, origin, axes, middle, radius):
+def _beams_near(xyz, gps_time, path, tolerance, place):
     """Rows (k,) of these beams, and which of them ended on the plane: thousands of calls look."""
+    (origin, axes, middle, radius), (epochs, scanner) = place, path
     rows, on_plane, count = np.empty(len(xyz), np.int64), np.empty(len(xyz), np.bool_), 0
+    above, epoch = np.zeros(len(epochs)), 0  # the plane, where the scanner was
+    for i in range(3):
+        above += (scanner[:, i] - origin[i]) * axes[2, i]
     for row in range(len(xyz)):
-        height = steep = 0.0
+        while epoch < len(epochs) - 2 and epochs[epoch + 1] <= gps_time[row]:
+            epoch += 1
+        share = (gps_time[row] - epochs[epoch]) / (epochs[epoch + 1] - epochs[epoch])
+        height = 0.0
         for i in range(3):
             height += (xyz[row, i] - origin[i]) * axes[2, i]
-            steep += sight[row, i] * axes[2, i]
-        beyond, is_on = height / steep, abs(height) <= tolerance  # positive behind the plane
-        if not (abs(beyond) < 1.0 and (is_on or beyond > 0.0)):  # in units of the range
+        steep = height - above[epoch] - share * (above[epoch + 1] - above[epoch])
+        is_on, is_behind = abs(height) <= tolerance, height * steep > 0.0
+        if not (abs(height) < abs(steep) and (is_on or is_behind)):
             continue
-        away = 0.0
+        beyond, away = height / steep, 0.0  # behind the plane, in units of the range
         for axis in range(2):
             across = -middle[axis]
             for i in range(3):
-                across += (xyz[row, i] - origin[i] - beyond * sight[row, i]) * axes[axis, i]
+                start = scanner[epoch, i] + share * (scanner[epoch + 1, i] - scanner[epoch, i])
+                met = xyz[row, i] - beyond * (xyz[row, i] - start)
+                across += (met - origin[i]) * axes[axis, i]
             away += across**2
         if away < radius**2:
             rows[count], on_plane[count] = row, is_on
@@ -111,7 +125,7 @@ def missed_points(echoes: Echoes, rows: np.ndarray, plane: Plane) -> np.ndarray:
         Units: m. None when the target has fewer than two scan lines, or when the pulses don't
         follow each other regularly in one line (scanners of many beams at once).
     """
-    uv = plane.crossing(echoes.xyz[rows], echoes.sight[rows])
+    uv = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
     pulse, lines = _scan_lines(echoes.gps_time[rows])
     if len(lines) < 2 or pulse == 0:
         return np.empty((0, 2))

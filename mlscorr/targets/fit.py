@@ -1,7 +1,8 @@
 """Targets of one piece of cloud: what extraction near control and search without it both call."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from mlscorr.targets.echoes import Echoes
 from mlscorr.targets.intensity import why_useless
 from mlscorr.targets.plane import centre_of
 from mlscorr.targets.regions import BrightRegion
+from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.seeds import bright_seeds, hole_seeds, plate_seeds, region_seeds
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shape_fit import ShapeFit, exact_fit, rough_fit
@@ -106,11 +108,12 @@ class FittedTarget:
 
 def fit_targets(
     cloud: PointCloud,
-    sight: np.ndarray,
+    path: ScannerPath,
     shapes: Sequence[tuple[str, float | None]],
     scanner: Scanner,
     rng: np.random.Generator,
     region: BrightRegion | None = None,
+    origin: np.ndarray | None = None,
 ) -> list[FittedTarget]:
     """Fit targets of the given shapes in one piece of cloud of one pass and visit.
 
@@ -118,8 +121,8 @@ def fit_targets(
     ----------
     cloud : PointCloud
         A few metres of cloud.
-    sight : (n, 3) array
-        Scanner to point. Units: m.
+    path : ScannerPath
+        While they were measured.
     shapes : sequence of (kind, size or None)
         What to look for; where the size (m) is None it is estimated.
     scanner : Scanner
@@ -128,6 +131,8 @@ def fit_targets(
         For the random samples in which flat patches are looked for.
     region : BrightRegion, optional
         The only one to look at.
+    origin : (3,) array, optional
+        What the places of the cloud are counted from; 0 by default. Units: m.
 
     Returns
     -------
@@ -139,10 +144,13 @@ def fit_targets(
         return []
     if not (np.diff(cloud.gps_time) >= 0).all():
         order = np.argsort(cloud.gps_time, kind="stable")
-        cloud, sight = cloud[order], sight[order]
-    origin, intensity = cloud.xyz.mean(axis=0), cloud.intensity.astype(float)
-    tolerance = max(SETTINGS.thickness, 4 * scanner.range_noise)
-    echoes = Echoes(cloud.xyz - origin, cloud.gps_time, intensity, sight, tolerance)
+        cloud = cloud[order]
+    if origin is None:
+        origin = cloud.xyz.mean(axis=0)
+        cloud = replace(cloud, xyz=cloud.xyz - origin)
+    intensity, tolerance = cloud.intensity, max(SETTINGS.thickness, 4 * scanner.range_noise)
+    path = path.seen_from(origin)
+    echoes = Echoes(cloud.xyz, cloud.gps_time, intensity, path, tolerance)
     blind = why_useless(intensity) is not None
     rough: list[ShapeFit] = []
     for kind, size in shapes:
@@ -172,11 +180,13 @@ def distinct(targets: Iterable[FittedTarget]) -> list[FittedTarget]:
     ----------
     targets : iterable of FittedTarget
     """
-    kept: list[FittedTarget] = []
+    kept: dict[int, list[FittedTarget]] = {}  # by the pause in time, as only these overlap
     for target in sorted(targets, key=lambda target: -target.score * np.sqrt(target.points)):
-        if not any(target.overlaps(other) for other in kept):
-            kept.append(target)
-    return sorted(kept, key=lambda target: target.gps_time)
+        slot = int(target.gps_time / MATCHING.pause)
+        near = chain(*(kept.get(number, []) for number in (slot - 1, slot, slot + 1)))
+        if not any(target.overlaps(other) for other in near):
+            kept.setdefault(slot, []).append(target)
+    return sorted(chain(*kept.values()), key=lambda target: target.gps_time)
 
 
 def _is_settled(fit, seed, kind, size):
@@ -203,6 +213,7 @@ def _as_target(echoes, fit, origin):
     points, state, rows = fit.beams
     plane, outline = fit.seed.plane, fit.outline
     met = rows[fit.on_target & (rows >= 0)]
+    intensity = echoes.intensity[met].astype(float)
     centre = centre_of(echoes, plane, outline, met)
     size, sigma = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)
     return FittedTarget(
@@ -216,7 +227,7 @@ def _as_target(echoes, fit, origin):
         size_sigma=float(sigma),
         points=len(met),
         score=fit.assessment.score,
-        cloud=PointCloud(echoes.xyz[met] + origin, echoes.gps_time[met], echoes.intensity[met]),
+        cloud=PointCloud(echoes.xyz[met] + origin, echoes.gps_time[met], intensity),
         view=TargetView(
             points,
             state,

@@ -15,14 +15,14 @@ def why_useless(intensity: np.ndarray) -> str | None:
 
     >>> import numpy as np
     >>> why_useless(np.zeros(1000))
-    'The intensity of all 1000 points is 0.'
+    'The intensity of all points is 0.'
     >>> why_useless(np.r_[np.full(900, 20), np.arange(50, 150)]) is None
     True
     """
     values = np.unique(intensity)
     if len(values) <= 1:
         value = f"{values[0]:g}" if len(values) else "missing"
-        return f"The intensity of all {len(intensity)} points is {value}."
+        return f"The intensity of all points is {value}."
     if len(values) < SETTINGS.smallest_levels:
-        return f"The intensity of {len(intensity)} points takes only {len(values)} values."
+        return f"The intensity takes only {len(values)} values."
     return None

@@ -153,19 +153,13 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
     return Plane(middle + centre, axes.T[::-1], float(sigma), inside)
 
 
-@njit(cache=True, nogil=True)
 def _least_squares(xyz, inside):
     """Centre of the points that are inside, squares about it along its axes, and these."""
-    centre, squares = np.zeros(3), np.zeros((3, 3))
-    for i in np.flatnonzero(inside):
-        for a in range(3):
-            centre[a] += xyz[i, a]
-    centre /= inside.sum()
-    for i in np.flatnonzero(inside):
-        for a in range(3):
-            for b in range(a + 1):
-                squares[a, b] += (xyz[i, a] - centre[a]) * (xyz[i, b] - centre[b])
-    return centre, *np.linalg.eigh(squares)
+    points = xyz[inside]
+    centre = points.mean(axis=0)
+    points -= centre
+    # not by BLAS, which sums otherwise with another number of threads
+    return centre, *np.linalg.eigh(np.einsum("ni,nj->ij", points, points))
 
 
 @dataclass(frozen=True)
@@ -208,13 +202,13 @@ def centre_of(echoes: "Echoes", plane: Plane, outline: "Outline", rows: np.ndarr
     too far moves the centre along the beam. Range noise may be correlated from point to point,
     which plain sigmas of a fit overlook: the residuals tell by how much.
     """
-    crossing = plane.crossing(echoes.xyz[rows], echoes.sight[rows])
+    crossing = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
     basis = np.column_stack([np.ones(len(rows)), crossing - outline.centre])
     weights = np.linalg.pinv(basis)[0]
     height = plane.coordinates(echoes.xyz[rows])[:, 2]
     free = max(len(rows) - 3, 1)
     variance = plane.sigma**2 * (free + 2) / free * _correlation_factor(height)
-    beam = plane.axes @ echoes.sight[rows].mean(axis=0)
+    beam = plane.axes @ echoes.sight(rows).mean(axis=0)
     covariance = variance * (weights @ weights) * np.outer(beam, beam) / beam[2] ** 2
     covariance[:2, :2] += outline.covariance
     time = echoes.gps_time[rows] - echoes.gps_time[0]

@@ -7,11 +7,11 @@ import numpy as np
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.targets.balls import Neighbourhoods
-from mlscorr.targets.clusters import split_by_time
 from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
 from mlscorr.targets.regions import bright_regions
+from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.settings import SETTINGS
-from mlscorr.targets.visits import scanner_path
+from mlscorr.targets.visits import split_visits
 
 
 def search_targets(
@@ -47,19 +47,19 @@ def search_targets(
             chunk,
             [
                 target
-                for cloud, sight, region in _pieces(whole, survey)
-                for target in _fit_piece(cloud, sight, region, shapes, survey.scanner, rng)
+                for cloud, path, region in _pieces(whole, survey)
+                for target in _fit_piece(cloud, path, region, shapes, survey.scanner, rng)
             ],
         )
         carried = _end_of(chunk)
 
 
-def _fit_piece(cloud, sight, region, shapes, scanner, rng):
+def _fit_piece(cloud, path, region, shapes, scanner, rng):
     """FittedTarget of the shape that fits a region best, each fitted to the end, in a list."""
     targets = [
         target
         for shape in shapes
-        for target in fit_targets(cloud, sight, [shape], scanner, rng, region)
+        for target in fit_targets(cloud, path, [shape], scanner, rng, region)
         if target.size <= SETTINGS.largest_size
     ]
     return distinct(targets)
@@ -73,25 +73,13 @@ def _end_of(chunk):
 
 
 def _pieces(cloud, survey):
-    """(PointCloud, sight (n, 3), BrightRegion) about each bright region, by pass and visit."""
+    """(PointCloud, ScannerPath, BrightRegion) about each bright region, by pass and visit."""
     regions = bright_regions(cloud.xyz, cloud.intensity)[: SETTINGS.largest_fits]
-    if len(regions) == 0:
-        return
-    centre = np.array([region.centre for region in regions])
+    centre = np.array([region.centre for region in regions]).reshape(-1, 3)
     radius = 2 * np.array([region.radius for region in regions])  # what lies behind its edges
     balls = Neighbourhoods(centre, radius).each(cloud.xyz)
-    rows = np.unique(np.concatenate(balls))
-    near = cloud[rows]
-    segment = survey.trajectory.segment(near.gps_time)
-    sight = np.full((len(rows), 3), np.nan)
-    placed = near[segment >= 0]
-    path = scanner_path(placed.gps_time, survey.trajectory, survey.lever_arm)
-    sight[segment >= 0] = placed.xyz - path
-    for region, ball in zip(regions, balls, strict=True):
-        inside = np.searchsorted(rows, ball)
-        for part in np.unique(segment[inside][segment[inside] >= 0]):
-            in_pass = inside[segment[inside] == part]
-            for visit in split_by_time(near.gps_time[in_pass], MATCHING.pause):
-                surplus = max(0, len(visit) - SETTINGS.piece_points)  # of a stop in front of it
-                piece = in_pass[visit[surplus // 2 : len(visit) - (surplus + 1) // 2]]
-                yield near[piece], sight[piece], region
+    for region, rows in zip(regions, balls, strict=True):
+        for _, visit in split_visits(cloud[rows], survey):
+            surplus = max(0, len(visit) - SETTINGS.piece_points)  # of a stop in front of it
+            piece = visit[surplus // 2 : len(visit) - (surplus + 1) // 2]
+            yield piece, ScannerPath.of(survey, piece.gps_time), region

@@ -98,7 +98,7 @@ def plate_seeds(
     """
     for guess in SETTINGS.size_guesses if size is None else (size,):
         for plane, rows in flat_patches(echoes, guess, rng):
-            points = plane.crossing(echoes.xyz[rows], echoes.sight[rows])
+            points = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
             for share in SETTINGS.link_shares:
                 for part in components(points, max(share * guess, 2 * SETTINGS.thickness)):
                     extent = _extent(points[part], kind, size, guess)
@@ -117,7 +117,7 @@ def hole_seeds(echoes: Echoes, size: float | None, rng: np.random.Generator) -> 
     rng : numpy.random.Generator
     """
     for plane, rows in flat_patches(echoes, size or np.median(SETTINGS.size_guesses), rng):
-        points = plane.crossing(echoes.xyz[rows], echoes.sight[rows])
+        points = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
         for middle, radius, mesh in _gaps(echoes, plane, points, size):
             about = np.linalg.norm(points - middle, axis=1) < 2.5 * radius
             if about.sum() >= SETTINGS.smallest_count:
@@ -155,8 +155,8 @@ def flat_patches(
 
 def _steep(echoes, plane):
     """Which beams can be said to cross a plane."""
-    slant = np.abs(echoes.sight @ plane.axes[2])
-    return slant > SETTINGS.grazing * np.linalg.norm(echoes.sight, axis=1)
+    sight = echoes.sight(slice(None))
+    return np.abs(sight @ plane.axes[2]) > SETTINGS.grazing * np.linalg.norm(sight, axis=1)
 
 
 def _most_common_plane(xyz, size, tolerance, rng):
@@ -198,7 +198,7 @@ def _flat_parts(echoes, rows, size):
             return
         plane = fit_plane(echoes.xyz[rows], echoes.tolerance)
         flat, whole = rows[plane.inliers], plane.inliers.mean() >= 0.7
-        points = plane.crossing(echoes.xyz[flat], echoes.sight[flat])
+        points = plane.crossing(echoes.xyz[flat], echoes.sight(flat))
         link = SETTINGS.link_shares[-1] * size
         parts = [np.arange(len(flat))] if whole else components(points, link)
         for part in parts:
@@ -227,10 +227,10 @@ def _gaps(echoes, plane, points, size):
 
     They are circumcircles of the Delaunay triangles (their centres are Voronoi's corners).
     """
-    height, beam = plane.coordinates(echoes.xyz)[:, 2], echoes.sight @ plane.axes[2]
+    height, beam = plane.coordinates(echoes.xyz)[:, 2], echoes.sight(slice(None)) @ plane.axes[2]
     blocked = (height * beam < 0) & (np.abs(height) > echoes.tolerance)
     blocked &= _steep(echoes, plane)
-    before = plane.crossing(echoes.xyz[blocked], echoes.sight[blocked])
+    before = plane.crossing(echoes.xyz[blocked], echoes.sight(blocked))
     known = np.vstack([points, before])
     known = known[:: len(known) // SETTINGS.piece_points + 1]
     if len(known) < SETTINGS.smallest_count:

@@ -201,7 +201,7 @@ def _blur(echoes, fit, scanner):
     """
     _, state, rows = fit.beams
     on_target = fit.on_target
-    sight = echoes.sight[rows[on_target]].mean(axis=0)
+    sight = echoes.sight(rows[on_target]).mean(axis=0)
     distance = np.linalg.norm(sight)
     cosine = abs(sight @ fit.seed.plane.axes[2]) / distance
     slant = np.sqrt((1 + 1 / cosine**2) / 2)  # both ways in the plane, on average

@@ -1,45 +1,51 @@
 """When the scanner came by: one observation of a target for each pass and visit of it."""
 
+from itertools import pairwise
+from math import dist
+
 import numpy as np
-from numba import njit
 
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pos import stated_sigma
-from mlscorr.survey import Pos, Trajectory
-from mlscorr.targets.clusters import split_by_time
+from mlscorr.survey import PointCloud, Pos, Survey, Trajectory
+from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.settings import SETTINGS
 
 
-def split_visits(gps_time: np.ndarray, scanner: np.ndarray) -> list[np.ndarray]:
+def split_visits(cloud: PointCloud, survey: Survey) -> list[tuple[int, PointCloud]]:
     """Visits of a place.
 
     Parameters
     ----------
-    gps_time : (n,) array
-        Of points. Units: s.
-    scanner : (n, 3) array
-        Where the scanner was. Units: m.
+    cloud : PointCloud
+    survey : Survey
+        Its trajectory and lever arm.
 
     Returns
     -------
-    list of int arrays
-        Rows of the points of each visit, in time.
+    list of (segment of the trajectory, PointCloud)
+        The points of each visit, in time; those without a pose in none. Of a cloud in order of
+        time these are views.
 
     A pause of two seconds parts two visits, and so does a turn back (a U-turn before a target); a
     stop is one visit.
-
-    >>> time = np.arange(0.0, 20.0, 0.1)
-    >>> there_and_back = np.abs(time - 10.0)[:, None] * [[0.0, 5.0, 0.0]]
-    >>> [len(rows) for rows in split_visits(time, there_and_back)]
-    [100, 100]
     """
-    runs = split_by_time(gps_time, MATCHING.pause)
-    return [part for run in runs for part in _by_direction(run, scanner)]
+    segment = survey.trajectory.segment(cloud.gps_time)
+    if (segment < 0).any() or (np.diff(cloud.gps_time) < 0).any():
+        order = np.argsort(cloud.gps_time, kind="stable")
+        order = order[segment[order] >= 0]
+        cloud, segment = cloud[order], segment[order]
+    is_new = (np.diff(cloud.gps_time) > MATCHING.pause) | (np.diff(segment) != 0)
+    ends = np.unique([0, *(np.flatnonzero(is_new) + 1), len(cloud)])
+    turns = [first + _turns(cloud.gps_time[first:last], survey) for first, last in pairwise(ends)]
+    ends = np.unique(np.concatenate([ends, *turns]))
+    return [(int(segment[first]), cloud[first:last]) for first, last in pairwise(ends)]
 
 
-def _by_direction(rows, scanner):
-    """Rows of one run, parted where the vehicle turned back against the way it came."""
-    path = scanner[rows]
+def _turns(gps_time, survey):
+    """Rows at which the vehicle turned back against the way it came."""
+    scanner = ScannerPath.of(survey, gps_time)
+    path = scanner.position
     marks = _each_step(path, SETTINGS.turn_step)
     steps = np.diff(path[marks, :2], axis=0)
     cuts, forward = [], steps[0] if len(steps) else None
@@ -48,41 +54,16 @@ def _by_direction(rows, scanner):
             first, last = marks[number - 1], marks[number + 1]
             cuts.append(first + int(np.argmax(path[first:last, :2] @ forward)))
             forward = steps[number]
-    return np.split(rows, cuts)
+    return np.searchsorted(gps_time, scanner.gps_time[cuts])
 
 
-@njit(cache=True)
 def _each_step(path, step):
     """Rows (k,) of a path, of which each is the first farther than a step from the one before."""
-    marks, count = np.zeros(len(path), dtype=np.int64), 1
-    for row in range(len(path)):
-        east, north = path[row, :2] - path[marks[count - 1], :2]
-        if east**2 + north**2 > step**2:
-            marks[count] = row
-            count += 1
-    return marks[:count]
-
-
-def scanner_path(gps_time: np.ndarray, trajectory: Trajectory, lever_arm: np.ndarray) -> np.ndarray:
-    """Where the scanner was (n, 3). Units: m.
-
-    Parameters
-    ----------
-    gps_time : (n,) array
-        Within the trajectory. Units: s.
-    trajectory : Trajectory
-    lever_arm : (3,) array
-        Turned by the attitude of the nearest epoch, which is exact enough for a direction and
-        spares slerps. Units: m.
-    """
-    time = trajectory.gps_time
-    epoch = np.clip(np.searchsorted(time, gps_time), 1, len(time) - 1)
-    epoch -= gps_time - time[epoch - 1] < time[epoch] - gps_time
-    epochs = np.unique(epoch)
-    path = trajectory.attitude[epochs].apply(lever_arm)[np.searchsorted(epochs, epoch)]
-    for axis, position in enumerate(trajectory.position.T):
-        path[:, axis] += np.interp(gps_time, time, position)
-    return path
+    places, marks = path[:, :2].tolist(), [0]
+    for row, place in enumerate(places):
+        if dist(place, places[marks[-1]]) > step:
+            marks.append(row)
+    return marks
 
 
 def motion_covariance(

@@ -6,6 +6,7 @@ import numpy as np
 from target_rays import ORIGIN, TARGETS, view
 
 from mlscorr.targets.echoes import Echoes
+from mlscorr.targets.scanner_path import ScannerPath
 
 SIZE = 0.6  # m
 TOLERANCE = 0.03  # m
@@ -25,9 +26,8 @@ def views(look, count=3):
 
 def echoes_of(seen):
     "A view as Echoes about ORIGIN"
-    return Echoes(
-        seen.cloud.xyz - ORIGIN, seen.cloud.gps_time, seen.cloud.intensity, seen.sight, TOLERANCE
-    )
+    cloud, path = seen.cloud, seen.path.seen_from(ORIGIN)
+    return Echoes(cloud.xyz - ORIGIN, cloud.gps_time, cloud.intensity, path, TOLERANCE)
 
 
 def centre_of(seen):
@@ -45,4 +45,4 @@ def wall(white, rng, half=0.9, spacing=0.02, distance=6.0, noise=0.002):
     xyz = np.column_stack([distance + rng.normal(0.0, noise, len(u)), u, v])
     intensity = np.where(paint > 0.5, 12_000.0, 2_000.0) * rng.normal(1.0, 0.03, len(u))
     time = 413_200.0 + 1e-4 * np.arange(len(u))
-    return Echoes(xyz, time, intensity, xyz.copy(), TOLERANCE)
+    return Echoes(xyz, time, intensity, ScannerPath(time[[0, -1]], np.zeros((2, 3))), TOLERANCE)

@@ -7,6 +7,7 @@ from mlscorr.targets.assessment import assess
 from mlscorr.targets.echoes import Echoes
 from mlscorr.targets.outline import Outline
 from mlscorr.targets.plane import plane_through
+from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.seeds import Seed
 from mlscorr.targets.shapes import BRIGHT, DARK
 
@@ -23,9 +24,10 @@ def assessed(outline, visible=lambda points: np.ones(len(points), bool), dark=10
     points = points[visible(points)]
     state = np.where(np.hypot(*points.T) < SIZE / 2, BRIGHT, DARK)
     xyz = points @ PLANE.axes[:2]
-    sight = xyz + np.array([0.0, 5.0, 0.0])
+    time = np.arange(len(xyz)) * 1e-5
+    path = ScannerPath(time[[0, -1]], np.tile([0.0, -5.0, 0.0], (2, 1)))
     intensity = np.where(state == BRIGHT, 1000.0, dark)
-    echoes = Echoes(xyz, np.arange(len(xyz)) * 1e-5, intensity, sight, 0.03)
+    echoes = Echoes(xyz, time, intensity, path, 0.03)
     seed = Seed(np.flatnonzero(state == BRIGHT), PLANE, 500.0, False, SIZE, np.zeros(2))
     beams = points, state, np.arange(len(points))
     return assess(beams, outline, "circle", seed, echoes, BLUR)

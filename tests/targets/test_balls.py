@@ -1,8 +1,7 @@
-"Balls about places: what distances say, and when a ball is passed."
+"Balls about places: what distances say."
 
 import numpy as np
 
-from mlscorr.survey import PointCloud
 from mlscorr.targets.balls import Neighbourhoods
 from tests.targets.test_extract import ORIGIN
 
@@ -17,15 +16,6 @@ def test_balls_hold_what_is_within_their_radius():
     for rows, inside in zip(balls.each(xyz), apart.T, strict=True):
         assert np.array_equal(rows, np.flatnonzero(inside))
     assert np.array_equal(balls.contains(xyz), np.flatnonzero(apart.any(axis=1)))
-
-
-def test_a_ball_is_passed_when_all_that_overlap_with_it_are():
-    "Points at two places that overlap are handed on together, after the last of both"
-    places = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [50.0, 0.0, 0.0]])
-    cloud = PointCloud(places, np.array([1.0, 9.0, 1.0]), np.ones(3))
-    balls = Neighbourhoods(places, np.full(3, 2.0))
-    assert balls.passed(cloud, 5.0).tolist() == [False, False, True]
-    assert balls.passed(cloud, 10.0).all()
 
 
 def test_without_a_ball_no_point_is_near():

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import attitude_from_angles
+from mlscorr.pipeline.finding import fit_while_reading
 from mlscorr.survey import PointCloud, Trajectory
-from mlscorr.targets import collect, fit_near_control, search_radius
+from mlscorr.targets import SETTINGS, Neighbourhoods, collect, search_radius
+from mlscorr.targets.candidates import PointsInBalls
 from tests.targets.test_extract import ORIGIN, SIZE, START, control_point, survey_of, view
 
 
@@ -27,28 +29,71 @@ def test_search_radius_is_the_surveys_and_half_a_diagonal():
     assert search_radius(replace(survey, search_radius=3.0), control) == pytest.approx([3.0 + half])
 
 
-def test_collect_by_chunks_is_the_whole():
-    "Chunks of 700 points keep the same points as one; those in a gap are unplaced"
+def near(survey, read):
+    "What collect hands on: Candidates, and points and pass numbers about each surveyed point"
+    handed_on, parts, since = {}, [], []
+
+    def fit(file, index, cloud):
+        handed_on.setdefault(index, []).append((file, cloud))
+
+    candidates = collect(survey, read, fit, parts.append, since.append, lambda _: None)
+    assert since[-1] == np.inf
+    for index, given in handed_on.items():
+        numbers = [
+            candidates.passes[file, segment]
+            for file, cloud in given
+            for segment in survey.trajectory.segment(cloud.gps_time)
+        ]
+        handed_on[index] = PointCloud.concatenate([cloud for _, cloud in given]), np.array(numbers)
+    return candidates, handed_on, sum(map(len, parts))
+
+
+def test_collect_by_chunks_is_the_whole(monkeypatch):
+    "Chunks of 700 points, few held, hand on what one does; the third ball is in a gap: unplaced"
     rng = np.random.default_rng(1)
     elapsed = np.sort(rng.uniform(0, 100, 20_000))
     xyz = ORIGIN + np.outer(elapsed, [0.0, 10.0, 0.0]) + rng.uniform(-5, 5, (20_000, 3))
     cloud = PointCloud(xyz, START + elapsed, np.arange(20_000.0))
-    control = control_point(ORIGIN + np.array([2.0, 100.0, 0.0]), "circle")
-    control += control_point(ORIGIN + np.array([2.0, 550.0, 0.0]), "circle")  # in the gap
-    trajectory = straight()
+    places = ORIGIN + np.array(
+        [[2.0, y, 0.0] for y in (100.0, 112.0, 550.0)]
+    )  # the last in the gap
+    control = control_point(places[0], "circle")
+    control += control_point(places[1], "circle") + control_point(places[2], "circle")
+    survey = survey_of(straight(), control, [cloud])
 
     def read(size):
         return lambda _: (cloud[i : i + size] for i in range(0, len(cloud), size))
 
-    survey = survey_of(trajectory, control, [cloud])
-    whole, parts = collect(survey, read(len(cloud))), collect(survey, read(700))
+    whole, about, count = near(survey, read(len(cloud)))
+    monkeypatch.setitem(SETTINGS.__dict__, "held_points", 100)
+    parts, about_parts, count_parts = near(survey, read(700))
     expected = np.linalg.norm(xyz[:, None] - control.position, axis=2)
     expected = expected < search_radius(survey, control)
-    assert np.array_equal(whole.cloud.intensity, np.flatnonzero(expected[:, 0]))
-    assert np.array_equal(whole.unplaced.intensity, np.flatnonzero(expected[:, 1]))
-    for name in ("cloud", "unplaced"):
-        assert np.array_equal(getattr(parts, name).xyz, getattr(whole, name).xyz)
-    assert np.array_equal(parts.pass_number, whole.pass_number)
+    assert list(about) == list(about_parts) == [0, 1]
+    for index in about:
+        of, numbers = about[index]
+        assert np.array_equal(of.intensity, np.flatnonzero(expected[:, index]))
+        assert np.allclose(of.xyz + control.position[index], xyz[expected[:, index]], atol=1e-9)
+        assert np.array_equal(of.xyz, about_parts[index][0].xyz)
+        assert np.array_equal(numbers, about_parts[index][1])
+    assert count == count_parts == expected[:, :2].any(axis=1).sum()  # both balls hold some
+    for candidates in (whole, parts):
+        assert np.array_equal(candidates.unplaced.intensity, np.flatnonzero(expected[:, 2]))
+
+
+def test_a_ball_is_passed_by_itself():
+    "Of two that overlap the first is handed on with all its points, before the second was passed"
+    balls = Neighbourhoods(ORIGIN + np.array([[0.0, 0.0, 0.0], [0.0, 3.0, 0.0]]), np.full(2, 2.0))
+    north = np.array([-1.0, 1.5, 4.0])
+    held = PointsInBalls(balls)
+    held.add(PointCloud(ORIGIN + np.outer(north, [0, 1, 0]), START + north, north))
+    assert held.passed(START + 2.0).tolist() == [0]
+    assert held.inside(0).intensity.tolist() == [-1.0, 1.5]
+    assert held.inside(1).xyz[:, 1] == pytest.approx([-1.5, 1.0])  # m, from its middle
+    held.release(np.array([0]))
+    assert len(held) == 2 and held.since() == START + 1.5  # s
+    assert held.passed(START + 2.0).tolist() == [] and held.passed(np.inf).tolist() == [1]
+    assert len(held.inside(1)) == 2
 
 
 def test_passes_without_a_target_count_too():
@@ -57,9 +102,9 @@ def test_passes_without_a_target_count_too():
     early = PointCloud(seen.cloud.xyz + 5000.0, seen.cloud.gps_time - 0.5, seen.cloud.intensity)
     files = {"late": seen.cloud, "early": early}
     survey = survey_of(seen.trajectory, seen.control, files)
-    candidates = collect(survey, lambda name: [files[name]])
-    assert len(candidates.cloud) > 0
-    assert set(candidates.pass_number) == {2}
+    _, about, count = near(survey, lambda name: [files[name]])
+    assert count > 0
+    assert set(about[0][1]) == {2}
 
 
 def test_collect_far_from_control_keeps_nothing():
@@ -67,6 +112,6 @@ def test_collect_far_from_control_keeps_nothing():
     seen = view("disc on a board", 1)
     away = replace(seen.control, position=seen.control.position + 5000.0)
     survey = survey_of(seen.trajectory, away)
-    candidates = collect(survey, lambda _: [seen.cloud])
-    assert len(candidates.cloud) == len(candidates.unplaced) == 0
-    assert fit_near_control(candidates, survey, np.random.default_rng(0)) == []
+    candidates, about, count = near(survey, lambda _: [seen.cloud])
+    assert len(candidates.unplaced) == len(about) == count == 0
+    assert fit_while_reading(survey, lambda _: [seen.cloud])[0] == []

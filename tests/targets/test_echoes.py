@@ -3,6 +3,7 @@ import pytest
 
 from mlscorr.targets.echoes import Echoes, beams_at_plane, missed_points
 from mlscorr.targets.plane import plane_through
+from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
 
 FACE = plane_through(np.array([0.0, 5.0, 0.0]), np.array([0.0, -1.0, 0.0]))  # 5 m off
@@ -11,7 +12,9 @@ FACE = plane_through(np.array([0.0, 5.0, 0.0]), np.array([0.0, -1.0, 0.0]))  # 5
 def echoes(xyz, intensity=None, gps_time=None):
     "Points seen from the origin"
     time = np.arange(len(xyz)) * 1e-5 if gps_time is None else gps_time
-    return Echoes(xyz, time, np.ones(len(xyz)) if intensity is None else intensity, xyz, 0.03)
+    intensity = np.ones(len(xyz)) if intensity is None else intensity
+    path = ScannerPath(time[[0, -1]], np.zeros((2, 3)))
+    return Echoes(xyz, time, intensity, path, 0.03)
 
 
 def test_beams_are_bright_dark_or_miss_the_plane():

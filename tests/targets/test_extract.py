@@ -6,8 +6,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles
+from mlscorr.pipeline.finding import fit_while_reading
 from mlscorr.survey import ControlPoints, PointCloud, Scanner, Survey, Trajectory
-from mlscorr.targets import as_observations, collect, fit_near_control
+from mlscorr.targets import as_observations
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 START = 357_700.0  # s of the GPS week
@@ -165,8 +166,7 @@ def survey_of(trajectory, control, clouds=(None,)):
 
 def find(view):
     survey = survey_of(view.trajectory, view.control)
-    candidates = collect(survey, lambda _: [view.cloud])
-    return as_observations(fit_near_control(candidates, survey, np.random.default_rng(0)))
+    return as_observations(fit_while_reading(survey, lambda _: [view.cloud])[0])
 
 
 @dataclass(frozen=True)
@@ -349,6 +349,6 @@ def test_without_contrast_there_is_no_target():
     assert len(find(seen)) == 0
     for level in (0.0, 100.0):
         flat = replace(seen.cloud, intensity=np.full(len(seen.cloud), level))
-        with pytest.warns(UserWarning, match=f"all .* points is {level:g}.* Bright targets can't"):
+        with pytest.warns(UserWarning, match=f"all points is {level:g}.* Bright targets can't"):
             assert len(find(replace(seen, cloud=flat))) == 0
     assert len(find(replace(seen, cloud=seen.cloud[:0]))) == 0

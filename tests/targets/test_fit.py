@@ -8,6 +8,7 @@ from target_rays import SCANNER, TARGETS, view
 
 from mlscorr.survey import PointCloud
 from mlscorr.targets.fit import fit_targets
+from mlscorr.targets.scanner_path import ScannerPath
 
 UTM = np.array([532_000.0, 3_374_000.0, 40.0])  # m
 SIZE = 0.6  # m
@@ -17,7 +18,7 @@ STEP = 1.5e-3  # rad between pulses: sparse, which is quick
 
 def fit(seen, kind, size=SIZE, seed=0):
     rng = np.random.default_rng(seed)
-    return fit_targets(seen.cloud, seen.sight, [(kind, size)], SCANNER, rng)
+    return fit_targets(seen.cloud, seen.path, [(kind, size)], SCANNER, rng)
 
 
 @cache
@@ -42,7 +43,8 @@ def test_every_kind_is_found_to_millimetres_and_nothing_else(look):
             square.append(error[-1] @ np.linalg.solve(target.covariance, error[-1]) / 3)
             assert target.gps_time == pytest.approx(seen.gps_time, abs=0.03)  # s
             assert 0.5 < target.score <= 1.0
-            assert target.normal @ seen.sight.mean(axis=0) < 0
+            scanner = seen.path.at(np.array([seen.gps_time]))[0]
+            assert target.normal @ (seen.centre - scanner) < 0
     distance = np.linalg.norm(error, axis=1)
     assert len(distance) >= len(views(look)) - 1
     assert np.median(distance) < 0.003  # m
@@ -88,8 +90,8 @@ def test_a_piece_without_a_target_gives_none():
     "Road and post alone, and a piece of ten points, hold no target of any kind"
     seen = views("disc")[0]
     away = np.linalg.norm(seen.cloud.xyz - seen.centre, axis=1) > 1.2 * SIZE
-    empty = replace(seen, cloud=seen.cloud[away], sight=seen.sight[away])
-    few = replace(seen, cloud=seen.cloud[:10], sight=seen.sight[:10])
+    empty = replace(seen, cloud=seen.cloud[away])
+    few = replace(seen, cloud=seen.cloud[:10])
     for kind in ("circle", "square", "checkerboard"):
         assert fit(empty, kind) == fit(few, kind) == []
 
@@ -117,7 +119,8 @@ def test_a_twig_whose_plane_turns_away_from_it_is_no_target(seed):
     order = rng.permutation(len(xyz))
     across = rng.choice([-1, 1]), rng.uniform(0.0, 0.4), rng.uniform(-1, 1)
     beam = across @ axes[:, [1, 2, 0]].T
-    sight = xyz + 8 * beam / np.linalg.norm(beam)
+    scanner = UTM - 8 * beam / np.linalg.norm(beam) + np.zeros((2, 3))
     time = 357_700.0 + np.arange(len(xyz)) * 1e-5
     cloud = PointCloud(xyz[order] + UTM, time, intensity[order].astype(np.uint16))
-    assert fit_targets(cloud, sight[order], [("square", SIZE)], SCANNER, rng) == []
+    path = ScannerPath(time[[0, -1]], scanner)
+    assert fit_targets(cloud, path, [("square", SIZE)], SCANNER, rng) == []

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.survey import PointCloud, Scanner
 from mlscorr.targets.fit import fit_targets
+from mlscorr.targets.scanner_path import ScannerPath
 from tests.beds.shared import shared
 
 SCANNER = Scanner(range_noise=0.015, angle_noise=np.radians(0.02))  # data sheet of its 64 beams
@@ -31,7 +32,8 @@ def fit_holes(path, size, turn=None, origin=0.0):
     near = np.linalg.norm(xyz - BOARD, axis=1) < REACH
     sight = xyz[near] if turn is None else turn.apply(xyz[near])
     cloud = PointCloud(sight + origin, time[near], intensity[near])
-    found = fit_targets(cloud, sight, [("hole", size)], SCANNER, np.random.default_rng(0))
+    path = ScannerPath(np.array([time.min(), time.max()]), np.zeros((2, 3)) + origin)
+    found = fit_targets(cloud, path, [("hole", size)], SCANNER, np.random.default_rng(0))
     board = (BOARD if turn is None else turn.apply(BOARD)) + origin
     return [one for one in found if np.linalg.norm(one.position - board) < 0.7]
 

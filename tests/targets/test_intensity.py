@@ -11,7 +11,7 @@ from mlscorr.targets.settings import SETTINGS
 
 def test_why_useless_names_the_reason():
     "All equal, or a flag of two values; 8 bits in 16 are of use"
-    assert "all 5 points is 7" in why_useless(np.full(5, 7))
+    assert "all points is 7" in why_useless(np.full(5, 7))
     assert "only 2 values" in why_useless(np.arange(10) % 2)
     assert why_useless(np.arange(256)) is None
 
@@ -23,7 +23,7 @@ def test_levels_count_and_not_points(levels):
     told = why_useless(values)
     assert (told is None) == (levels >= SETTINGS.smallest_levels)
     if 1 < levels < SETTINGS.smallest_levels:
-        assert told == f"The intensity of {1000 * levels} points takes only {levels} values."
+        assert told == f"The intensity takes only {levels} values."
 
 
 @given(st.lists(st.integers(0, 65_535), max_size=30), st.integers(1, 256), st.randoms())
@@ -38,4 +38,4 @@ def test_neither_order_nor_scale_matters(values, factor, random):
 
 def test_no_points_are_told():
     "A cloud without a point has an intensity that is missing"
-    assert why_useless(np.zeros(0)) == "The intensity of all 0 points is missing."
+    assert why_useless(np.zeros(0)) == "The intensity of all points is missing."

@@ -1,5 +1,7 @@
 """Seeds stand where targets are, and say how large what they saw is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,7 +62,7 @@ def test_a_saturated_disc_may_be_larger():
     "Where more than half of its points have the largest count it is told, else not"
     echoes = wall(disc, RNG(1))
     clipped = type(echoes)(
-        echoes.xyz, echoes.gps_time, np.minimum(echoes.intensity, 10_000.0), echoes.sight, TOLERANCE
+        echoes.xyz, echoes.gps_time, np.minimum(echoes.intensity, 10_000.0), echoes.path, TOLERANCE
     )
     assert all(seed.bloomed for seed in bright_seeds(clipped, "circle", SIZE))
     wide = wall(lambda u, v: np.hypot(u, v) < 0.45, RNG(1))
@@ -124,8 +126,8 @@ def test_flat_patches_are_the_planes_of_a_piece():
         [rng.uniform(4.0, 5.5, 1500), rng.normal(1.0, 0.002, 1500), rng.uniform(-1, 1, 1500)]
     )
     xyz = np.vstack([first, second])
-    one = np.ones(len(xyz))
-    echoes = type(wall(disc, rng))(xyz, one.cumsum(), one, xyz.copy(), TOLERANCE)
+    one, seen = np.ones(len(xyz)), wall(disc, rng)
+    echoes = replace(seen, xyz=xyz, gps_time=one.cumsum(), intensity=one)
     patches = list(flat_patches(echoes, SIZE, RNG(1)))
     assert len(patches) == 2
     (plane, rows), (other, others) = patches

@@ -6,7 +6,7 @@ from mlscorr.gap.close.beams import Beams
 from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.survey import PointCloud, Survey
-from mlscorr.targets import BY_EDGES, BrightRegion, diameter, fit_targets, scanner_path
+from mlscorr.targets import BY_EDGES, BrightRegion, ScannerPath, diameter, fit_targets
 from mlscorr.targets import SETTINGS as TARGETS
 
 
@@ -71,14 +71,14 @@ def _fitted(cloud, shape, survey, expected, bright, rng):
     apart = np.linalg.norm(cloud.xyz - expected, axis=1)
     if (apart <= SETTINGS.same * size).sum() < TARGETS.smallest_count:
         return None
-    sight = cloud.xyz - scanner_path(cloud.gps_time, survey.trajectory, survey.lever_arm)
+    path = ScannerPath.of(survey, cloud.gps_time)
     beside = cloud.intensity[apart > SETTINGS.background * size]
     dark = np.percentile(beside, 90) if len(beside) else 0.0
     spot = BrightRegion(expected, SETTINGS.extent * diameter(kind, size), (bright + dark) / 2)
     lit = (cloud.intensity >= spot.threshold) & (apart <= spot.radius)
     spots = [None] if kind in BY_EDGES or lit.sum() < TARGETS.smallest_count else [spot, None]
     for spot in spots:
-        targets = fit_targets(cloud, sight, [shape], survey.scanner, rng, spot)
+        targets = fit_targets(cloud, path, [shape], survey.scanner, rng, spot)
         away = [np.linalg.norm(target.position - expected) for target in targets]
         if away and min(away) <= SETTINGS.same * size:
             return targets[int(np.argmin(away))]
