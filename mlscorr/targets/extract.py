@@ -36,8 +36,8 @@ def fit_near_control(
     list of (segment, FittedTarget)
         Of one target several fits, by what was looked at.
     """
-    surveyed, seed = survey.surveyed, rng.integers(2**63)  # of each piece alike: none depends on
-    shape = surveyed.kind[index], float(surveyed.size[index])  # another
+    surveyed, seed = survey.surveyed, rng.integers(2**63)  # alike for each: none needs another
+    shape = surveyed.kind[index], float(surveyed.size[index])
     targets, place = [], surveyed.position[index]
     whole = search_radius(survey, surveyed)[index]
     near = min(SETTINGS.near_radius + shape[1] / np.sqrt(2), whole)
