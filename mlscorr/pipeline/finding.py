@@ -93,8 +93,8 @@ def _checked(survey, targets, candidates, near):
         reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
         raise ValueError(
             f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
-            f"were found ({near.intensities} there). {reasons} Are control and cloud in the same "
-            "CRS?"
+            f"were found ({near.intensity_range} there). {reasons} Are control and cloud in the "
+            "same CRS?"
         )
     names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
     return replace(finding, scanned=names, warnings=sentences)

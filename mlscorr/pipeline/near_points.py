@@ -36,7 +36,7 @@ class NearPoints:
         self.is_present = np.zeros(1 << 16, bool)
 
     @property
-    def intensities(self) -> str:
+    def intensity_range(self) -> str:
         """The darkest and the brightest, in words."""
         present = np.flatnonzero(self.is_present)
         return f"intensity {present[0]} to {present[-1]}"
@@ -135,7 +135,7 @@ def nothing_found(survey: Survey, candidates: Candidates, near: NearPoints) -> s
         )
     return (
         f"None of the {len(surveyed)} surveyed targets was found among {near.points} points "
-        f"within {radius:.1f} m of them ({near.intensities}). Targets are circles or squares of "
-        "the surveyed size, brighter than what surrounds them: check kind and size in the control "
-        "file, and the intensity."
+        f"within {radius:.1f} m of them ({near.intensity_range}). Targets are circles or squares "
+        "of the surveyed size, brighter than what surrounds them: check kind and size in the "
+        "control file, and the intensity."
     )

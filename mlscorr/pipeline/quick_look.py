@@ -195,6 +195,6 @@ def _doubt(survey, matched, candidates, near):
         return nothing_found(survey, candidates, near)
     return (
         f"A quick look finds {_count(matched)} of the {len(survey.control)} surveyed points that "
-        f"it looks at, among {near.points} points ({near.intensities}) near them: check kind, "
+        f"it looks at, among {near.points} points ({near.intensity_range}) near them: check kind, "
         "size and place in the control file, and the intensity of the cloud."
     )

@@ -15,11 +15,12 @@ NO_POINTS = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0, np.uint16))
 
 @dataclass(frozen=True)
 class Candidates:
-    """Points near control points.
+    """Points near control points that are kept, and the passes of the clouds.
 
     Parameters
     ----------
     cloud : PointCloud
+        On targets, once these are matched.
     pass_number : (n,) int array
         Of each point. A pass starts with each file and at each gap of the trajectory; passes count
         from 1 in time.
@@ -88,12 +89,10 @@ class PointsInBalls:
         ball = self._balls[np.array([number])]
         rows = [ball.contains(part.xyz) for part in self._parts]
         ends = np.cumsum([len(k) for k in rows])
-        xyz = np.empty((ends[-1], 3))  # filled by parts, as those of dense balls are large
+        xyz, columns = np.empty((ends[-1], 3)), []  # filled by parts, as dense balls are large
         for part, k, places in zip(self._parts, rows, np.split(xyz, ends[:-1]), strict=True):
             np.subtract(part.xyz[k], ball.position, out=places)
-        columns = [
-            (part.gps_time[k], part.intensity[k]) for part, k in zip(self._parts, rows, strict=True)
-        ]
+            columns.append((part.gps_time[k], part.intensity[k]))
         return PointCloud(xyz, *map(np.concatenate, zip(*columns, strict=True)))
 
     def release(self, numbers: np.ndarray) -> None:
@@ -154,14 +153,15 @@ def collect(
             rows = near.contains(chunk.xyz)
             has_pose = segment[rows] >= 0
             unplaced.append(chunk[rows[~has_pose]])
-            held.add(chunk[rows[has_pose]])
-            count(chunk[rows[has_pose]])
+            placed = chunk[rows[has_pose]]
+            held.add(placed)
+            count(placed)
             if len(held) > limit:
                 latest = chunk.gps_time.max()
                 hand_on(number, held, latest - MATCHING.pause, latest)
                 limit = max(SETTINGS.held_points, 2 * len(held))
             progress(len(chunk))
-            del chunk, segment, rows, has_pose  # large, and needed no more
+            del chunk, segment, rows, has_pose, placed  # large, and needed no more
         hand_on(number, held, np.inf, np.inf)
     return Candidates(
         NO_POINTS, np.empty(0, int), PointCloud.concatenate(unplaced), number_passes(starts), starts

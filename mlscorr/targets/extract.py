@@ -12,7 +12,7 @@ from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.visits import motion_covariance, split_visits
 
-PassTarget = tuple[int, FittedTarget]  # a pass number, and a target of that pass
+PassTarget = tuple[int, FittedTarget]  # number of a pass, or of its segment, and a target of it
 
 
 def fit_near_control(
