@@ -33,6 +33,7 @@ from mlscorr.collocation.row_loops import (
 )
 from mlscorr.collocation.sparse_rows import Sides, SparseRows
 from mlscorr.collocation.states import Layout
+from mlscorr.collocation.steps import sufficient_steps
 
 
 @dataclass(frozen=True)
@@ -57,15 +58,15 @@ class InformationSolver:
 
     @classmethod
     def of(
-        cls, rows: Sequence[SparseRows], like: InformationSolver | None = None
+        cls, rows: Sequence[SparseRows], like: InformationSolver | None, tolerance: float = 0.0
     ) -> InformationSolver:
         """The solver of rows; see ``collocate_rows``."""
         signals = rows[0].signals
         layout = Layout.of(signals)
         if like is None:
             times, clocks = zip(*(part.epochs for part in rows), strict=True)
-            covariances = [signal.covariance for signal in signals]
-            knots = Knots.of(np.concatenate(times), np.concatenate(clocks), covariances)
+            epochs = np.concatenate(times), np.concatenate(clocks)
+            knots = Knots.of(*epochs, sufficient_steps(rows, tolerance))
         else:
             knots = like.knots
         processes = np.bincount(layout.signal, minlength=len(signals))
@@ -139,9 +140,18 @@ class InformationSolver:
 
     def precision(self, rows: np.ndarray) -> np.ndarray:
         """A block of V^-1."""
-        unit = np.zeros((sum(part.sigma.size for part in self.sides), len(rows)))
-        unit[rows, np.arange(len(rows))] = 1.0
-        return self.solve(unit)[rows]
+        table = self.layout, self.pattern, self._cells
+        x, parts = np.zeros((self.pattern.states, len(rows))), []
+        all_numbers = self.by_rows(np.arange(len(self.columns))[:, None])
+        for sides, numbers in zip(self.sides, all_numbers, strict=True):
+            is_asked = np.isin(numbers, rows).any(axis=(1, 2))
+            part = Sides(*(values[is_asked] for values in sides))
+            unit = np.ascontiguousarray(part.white @ (numbers[is_asked] == rows))
+            send_to_states(*table, part, unit, x)
+            parts.append((part, unit))
+        solve_in_place(self.pattern, self._factor, x)
+        left = ((unit, unit - observe_states(*table, part, x)) for part, unit in parts)
+        return sum(np.einsum("nri,nrj->ij", *both) for both in left)
 
     @cached_property
     def blocks(self) -> list[np.ndarray]:
@@ -166,8 +176,7 @@ class InformationSolver:
     @cached_property
     def _cells(self):
         """Knots.cells in the order of elimination."""
-        cells = self.knots.cells
-        return np.where(cells >= 0, self.pattern.place[cells], -1)
+        return np.append(self.pattern.place, -1)[self.knots.cells]  # -1 stays
 
     @cached_property
     def _prior(self):

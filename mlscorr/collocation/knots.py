@@ -10,8 +10,9 @@ rows of one interval may have each an r of its own. The prior of the states is a
 steps of smooth signals are too small no digit is left of L0. So each signal has knots of its own,
 a step apart after which r in the middle, Q_11(step / 4), is ``SHARE`` of the signal's sigma: a
 22nd of the correlation time for Matern 5/2, a 350th for 3/2, 1/184 on the clock of an integrated
-random walk; the exponential one has them at all epochs. A knot may leave out epochs within a
-quarter of a step, where r is no larger.
+random walk; the exponential one has them at all epochs. Where rows tell less, longer steps do
+(``sufficient_steps``). A knot may leave out epochs within a quarter of a step, where r is no
+larger.
 """
 
 from __future__ import annotations
@@ -53,22 +54,18 @@ class Knots(NamedTuple):
     cells: np.ndarray
 
     @classmethod
-    def of(
-        cls, gps_time: np.ndarray, clocks: np.ndarray, covariances: Sequence[Covariance]
-    ) -> Knots:
+    def of(cls, gps_time: np.ndarray, clocks: np.ndarray, steps: Sequence[float]) -> Knots:
         """The knots that signals need at given epochs.
 
         Parameters
         ----------
         gps_time, clocks : (q,), (q, s) array
             Of the epochs, in any order and more than once. Units: s.
-        covariances : sequence of Covariance
+        steps : sequence of float
+            Largest step of each signal between its knots, on its clock.
         """
         epochs, rows = np.unique(gps_time, return_index=True)
-        kept = [
-            thinned(clock, knot_step(covariance))
-            for clock, covariance in zip(clocks[rows].T, covariances, strict=True)
-        ]
+        kept = [thinned(clock, step) for clock, step in zip(clocks[rows].T, steps, strict=True)]
         first = np.concatenate([[0], np.cumsum([len(k) for k in kept])]).astype(np.int64)
         times = np.unique(np.concatenate([epochs[:0], *(epochs[k] for k in kept)]))
         edges = np.append(-np.inf, times)
@@ -85,17 +82,19 @@ class Knots(NamedTuple):
         return np.searchsorted(self.times, gps_time, side="right")
 
 
-def knot_step(covariance: Covariance) -> float:
+def knot_step(covariance: Covariance, share: float = SHARE) -> float:
     """Largest step between knots among epochs, on the signal's clock.
 
     Parameters
     ----------
     covariance : Covariance
+    share : float
+        Of the signal's sigma that knots may leave.
     """
     small = 1e-3  # where Q_11 has only its first power
     power = 1.0 / (2 * covariance.states - 1)
     variance = process_noise(covariance.kind, small)[0]
-    return float(4 * small * (SHARE**2 / variance) ** power / covariance.rate)
+    return float(4 * small * (share**2 / variance) ** power / covariance.rate)
 
 
 @njit(cache=True, nogil=True)

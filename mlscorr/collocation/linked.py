@@ -16,7 +16,7 @@ from mlscorr.collocation.sparse_rows import SparseRows
 
 
 def collocate_rows(
-    rows: Sequence[SparseRows], like: InformationSolver | None = None
+    rows: Sequence[SparseRows], like: InformationSolver | None = None, tolerance: float = 0.0
 ) -> Collocation:
     r"""Separate the misclosures of sparse rows into trend, signal and noise.
 
@@ -34,6 +34,9 @@ def collocate_rows(
     like : InformationSolver, optional
         Of the same epochs: its knots and order of elimination are used again. A likelihood is
         smooth in the signals' parameters only where knots stay.
+    tolerance : float
+        What knots may leave over what the observations of an interval between two of them leave
+        open together: fewer knots, where those for all digits would only cost time.
 
     Returns
     -------
@@ -60,7 +63,7 @@ def collocate_rows(
     >>> mean.round(4), np.sqrt(covariance).round(4)
     (array([[0.3]]), array([[[0.0014]]]))
     """
-    return _solve(InformationSolver.of(rows, like))
+    return _solve(InformationSolver.of(rows, like, tolerance))
 
 
 def reweight(solved: Collocation, weights: Sequence[np.ndarray]) -> Collocation:

@@ -55,7 +55,7 @@ def test_every_signal_has_knots_of_its_own_and_a_cell_names_those_about_it():
     "An exponential signal has them at all epochs, a smooth one at some"
     gps_time = START + np.array([5.0, 0.0, 0.1, 0.2, 0.3, 5.0])
     covariances = [Covariance("exponential", 30.0), Covariance("matern52", 30.0)]
-    knots = Knots.of(gps_time, np.column_stack([gps_time, gps_time]), covariances)
+    knots = Knots.of(gps_time, np.column_stack([gps_time, gps_time]), map(knot_step, covariances))
     assert knots.first.tolist() == [0, 5, 7]
     assert (knots.clock - START).round(9).tolist() == [0.0, 0.1, 0.2, 0.3, 5.0, 0.0, 5.0]
     assert knots.cells[0].tolist() == [[-1, 0], [-1, 5]]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation.knots import Knots
+from mlscorr.collocation.knots import Knots, knot_step
 from mlscorr.collocation.sparse_rows import Sides
 from mlscorr.collocation.states import Layout
 from tests.beds.joint_states import ALL_FAMILIES
@@ -15,7 +15,7 @@ def sides_of(street, nodes=1000):
     rows = street.rows
     times, clocks = (np.concatenate(part) for part in zip(*(r.epochs for r in rows), strict=True))
     layout = Layout.of(rows[0].signals)
-    knots = Knots.of(times, clocks, [signal.covariance for signal in rows[0].signals])
+    knots = Knots.of(times, clocks, [knot_step(signal.covariance) for signal in rows[0].signals])
     return layout, knots, [Sides.of(part, layout, knots, nodes) for part in rows]
 
 
