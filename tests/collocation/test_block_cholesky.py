@@ -70,3 +70,17 @@ def test_a_matrix_of_blocks_alone_needs_no_fill():
     values = np.tile([4.0, 0.0, 2.0, 5.0], 2)
     assert factorise(pattern, values) == -1
     assert values == pytest.approx(np.tile([2.0, 0.0, 1.0, 2.0], 2))
+
+
+def test_no_value_is_so_small_that_its_products_are_slow():
+    "Links of 1e-100 fill in 1e-200, of which neither factor nor inverse keeps anything"
+    pattern, values, _ = random_matrix(1)
+    off = np.concatenate(
+        [where.ravel() for rows, columns, where in blocks(pattern) if rows != columns]
+    )
+    values[off] *= 1e-100
+    for work in (factorise, invert_in_place):
+        work(pattern, values)
+        left = np.abs(values[values != 0.0])
+        assert left.min() > 1e-150
+        assert 0 < np.count_nonzero(left < 1e-50) < np.count_nonzero(off)
