@@ -20,9 +20,7 @@ class Settings:
     largest_lean: float = 0.2  # rad: of a pole; branches lean more
     roundness: float = 0.1  # of the radius, one sigma: trunks are no cylinders, masts have edges
     features: int = 32  # of a second and direction of a pass: two blocks of a wall, or of the road
-    ties: int = (
-        6  # of a second, direction and pair of passes: 10 mm each make 4 mm, two may be wrong
-    )
+    ties: int = 6  # of a second, direction and pass: 10 mm each make 4 mm, two may be wrong
     coarse_features: int = 6000  # for six unknowns of a mounting; more cost time alone
     block: float = 4.0  # m: neighbours that are kept together, so that two passes keep the same
     # Pairs

@@ -57,10 +57,12 @@ def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
 
 
 def thinned_ties(ties: Ties) -> Ties:
-    """As many ties of each second, pair of passes and direction as can still tell it anything.
+    """As many ties of each second of a pass, direction and other scanner as can tell anything.
 
     A second of them is believed to SETTINGS.best_second only (``weigh_by_time``): more of them
-    would cost time alone. Those stay whose first place has the least of some random numbers.
+    would cost time alone. What m visits saw has m - 1 differences that tell something new, not
+    m (m - 1) / 2, so the earlier view has as many ties with all later visits together. Those stay
+    whose first place and later pass have the least of some random numbers.
 
     Parameters
     ----------
@@ -68,8 +70,10 @@ def thinned_ties(ties: Ties) -> Ties:
     """
     moment = np.floor(ties.gps_time[:, 0] / SETTINGS.moment).astype(np.int64)
     bins = direction_class(ties.direction)
-    group = np.column_stack([ties.pass_number, moment, np.minimum(bins, 26 - bins)])
-    chance = _chance(np.floor(ties.place[:, 0] / SETTINGS.cell).astype(np.int64))
+    earlier, later = ties.pass_number.T
+    group = np.column_stack([earlier, ties.scanner[:, 1], moment, np.minimum(bins, 26 - bins)])
+    cell = np.floor(ties.place[:, 0] / SETTINGS.cell).astype(np.int64)
+    chance = _chance(np.column_stack([cell, later]))
     return ties[_least(group, [ties.gps_time[:, 0], chance], SETTINGS.ties)]
 
 
@@ -83,7 +87,7 @@ def _least(group, order, number):
 
 
 def _chance(cells):
-    """A random 64-bit number (n,) that depends on integers (n, 3) alone."""
+    """A random 64-bit number (n,) that depends on integers (n, k) alone."""
     mixed = np.zeros(len(cells), np.uint64)
     for number in cells.T:
         mixed ^= number.astype(np.uint64)
