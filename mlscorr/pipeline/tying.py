@@ -135,8 +135,9 @@ def _with_mounting_checked(survey, estimate, control):
 def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Estimate:
     """The estimate with the ties of a survey; the same with the reason where nothing is tied.
 
-    Pairs are looked for as far apart as the sigmas of the estimate allow, then half as far with
-    each correction that they make, down to the scatter of what is left of them.
+    Pairs are looked for as far apart as the sigmas of the estimate allow; with each correction that
+    they make, within the geometric mean of that and of the scatter of what is left of them, half as
+    far at most, down to that scatter.
 
     Parameters
     ----------
@@ -149,6 +150,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     correction = estimate.correction
     sigma = placed_sigma(correction, survey, features)
     radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
+    limit = 0.0
     moved = _moved(correction, features)
     mountings = [part.mounting for part in survey.by_scanner.values()]
     mountings = [] if None in mountings else mountings
@@ -160,12 +162,12 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
         ties = agreeing_ties(pairs, moved)
         if len(ties) == 0:
             return _untied(estimate, features, radius)
-        moved = _moved(previewed_correction(estimate, ties, mountings), features)
-        limit = narrowest_gate(ties, moved)
         if radius <= limit:
             unheld = _unheld(estimate, features, ties)
             return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
-        radius = max(radius / 2, limit)
+        moved = _moved(previewed_correction(estimate, ties, mountings), features)
+        limit = narrowest_gate(ties, moved)
+        radius = max(min(radius / 2, np.sqrt(radius * limit)), limit)
 
 
 def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) -> np.ndarray:
