@@ -214,6 +214,15 @@ class Collocation:
         """V^-1 A times the root of the trend's covariance, (m, p)."""
         return self.solver.solve(self.design) @ self.trend_root
 
+    def project(self, columns: np.ndarray) -> np.ndarray:
+        """P c of columns (m, k), with P = V^-1 - V^-1 A (A^T V^-1 A)^-1 A^T V^-1.
+
+        Parameters
+        ----------
+        columns : (m, k) array
+        """
+        return self.solver.solve(columns) - self.projected @ (self.projected.T @ columns)
+
     def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
         basis, limit = self._leverage[rows], 1.0 - SMALLEST_INFORMATION

@@ -57,13 +57,13 @@ class AddedUnknowns:
         prior_sigma : (k,) array
             One sigma of what is known of them without the survey.
         """
-        solutions = [with_misclosures(equations, column).solve(parameters) for column in columns.T]
-        weights = np.column_stack([solution.weights for solution in solutions])
+        solved = equations.solve(parameters)
+        weights = solved.project(columns)
         covariance = np.linalg.inv(columns.T @ weights + np.diag(prior_sigma**-2.0))
         right = weights.T @ misclosures_of(equations)
         correction = covariance @ right
         critical = float(chi2.isf(SETTINGS.significance, len(correction)))
-        response = np.column_stack([solution.trend for solution in solutions])
+        response = solved.trend_root @ (solved.projected.T @ columns)  # Eq. 13 of columns
         return cls(correction, covariance, response, float(right @ correction), critical)
 
     @property

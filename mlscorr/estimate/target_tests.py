@@ -60,12 +60,12 @@ def all_tests(equations: Equations, posterior: Posterior) -> list[TargetTest]:
     posterior : Posterior
         Of the parameters, by these equations.
     """
-    tests = []
-    for block in Objective.of(equations).blocks:
-        solved = [(block.solve(chosen), weight) for chosen, weight in posterior.points]
-        targets = len(equations.target_rows)
-        tests += [_test(block, *target, solved, targets) for target in block.target_rows.items()]
-    return tests
+    targets = len(equations.target_rows)
+    return [
+        test
+        for block in Objective.of(equations).blocks
+        for test in _tests(block, block.target_rows, posterior, targets)
+    ]
 
 
 def single_test(equations: Equations, name: str, posterior: Posterior) -> TargetTest:
@@ -80,23 +80,34 @@ def single_test(equations: Equations, name: str, posterior: Posterior) -> Target
         Of the parameters, by the others.
     """
     block = next(block for block in Objective.of(equations).blocks if name in block.names)
-    solved = [(block.solve(chosen), weight) for chosen, weight in posterior.points]
-    return _test(block, name, block.target_rows[name], solved, len(equations.target_rows))
+    return _tests(block, [name], posterior, len(equations.target_rows))[0]
 
 
-def _test(equations, name, rows, solved, targets):
+def _tests(equations, names, posterior, targets):
+    """TargetTests of some targets, by a Collocation after the other: many would fill the memory."""
+    left_out = {name: [] for name in names}
+    for chosen, weight in posterior.points:
+        solved = equations.solve(chosen)
+        for name, of_target in left_out.items():
+            rows = equations.target_rows[name]
+            if solved.determined_without(rows):
+                of_target.append((weight, *solved.leave_out(rows)))
+    return [_test(equations, name, parts, targets) for name, parts in left_out.items()]
+
+
+def _test(equations, name, left_out, targets):
     """TargetTest by the left-out misclosure, averaged over the parameters.
 
     What the parameters leave open is a part of its covariance, so that neither a mode that is too
     sure of itself decides nor one that the target itself has raised.
     """
+    rows = equations.target_rows[name]
     critical = float(chi2.isf(SETTINGS.significance / targets, len(rows)))
-    if not solved[0][0].determined_without(rows):
+    if not left_out:
         nothing = np.full((len(rows) // 3, 3), np.nan)
         return TargetTest(name, float("nan"), critical, nothing, nothing, nothing)
     mean, square = 0.0, 0.0
-    for collocation, weight in solved:
-        residual, covariance = collocation.leave_out(rows)
+    for weight, residual, covariance in left_out:
         mean = mean + weight * residual
         square = square + weight * (covariance + np.outer(residual, residual))
     covariance = square - np.outer(mean, mean)
