@@ -31,7 +31,7 @@ from mlscorr.collocation.row_loops import (
     row_covariances,
     send_to_states,
 )
-from mlscorr.collocation.sparse_rows import Sides, SparseRows
+from mlscorr.collocation.sparse_rows import Sides, SparseRows, check_same
 from mlscorr.collocation.states import Layout
 from mlscorr.collocation.steps import sufficient_steps
 
@@ -81,7 +81,7 @@ class InformationSolver:
             pattern = like.pattern
         placed = tuple(part.placed(pattern.place) for part in sides)
         if like is not None:
-            _check_same(sizes, pattern, placed, like.sides)
+            check_same(sizes, like.pattern, placed, like.sides)
         return cls(tuple(rows), layout, knots, pattern, placed)
 
     def reweighted(self, weights: Sequence[np.ndarray]) -> InformationSolver:
@@ -139,14 +139,22 @@ class InformationSolver:
         return np.concatenate([part.reshape(-1, part.shape[2]) for part in weights])
 
     def precision(self, rows: np.ndarray) -> np.ndarray:
-        """A block of V^-1."""
+        """A block of V^-1: of one observation by the selected inverse, else by solving."""
+        ends = np.cumsum([part.sigma.size for part in self.sides])
+        of_part = np.searchsorted(ends, rows, side="right")
+        number, row = np.divmod(rows - ends[of_part], self._heights[of_part])  # from the end
+        known = self.sides[of_part[0]]
+        is_one = (of_part == of_part[0]) & (number == number[0])
+        if is_one.all() and known.unknown[number[0]] < 0:
+            block = self._own_precision(Sides(*(values[number[:1]] for values in known)))
+            return block[0][np.ix_(row, row)]
         table = self.layout, self.pattern, self._cells
         x, parts = np.zeros((self.pattern.states, len(rows))), []
-        all_numbers = self.by_rows(np.arange(len(self.columns))[:, None])
-        for sides, numbers in zip(self.sides, all_numbers, strict=True):
-            is_asked = np.isin(numbers, rows).any(axis=(1, 2))
-            part = Sides(*(values[is_asked] for values in sides))
-            unit = np.ascontiguousarray(part.white @ (numbers[is_asked] == rows))
+        for k, sides in enumerate(self.sides):
+            asked = np.unique(number[of_part == k])
+            part = Sides(*(values[asked] for values in sides))
+            places = asked[:, None] * self._heights[k] + np.arange(self._heights[k]) + ends[k]
+            unit = np.ascontiguousarray(part.white @ (places[:, :, None] == rows))
             send_to_states(*table, part, unit, x)
             parts.append((part, unit))
         solve_in_place(self.pattern, self._factor, x)
@@ -156,12 +164,13 @@ class InformationSolver:
     @cached_property
     def blocks(self) -> list[np.ndarray]:
         """Blocks (n, r, r) of V^-1 of each observation, for each SparseRows."""
-        blocks = []
-        for part in self.sides:
-            white = part.white
-            known = row_covariances(self.layout, self.pattern, self._cells, part, self._inverse)
-            blocks.append(white.swapaxes(1, 2) @ (np.eye(white.shape[1]) - known) @ white)
-        return blocks
+        return [self._own_precision(part) for part in self.sides]
+
+    def _own_precision(self, sides):
+        """Blocks (n, r, r) of V^-1 of observations."""
+        table, white = (self.layout, self.pattern, self._cells), sides.white
+        known = row_covariances(*table, sides, self._inverse)
+        return white.swapaxes(1, 2) @ (np.eye(white.shape[1]) - known) @ white
 
     def predictor(self, _: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
         """The predictor of the rows' own columns, whatever is given; see Collocation.predict."""
@@ -172,6 +181,11 @@ class InformationSolver:
         return predictor_by(
             lambda epochs: interpolate_knots(*table, epochs), self.layout, trend, trend_root
         )
+
+    @property
+    def _heights(self):
+        """Number of rows of an observation, for each SparseRows."""
+        return np.array([part.sigma.shape[1] for part in self.sides])
 
     @cached_property
     def _cells(self):
@@ -284,17 +298,3 @@ class InformationSolver:
         is_shared = np.zeros(len(place), dtype=bool)
         is_shared[place[first[-1] :]] = True
         yield x[np.repeat(is_shared, np.diff(self.pattern.first))]
-
-
-def _check_same(sizes, pattern, sides, known):
-    """Refuse rows that see other states than those whose knots they should use."""
-    same = np.array_equal(sizes, np.diff(pattern.first)[pattern.place]) and len(sides) == len(known)
-    for here, there in zip(sides, known, strict=False):
-        same = same and np.array_equal(here.cell, there.cell)
-        same = same and np.array_equal(here.unknown, there.unknown)
-    if not same:
-        raise ValueError(
-            f"The {sum(len(part.cell) for part in sides)} observations see other epochs, shared "
-            "errors or states than those of the solution whose knots they should use. Leave "
-            "``like`` out."
-        )

@@ -214,15 +214,6 @@ class Collocation:
         """V^-1 A times the root of the trend's covariance, (m, p)."""
         return self.solver.solve(self.design) @ self.trend_root
 
-    def project(self, columns: np.ndarray) -> np.ndarray:
-        """P c of columns (m, k), with P = V^-1 - V^-1 A (A^T V^-1 A)^-1 A^T V^-1.
-
-        Parameters
-        ----------
-        columns : (m, k) array
-        """
-        return self.solver.solve(columns) - self.projected @ (self.projected.T @ columns)
-
     def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
         basis, limit = self._leverage[rows], 1.0 - SMALLEST_INFORMATION
@@ -251,8 +242,9 @@ class Collocation:
                 f"Without the {len(rows)} observations that are left out the other "
                 f"{len(self.misclosure) - len(rows)} do not determine the trend."
             )
+        weights = self.weights[rows]  # first: sparse rows part with their factor for an inverse
         covariance = np.linalg.inv(self.precision_of(rows))
-        return covariance @ self.weights[rows], covariance
+        return covariance @ weights, covariance
 
     def precision_of(self, rows: np.ndarray) -> np.ndarray:
         """Inverse covariance (k, k) of rows that are left out, the trend unknown."""

@@ -17,6 +17,7 @@ from mlscorr.collocation.knots import Knots, knot_gains
 from mlscorr.collocation.markov import check_finite
 from mlscorr.collocation.matrices import assign, whitening_root
 from mlscorr.collocation.model import NOT_POSITIVE, Noise, Signal, signal_clocks
+from mlscorr.collocation.pattern import Pattern
 from mlscorr.collocation.states import Layout
 
 
@@ -148,6 +149,32 @@ class Sides(NamedTuple):
         if np.isnan(white).any():
             raise ValueError(NOT_POSITIVE.format(self.sigma.size))
         return self._replace(white=white)
+
+
+def check_same(
+    sizes: np.ndarray, pattern: Pattern, sides: Sequence[Sides], known: Sequence[Sides]
+) -> None:
+    """Refuse rows that see other states than those whose knots they should use.
+
+    Parameters
+    ----------
+    sizes : (k,) int array
+        Number of states of each node that the rows see.
+    pattern : Pattern
+        Of the others.
+    sides, known : sequences of Sides
+        Of the rows, and of the others.
+    """
+    same = np.array_equal(sizes, np.diff(pattern.first)[pattern.place]) and len(sides) == len(known)
+    for here, there in zip(sides, known, strict=False):
+        same = same and np.array_equal(here.cell, there.cell)
+        same = same and np.array_equal(here.unknown, there.unknown)
+    if not same:
+        raise ValueError(
+            f"The {sum(len(part.cell) for part in sides)} observations see other epochs, shared "
+            "errors or states than those of the solution whose knots they should use. Leave "
+            "``like`` out."
+        )
 
 
 @njit(cache=True, nogil=True)

@@ -58,12 +58,13 @@ class AddedUnknowns:
             One sigma of what is known of them without the survey.
         """
         solved = equations.solve(parameters)
-        weights = solved.project(columns)
+        taken = solved.projected.T @ columns
+        weights = solved.solver.solve(columns) - solved.projected @ taken  # P M
         covariance = np.linalg.inv(columns.T @ weights + np.diag(prior_sigma**-2.0))
         right = weights.T @ misclosures_of(equations)
         correction = covariance @ right
         critical = float(chi2.isf(SETTINGS.significance, len(correction)))
-        response = solved.trend_root @ (solved.projected.T @ columns)  # Eq. 13 of columns
+        response = solved.trend_root @ taken
         return cls(correction, covariance, response, float(right @ correction), critical)
 
     @property

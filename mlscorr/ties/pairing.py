@@ -182,7 +182,9 @@ def candidate_pairs(
                 partner = visits[i][nearest[first, column]]
                 pairs = np.column_stack([partner, visits[j][first]])
                 parts.append(pairs if i < j else pairs[:, ::-1])
-    pairs = np.unique(np.concatenate(parts), axis=0)
+    number = np.sort(np.concatenate(parts) @ [len(features), 1])
+    number = number[np.diff(number, prepend=-1) > 0]  # each once, sooner than by np.unique
+    pairs = np.column_stack(np.divmod(number, len(features)))
     apart = np.diff(place[pairs], axis=1)[:, 0] + shift[pairs[:, 1]]
     distance = _distance(features, apart, sigma, radius, pairs)
     cosine = np.einsum("ni,ni->n", *features.direction[pairs.T])
@@ -223,8 +225,8 @@ def _mutual(features, pairs, distance):
     pairs = pairs[np.argsort(distance, kind="stable")]
     nearest = np.ones(len(pairs), bool)
     for feature, partner in (pairs.T, pairs.T[::-1]):
-        keys = np.column_stack([feature, features.pass_number[partner]])
+        key = feature * (features.pass_number.max() + 1) + features.pass_number[partner]
         is_first = np.zeros(len(pairs), bool)
-        is_first[np.unique(keys, axis=0, return_index=True)[1]] = True
+        is_first[np.unique(key, return_index=True)[1]] = True
         nearest &= is_first
     return pairs[nearest]
