@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from scipy.sparse import coo_array
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import spilu
 
 
 class Pattern(NamedTuple):
@@ -95,7 +95,7 @@ class Pattern(NamedTuple):
 
 
 def _elimination_order(count, edges):
-    """Place of each node; the factor that SuperLU makes of the graph to find it is thrown away."""
+    """Place of each node, by SuperLU."""
     if count == 0:
         return np.zeros(0, dtype=np.int64)
     distinct = edges[edges[:, 0] != edges[:, 1]]
@@ -103,8 +103,9 @@ def _elimination_order(count, edges):
     graph = coo_array((np.full(both.shape[1], -1.0), tuple(both)), shape=(count, count)).tocsc()
     graph.data[:] = -1.0
     graph.setdiag(np.diff(graph.indptr) + 1.0)  # dominant: nothing is swapped
-    options = {"SymmetricMode": True}
-    factor = splu(graph.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    symmetric = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    nothing = {"drop_tol": 1.0, "fill_factor": 1}  # of a factor that nobody wants
+    factor = spilu(graph.tocsc(), permc_spec="MMD_AT_PLUS_A", **symmetric, **nothing)
     return factor.perm_c.astype(np.int64)
 
 
