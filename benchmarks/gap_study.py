@@ -16,10 +16,11 @@ import numpy as np
 from gap_mechanisms import ACTUAL, NOISES, STUDIED, Outside, metric, noisy, sized
 
 from mlscorr.gap.infer.causes import cause_of
+from mlscorr.gap.infer.decision import learned
 from mlscorr.gap.infer.labels import weigh_labels
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.separability import compare_signatures
-from mlscorr.gap.infer.verdict import decide, weigh_pairs
+from mlscorr.gap.infer.verdict import decide, joint_score
 from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.gap.train.errors import errors
 from mlscorr.gap.train.features import Geometry, geometry
@@ -82,7 +83,7 @@ def case(bed, rng, kind, effects=(), m=3.0, withheld=None, outside=None, noise=N
     rows = replace(rows, residual=residual)
     signs = tuple(s for s in bed.signs if s.name != withheld)
     evidence = weigh_labels(rows, g.background, g.survey, signs, rng, replicas)
-    probability = weigh_pairs(rows, signs, evidence)
+    probability = learned().probabilities(joint_score(rows, signs, evidence))
     answer = decide(evidence, probability)
     truth = "+".join(effects) or outside or noise or "none"
     off = None

@@ -6,9 +6,10 @@ import gap_study
 import numpy as np
 
 from mlscorr.collocation.covariance import Covariance
+from mlscorr.gap.infer.decision import learned
 from mlscorr.gap.infer.labels import weigh_labels
 from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.infer.verdict import decide, weigh_pairs
+from mlscorr.gap.infer.verdict import decide, joint_score
 from mlscorr.gap.signatures.changes import Bench
 
 
@@ -28,7 +29,8 @@ def named(rows, g, signs, replicas=0):
     "Verdict on rows"
     rng = np.random.default_rng(0)
     evidence = weigh_labels(rows, g.background, g.survey, signs, rng, replicas)
-    return decide(evidence, weigh_pairs(rows, signs, evidence))
+    joint = joint_score(rows, signs, evidence)
+    return decide(evidence, learned().probabilities(joint))
 
 
 def dense(g, model):

@@ -139,21 +139,6 @@ def joint_score(rows: Rows, signatures: Sequence[Signature], evidence: LabelEvid
     return JointScore(score, single, given.get(best, {}), facts, evidence.noisy)
 
 
-def weigh_pairs(
-    rows: Rows, signatures: Sequence[Signature], evidence: LabelEvidence
-) -> dict[str, float]:
-    """Probabilities of all labels, two of them together included, most probable first.
-
-    Parameters
-    ----------
-    rows : Rows
-    signatures : sequence of Signature
-    evidence : LabelEvidence
-        Of these.
-    """
-    return learned().probabilities(joint_score(rows, signatures, evidence))
-
-
 def _best_effect(evidence):
     """The effect with the largest score, or None without any."""
     return max(evidence.table.effects, key=lambda name: evidence.score[name][0], default=None)
