@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from mlscorr.correction import Correction
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.las import sample_gps_times
-from mlscorr.io.las_copy import write_corrected
+from mlscorr.io.las_copy import CorrectedPart, write_parts
 from mlscorr.survey import CloudFile, Trajectory
 
 START = 357_900.0  # s of week
@@ -79,7 +79,8 @@ def bare_copy(path, target):
 
 
 def corrected_copy(path, points, target, correction):
-    write_corrected(CloudFile(path, points, 0.0, "week"), target, correction)
+    file = CloudFile(path, points, 0.0, "week")
+    write_parts([CorrectedPart(file, correction)], target)
 
 
 def slerp_increments(correction, xyz, time):

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import mlscorr
-from mlscorr.io.las_copy import write_corrected
+from mlscorr.io.las_copy import CorrectedPart, write_parts
 from mlscorr.simulate import DEMO, simulate
 
 EVERY = 20  # points; neighbours have the same pose and hardly tell more
@@ -66,7 +66,7 @@ def costs(result, folder):
         for kind, its in enumerate((None, sigma)):
             target = folder / f"copy-{kind}.laz"
             start = time.perf_counter()
-            write_corrected(file, target, correction, sigma=its)
+            write_parts([CorrectedPart(file, correction, its)], target)
             best[kind] = min(best[kind], time.perf_counter() - start)
             size[kind] = target.stat().st_size
     return best[1] / best[0], size[1] / size[0]

@@ -32,47 +32,6 @@ class SupportsApply(Protocol):
         """The cloud with other coordinates."""
 
 
-def write_corrected(
-    cloud_file: CloudFile,
-    target: str | Path,
-    correction: SupportsApply,
-    watch: Callable[[np.ndarray], object] | None = None,
-    sigma: PointSigma | None = None,
-) -> int:
-    """Copy a CloudFile with corrected coordinates; all else stays as it was, byte for byte.
-
-    What changes: X, Y, Z of each point, the bounds in the header, and where it must, the
-    position of what follows the points. The target's suffix says whether it is compressed. It
-    appears whole or not at all: it is written beside its place as ``.part``, and read again
-    before it takes its name. A file there is replaced.
-
-    Parameters
-    ----------
-    cloud_file : CloudFile
-    target : path
-        ``.las`` or ``.laz``, not the input.
-    correction : Correction, or anything else with ``apply(cloud) -> cloud``
-    watch : function, optional
-        Called with the gps_time (n,) of each chunk that is done, in the trajectory's system.
-    sigma : PointSigma, optional
-        Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
-
-    Returns
-    -------
-    int
-        Number of points outside the trajectory, which are unchanged.
-
-    Raises
-    ------
-    ValueError
-        For bad input, a target that is the input, coordinates that overflow, and LAZ files with
-        waveforms (formats 9 and 10) of several scanner channels, which lazrs would damage.
-    OSError
-        When the target cannot be written.
-    """
-    return write_parts([CorrectedPart(cloud_file, correction, sigma, watch)], target)[0]
-
-
 @dataclass(frozen=True)
 class CorrectedPart:
     """Points of a file, and how they are corrected.
@@ -81,8 +40,11 @@ class CorrectedPart:
     ----------
     file : CloudFile
         All of the file, or those of one of several scanners or drives.
-    correction, sigma, watch
-        As of write_corrected.
+    correction : Correction, or anything else with ``apply(cloud) -> cloud``
+    sigma : PointSigma, optional
+        Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
+    watch : function, optional
+        Called with the gps_time (n,) of each chunk that is done, in the trajectory's system.
     """
 
     file: CloudFile
@@ -119,24 +81,32 @@ class CorrectedPart:
 
 
 def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]:
-    """Copy a file whose points several scanners measured, as write_corrected does.
+    """Copy a file with corrected coordinates; all else stays as it was, byte for byte.
+
+    What changes: X, Y, Z of each point, the bounds in the header, and where it must, the
+    position of what follows the points. The target's suffix says whether it is compressed. It
+    appears whole or not at all: it is written beside its place as ``.part``, and read again
+    before it takes its name. A file there is replaced.
 
     Parameters
     ----------
     parts : sequence of CorrectedPart
-        Of one file; with sigmas, or without.
+        Of one file, whose points several scanners may have measured; with sigmas, or without.
     target : path
-        As of write_corrected.
+        ``.las`` or ``.laz``, not the input.
 
     Returns
     -------
     list of int
-        Number of points of each outside the trajectory.
+        Number of points of each outside the trajectory, which are unchanged.
 
     Raises
     ------
-    ValueError, OSError
-        As write_corrected.
+    ValueError
+        For bad input, a target that is the input, coordinates that overflow, and LAZ files with
+        waveforms (formats 9 and 10) of several scanner channels, which lazrs would damage.
+    OSError
+        When the target cannot be written.
     """
     layout, target = read_layout(parts[0].file.path), Path(target)
     _check_target(layout.path, target)

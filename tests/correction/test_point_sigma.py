@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction, PointSigma
 from mlscorr.frames import attitude_from_angles, mounting_partials, pose_partials
-from mlscorr.io.las_copy import write_corrected
 from mlscorr.survey import Mounting, Scanner, Trajectory
+from tests.beds.copies import write_corrected
 from tests.beds.shared import shared
 from tests.io.test_las import cloud_of, covering, write_street
 

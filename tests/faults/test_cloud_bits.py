@@ -8,8 +8,8 @@ import pytest
 
 from mlscorr.io.las import read_records, sample_gps_times
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_copy import write_corrected
 from mlscorr.survey import CloudFile
+from tests.beds.copies import write_corrected
 from tests.io.test_las import START, correction, write_street
 
 POINTS = 300

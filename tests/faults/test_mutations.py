@@ -12,11 +12,11 @@ import pytest
 from mlscorr.io.control import read_control
 from mlscorr.io.las import read_records, sample_gps_times
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_copy import write_corrected
 from mlscorr.io.survey_sections import SurveyFile
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory import read_trajectory
 from mlscorr.survey import CloudFile
+from tests.beds.copies import write_corrected
 from tests.faults.sizes import IS_FULL, tries
 from tests.io.test_las import START, correction, write_street
 

@@ -16,7 +16,6 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.io.las import read_chunks, read_records, times_at
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_copy import write_corrected
 from mlscorr.io.las_windows import read_windows
 from mlscorr.io.preparation import glance
 from mlscorr.io.settings import Settings
@@ -25,6 +24,7 @@ from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.io.time_order import in_time_order
 from mlscorr.survey import CloudFile, PointCloud
 from tests.beds.copc_files import write_copc
+from tests.beds.copies import write_corrected
 from tests.io.test_las import CORNER, START, correction, write_street
 
 POINTS = 20_000

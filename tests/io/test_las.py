@@ -23,8 +23,8 @@ from mlscorr.io.las import (
     spread_times,
     times_at,
 )
-from mlscorr.io.las_copy import write_corrected
 from mlscorr.survey import CloudFile, Trajectory
+from tests.beds.copies import write_corrected
 from tests.beds.places import ROOT
 from tests.beds.shared import shared
 

@@ -10,10 +10,10 @@ import pytest
 import mlscorr
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_copy import write_corrected
 from mlscorr.io.las_crs import stated_crs
 from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.survey import CloudFile, PointCloud
+from tests.beds.copies import write_corrected
 from tests.beds.las_1_5 import OFFSET_FLAG, as_las_1_5, from_las_1_5
 from tests.io.test_las import START, correction, write_street
 

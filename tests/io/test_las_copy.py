@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlscorr.io.las import read_chunks, sample_gps_times, sha256
-from mlscorr.io.las_copy import write_corrected
 from mlscorr.survey import CloudFile, PointCloud
+from tests.beds.copies import write_corrected
 
 BOUNDS = slice(179, 227)  # bytes of the header
 clouds = st.fixed_dictionaries(

@@ -14,8 +14,8 @@ import pytest
 import mlscorr
 from mlscorr.baselines import RAW, Transformation
 from mlscorr.io.las import read_chunks
-from mlscorr.io.las_copy import write_corrected
 from mlscorr.io.survey_file import read_survey
+from tests.beds.copies import write_corrected
 from tests.beds.documents import undocumented
 from tests.beds.places import EXAMPLES, MLSCORR
 from tests.beds.shared import shared
