@@ -16,25 +16,3 @@ from mlscorr.collocation.markov import collocate
 from mlscorr.collocation.model import Collocation, Noise, Signal
 from mlscorr.collocation.sparse_rows import SparseRows
 from mlscorr.collocation.whitening import Whitened, Whitener, factor
-
-__all__ = [
-    "Collocation",
-    "InformationSolver",
-    "LeftOut",
-    "LiteralCollocation",
-    "LiteralSignal",
-    "Noise",
-    "Signal",
-    "SparseRows",
-    "Whitened",
-    "Whitener",
-    "collocate",
-    "collocate_dense",
-    "collocate_literal",
-    "collocate_rows",
-    "collocate_rows_dense",
-    "covariance_given",
-    "factor",
-    "leave_each_out",
-    "reweight",
-]

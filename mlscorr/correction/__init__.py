@@ -2,5 +2,3 @@
 
 from mlscorr.correction.pair import Correction
 from mlscorr.correction.point_sigma import PointSigma
-
-__all__ = ["Correction", "PointSigma"]

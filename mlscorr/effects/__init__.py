@@ -39,21 +39,3 @@ from mlscorr.effects.own import register_file
 from mlscorr.effects.quantity import quantity
 from mlscorr.effects.stages import STAGES, Reference, Returns
 from mlscorr.effects.wording import SizeEstimate
-
-__all__ = [
-    "EFFECTS",
-    "STAGES",
-    "Effect",
-    "Reference",
-    "Returns",
-    "SizeEstimate",
-    "apply_effects",
-    "effect_class",
-    "effect_streams",
-    "in_order",
-    "known_effects",
-    "make_effect",
-    "quantity",
-    "register",
-    "register_file",
-]

@@ -3,5 +3,3 @@
 from mlscorr.matching.association import Matches, match
 from mlscorr.matching.reasons import Refusal
 from mlscorr.matching.settings import SETTINGS
-
-__all__ = ["SETTINGS", "Matches", "Refusal", "match"]

@@ -11,14 +11,3 @@ from mlscorr.pos.history import DriftHistory, drift_history, held_sigma
 from mlscorr.pos.settings import SETTINGS
 from mlscorr.pos.stated import StatedSigma, stated_sigma
 from mlscorr.pos.steps import Steps, find_steps
-
-__all__ = [
-    "SETTINGS",
-    "DriftHistory",
-    "StatedSigma",
-    "Steps",
-    "drift_history",
-    "find_steps",
-    "held_sigma",
-    "stated_sigma",
-]
