@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from mlscorr.gap.close.folds import FoundCause, Simulated, make_folds
 from mlscorr.gap.close.over_sigma import OverSigma, errors_over_sigma
 from mlscorr.gap.close.settings import SETTINGS
-from mlscorr.gap.close.systematic import SystematicGap, share_gone
+from mlscorr.gap.close.systematic import Squares, SystematicGap, share_gone
 from mlscorr.gap.infer.columns import ColumnTable, column_table
 from mlscorr.gap.infer.error_models import ErrorModel
 from mlscorr.gap.infer.evidence import nuisance_columns
@@ -113,7 +113,7 @@ def close_gap(
     folds = make_folds(case, ruler.observations, ruler.model, simulated, rng, progress)
     held = ruler.compare(folds, rng)
     whole = replace(folds, fold=np.where(used, 0, -1), predicted=(folds.whole,))
-    gap, in_sample = held.gap(unit), ruler.compare(whole, rng, used).gap(unit)
+    gap, in_sample = _gap(held, unit), _gap(ruler.compare(whole, rng, used), unit)
     nothing = cause.effect == "none"
     return Closure(
         cause.effect,
@@ -132,19 +132,11 @@ def close_gap(
     )
 
 
-@dataclass(frozen=True)
-class _Measured:
-    """Squares before and after (2,), in each fold (f, 2), by chance (k,); 95 % of the share."""
-
-    square: np.ndarray
-    folds: np.ndarray
-    chance: np.ndarray
-    interval: tuple[float, float]
-
-    def gap(self, unit):
-        before, after = (float(v) for v in signed_root(self.square, unit))
-        band = np.percentile(signed_root(self.chance, unit), INFERENCE.band)
-        return Gap(before, after, tuple(float(v) for v in band))
+def _gap(squares, unit):
+    """Gap in a unit, by Squares."""
+    before, after = (float(v) for v in signed_root(squares.square, unit))
+    band = np.percentile(signed_root(squares.chance, unit), INFERENCE.band)
+    return Gap(before, after, tuple(float(v) for v in band))
 
 
 @dataclass(frozen=True)
@@ -173,10 +165,12 @@ class _Ruler:
         return cls(kind, rows, case.used, observations, table, model, probability)
 
     def compare(self, folds, rng, among=None):
-        """What the size of each fold's others does to the gap of some rows (m,): _Measured."""
+        """What the size of each fold's others does to the gap of some rows (m,): Squares."""
         among = np.ones(len(self.rows), bool) if among is None else among
         if self.kind == "systematic":
-            return self._systematic(folds, rng, among)
+            given = self.observations, self.model, self.table, self.rows.residual
+            systematic = SystematicGap.of(*given, folds, self.used, among)
+            return systematic.measure(rng, self.probability)
         before, after, chance, place = self._terms(folds, rng)
         keep = among[place]
         before, after, chance, place = (v[keep] for v in (before, after, chance, place))
@@ -187,15 +181,7 @@ class _Ruler:
         squares = both.mean(axis=0), folded, chance.mean(axis=0)
         if self.kind == "returns":  # a mean of shares, not of squares
             squares = tuple(np.sign(v) * v**2 for v in squares)
-        return _Measured(*squares, _jackknife(both, folds.block[place], squares[0]))
-
-    def _systematic(self, folds, rng, among):
-        """What the sizes leave, in all and in each fold: _Measured."""
-        gap = SystematicGap.of(
-            self.observations, self.model, self.table, self.rows.residual, folds, self.used, among
-        )
-        measured = gap.measure(rng, self.probability)
-        return _Measured(measured.square, measured.folds, measured.chance, measured.interval)
+        return Squares(*squares, _jackknife(both, folds.block[place], squares[0]))
 
     def _terms(self, folds, rng):
         """Terms before, after (q,) and by chance (q, k), whose mean is the gap; their rows (q,)."""

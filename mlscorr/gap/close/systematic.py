@@ -39,8 +39,8 @@ def share_gone(before: float, after: float) -> float:
 
 @dataclass(frozen=True)
 class Squares:
-    """Squares before and after (2,), in each fold (f, 2), before by chance (k,), in m^2; and 95 %
-    of the share that is gone.
+    """Squares before and after (2,), in each fold (f, 2), before by chance (k,), in m^2 or in the
+    square of the gap's unit; and 95 % of the share that is gone.
     """
 
     square: np.ndarray
