@@ -6,6 +6,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from mlscorr.effects.wording import known
+from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.report.gap.labels import title
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.rows import DetectableRow
@@ -28,7 +29,7 @@ def classes_in_order(separability: dict) -> tuple[list[int], list[tuple[int, int
     order, boxes = [], []
     for members in separability["classes"]:
         inside = np.isin(effect, members)
-        pairs = (square > SETTINGS.class_correlation) & inside[:, None] & inside
+        pairs = (square > INFERENCE.same) & inside[:, None] & inside
         pairs &= effect[:, None] != effect
         rows = [int(i) for i in np.flatnonzero(pairs.any(axis=1)) if i not in order]
         if rows:
@@ -88,7 +89,7 @@ def heat_figure(separability: dict) -> Figure:
     panel.tick_params(length=0)
     bar = figure.colorbar(cells, ax=panel, shrink=0.6, pad=0.02)
     bar.set_label("Squared correlation: 0 = told apart, 1 = the same")
-    bar.ax.axhline(SETTINGS.class_correlation, color=VERMILLION, linewidth=1.5)
+    bar.ax.axhline(INFERENCE.same, color=VERMILLION, linewidth=1.5)
     return figure
 
 

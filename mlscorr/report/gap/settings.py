@@ -12,13 +12,12 @@ class Settings:
     ladder_rows, ladder_letters : int
         Labels on the ladder of evidence, and letters of each, at most: a page's height and half
         of its width.
-    class_correlation : float
-        Squared correlation above which two effects are one class, as the diagnosis takes it.
     written_correlation : float
-        From which on it is written into its cell: half of the variance in common.
-    excess_share, least_share : float
-        A bin's share of the gap is written where it is that many times its share of the rows, and
-        at least that share: else it says nothing of where the gap lies.
+        From which on a squared correlation is written into its cell: half of the variance in
+        common.
+    least_share : float
+        A bin's share of the gap is written where it is at least that, and so many times its share
+        of the rows as the inference asks for: else it says nothing of where the gap lies.
     likely_probability : float
         From which on a cause is not folded away.
     stripe_sigmas : float
@@ -38,9 +37,7 @@ class Settings:
 
     ladder_rows: int = 26
     ladder_letters: int = 44
-    class_correlation: float = 0.9
     written_correlation: float = 0.5
-    excess_share: float = 1.3
     least_share: float = 0.15
     likely_probability: float = 0.01
     stripe_sigmas: float = 2.0

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.report.gap.innovations import WINDOW
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.rows import split_title
@@ -87,7 +88,7 @@ def _split(panel, split, is_explained):
 def _draw_extent(panel, split, edges):
     """The stretch in which the cause acts, where it holds more than its rows account for."""
     extent = split.get("extent")
-    if extent and extent["share"] > SETTINGS.excess_share * extent["rows"]:
+    if extent and extent["share"] > INFERENCE.plain * extent["rows"]:
         turns = (0.0, 360.0) if split["by"] == "scan_angle" else (0.0,)
         for turn in turns:  # an angle may be told as one of the next turn
             low, high = max(extent["low"] - turn, edges[0]), min(extent["high"] - turn, edges[-1])
@@ -101,7 +102,7 @@ def _write_share(panel, split, edges, high, is_explained):
     """
     count, share, before = (numbers(split[key]) for key in ("count", "share", "before"))
     of_rows = count / max(count.sum(), 1.0)
-    plain = (share > SETTINGS.excess_share * of_rows) & (share > SETTINGS.least_share)
+    plain = (share > INFERENCE.plain * of_rows) & (share > SETTINGS.least_share)
     plain &= is_explained | (before > high)
     if not plain.any():
         return
