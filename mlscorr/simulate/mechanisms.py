@@ -17,8 +17,8 @@ from types import ModuleType
 import numpy as np
 
 from mlscorr.simulate.displacement import RecordedPoints
+from mlscorr.simulate.scene import UP
 
-UP = np.array([0.0, 0.0, 1.0])
 MOMENT = 0.3  # s to each side, over which speed, turns and acceleration are taken
 EPOCH = 0.1  # s between the times at which the motion is worked out
 
