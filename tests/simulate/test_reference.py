@@ -57,7 +57,7 @@ def test_the_reference_is_where_the_survey_file_says(folders):
     assert read_survey(without).reference is None
     assert survey.reference.stat().st_size < 500_000
     scene = SceneScenario(kind="mesh", file=survey.reference)
-    mesh = read_mesh(Scenario(scene=scene, origin=made.scenario.origin))
+    mesh = read_mesh(scene, made.scenario.origin)
     np.testing.assert_allclose(
         np.sort(mesh.triangles.mean(axis=1), axis=0),
         np.sort(made.static_scan.triangles.mean(axis=1), axis=0),

@@ -418,7 +418,8 @@ def test_a_mesh_at_map_coordinates_keeps_its_micrometres(write, tmp_path):
     "PLY and OBJ vertices at UTM coordinates come back to 1e-6 m about the origin"
     vertices, triangles = ground_mesh(200.0)
     suffix = write.__name__[-3:]
-    mesh = read_mesh(on_mesh(write(tmp_path / f"mesh.{suffix}", vertices, triangles)))
+    scenario = on_mesh(write(tmp_path / f"mesh.{suffix}", vertices, triangles))
+    mesh = read_mesh(scenario.scene, scenario.origin)
     np.testing.assert_allclose(mesh.triangles + ORIGIN, vertices[triangles], rtol=0, atol=1e-6)
 
 
@@ -428,7 +429,7 @@ def test_drive_and_targets_stand_on_the_mesh(tmp_path):
     scenario = on_mesh(path, targets=TargetScenario(control=5, check=3))
     line, length, (trajectory,) = drive(scenario, rng(1))
     scene = build_scene(scenario, line, length, rng(2))
-    mesh = type(scene)(read_mesh(scenario), None, None, None, 0)
+    mesh = type(scene)(read_mesh(scenario.scene, scenario.origin), None, None, None, 0)
     local = trajectory.position - ORIGIN
     height = local[:, 2] - height_below(mesh, local)
     assert np.abs(height - 1.8).max() < 0.1  # m, vibration and the smoothing of the ground

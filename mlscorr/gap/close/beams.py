@@ -18,7 +18,7 @@ from mlscorr.simulate.scan import (
     recorded_platform,
     recorded_pulses,
 )
-from mlscorr.simulate.scenario import Scenario, SceneScenario
+from mlscorr.simulate.scenario import SceneScenario
 from mlscorr.simulate.scene import read_mesh
 from mlscorr.survey import PointCloud, Survey
 
@@ -207,4 +207,4 @@ def _reference(survey, rows, origin):
     if survey.reference is None or not (rows.channel == "surface").any():
         return None
     scene = SceneScenario(kind="mesh", file=survey.reference)
-    return MeshWorld(read_mesh(Scenario(scene=scene, origin=tuple(origin))))
+    return MeshWorld(read_mesh(scene, origin))

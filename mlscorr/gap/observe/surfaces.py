@@ -8,8 +8,8 @@ from mlscorr.gap.observe.covariates import scanner_origin
 from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.selection import consistent, gate
 from mlscorr.gap.observe.settings import SETTINGS
-from mlscorr.simulate.scenario import Scenario, SceneScenario
-from mlscorr.simulate.scene import ray_caster, read_mesh
+from mlscorr.simulate.scenario import SceneScenario
+from mlscorr.simulate.scene import read_mesh
 from mlscorr.survey import Survey
 from mlscorr.survey.columns import Columns
 
@@ -56,8 +56,7 @@ def on_reference(survey: Survey, patches: Patches) -> OnReference:
         For a mesh that can't be used, and for one in other coordinates.
     """
     origin = np.round(patches.centre.mean(axis=0))
-    scene = SceneScenario(kind="mesh", file=survey.reference)
-    mesh = read_mesh(Scenario(scene=scene, origin=tuple(origin)))
+    mesh = read_mesh(SceneScenario(kind="mesh", file=survey.reference), origin)
     direction, residual, met = _compare(survey, patches, mesh, origin)
     if met.sum() < max(1, SETTINGS.overlap * len(patches)):
         raise ValueError(_elsewhere(survey, patches, mesh, origin))
@@ -69,19 +68,19 @@ def on_reference(survey: Survey, patches: Patches) -> OnReference:
 def _compare(survey, patches, mesh, origin):
     """Direction (p, 3), residual (p,) and whether the patch met its like in the mesh (p,)."""
     p, samples = patches.time.shape
-    normal, offset = _planes(mesh)
     start = scanner_origin(survey, patches.time.ravel()) - origin
     end = patches.xyz.reshape(-1, 3) - origin
     rays = np.hstack([start, end - start]).astype(np.float32)
-    triangle = ray_caster(mesh.triangles).cast_rays(rays)["primitive_ids"].numpy()
+    triangle = mesh.caster.cast_rays(rays)["primitive_ids"].numpy()
     hit = triangle < len(mesh)
     triangle = np.where(hit, triangle, 0)
     own = np.repeat(patches.normal, samples, axis=0)
-    cosine = np.einsum("ni,ni->n", normal[triangle], own)
-    facing = normal[triangle] * np.sign(cosine)[:, None]
+    normal, offset = mesh.normal[triangle], mesh.offset[triangle]
+    cosine = np.einsum("ni,ni->n", normal, own)
+    facing = normal * np.sign(cosine)[:, None]
     off = np.einsum("ni,ni->n", own, end - np.repeat(patches.centre - origin, samples, axis=0))
     on_plane = end - own * off[:, None]
-    distance = np.einsum("ni,ni->n", normal[triangle], on_plane) - offset[triangle]
+    distance = np.einsum("ni,ni->n", normal, on_plane) - offset
     distance *= np.sign(cosine)
     limit = np.repeat(gate(survey, patches.gps_time), samples)
     used = hit & (np.abs(cosine) >= np.cos(SETTINGS.parallel)) & (np.abs(distance) <= limit)
@@ -94,18 +93,10 @@ def _compare(survey, patches, mesh, origin):
     return direction / np.where(length > 0, length, 1.0), residual, met
 
 
-def _planes(mesh):
-    """Unit normal (n, 3) and distance from the origin (n,) of a mesh's triangles."""
-    a, b, c = np.moveaxis(mesh.triangles, 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return normal, np.einsum("ni,ni->n", normal, a)
-
-
 def _elsewhere(survey, patches, mesh, origin):
     """The sentence for a reference surface that lies where the cloud is not."""
     centre = (patches.centre - origin).astype(np.float32)
-    closest = ray_caster(mesh.triangles).compute_closest_points(centre)["points"].numpy()
+    closest = mesh.caster.compute_closest_points(centre)["points"].numpy()
     apart = closest - centre
     distance, up = np.median(np.linalg.norm(apart, axis=1)), np.median(apart[:, 2])
     what = "in another height datum" if abs(up) > 0.9 * distance else "in another CRS or place"

@@ -13,8 +13,8 @@ from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
 from mlscorr.gap.plan.settings import SETTINGS
 from mlscorr.gap.signatures.settings import SETTINGS as SIGNATURES
 from mlscorr.gap.signatures.signatures import Signature
-from mlscorr.simulate.scenario import Scenario, SceneScenario
-from mlscorr.simulate.scene import ray_caster, read_mesh, sees
+from mlscorr.simulate.scenario import SceneScenario
+from mlscorr.simulate.scene import read_mesh, sees
 from mlscorr.survey import Survey
 from mlscorr.targets import SETTINGS as TARGETS
 
@@ -80,8 +80,7 @@ def _targets(survey, targets):
 def _facets(survey, rng):
     """Rows of a sample of the reference's facets, by their areas, that nothing hides."""
     origin = np.round(survey.trajectory.position.mean(axis=0))
-    scene = SceneScenario(kind="mesh", file=survey.reference)
-    mesh = read_mesh(Scenario(scene=scene, origin=tuple(origin)))
+    mesh = read_mesh(SceneScenario(kind="mesh", file=survey.reference), origin)
     a, b, c = np.moveaxis(mesh.triangles, 1, 0)
     cross = np.cross(b - a, c - a)
     area = np.linalg.norm(cross, axis=1)
@@ -95,7 +94,7 @@ def _facets(survey, rng):
     slant = np.einsum("ni,ni->n", normal, sight) / away
     start = place + sight / away[:, None] * OBSERVE.roughest
     visible = (np.abs(slant) >= TARGETS.grazing) & sees(
-        ray_caster(mesh.triangles), start - origin, start + sight * 0.99 - origin
+        mesh.caster, start - origin, start + sight * 0.99 - origin
     )
     rows = np.flatnonzero(visible)[: SETTINGS.facets]
     n, item, normal = len(rows), np.arange(len(rows)), normal[rows] * np.sign(slant[rows])[:, None]

@@ -6,4 +6,4 @@ from mlscorr.simulate.scene.mesh import line_on_mesh, read_mesh
 from mlscorr.simulate.scene.placing import Targets
 from mlscorr.simulate.scene.reference_surface import static_scan
 from mlscorr.simulate.scene.section import section
-from mlscorr.simulate.scene.shapes import UP, Mesh, ray_caster, sees
+from mlscorr.simulate.scene.shapes import UP, Mesh, sees

@@ -1,35 +1,37 @@
 """The user's own mesh as a scene: read, checked, its ground hits; targets on posts beside."""
 
-from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
 from mlscorr.io.ply import announced_faces
-from mlscorr.simulate.scenario import Scenario
+from mlscorr.simulate.scenario import Scenario, SceneScenario
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, eyes
 from mlscorr.simulate.scene.shapes import UP, Mesh, sees
 
 
-def read_mesh(scenario: Scenario) -> Mesh:
-    """Mesh of a scenario's PLY or OBJ, about its origin, without triangles of no area.
+def read_mesh(scene: SceneScenario, origin: ArrayLike) -> Mesh:
+    """Mesh of a scene's PLY or OBJ, about an origin, without triangles of no area.
 
     Parameters
     ----------
-    scenario : Scenario
-        Its scene names the file.
+    scene : SceneScenario
+        Names the file.
+    origin : (3,) array
+        Map coordinates of the local origin. Units: m.
 
     Raises
     ------
     ValueError
         An unknown suffix, no triangles, or vertices that are not numbers.
     """
-    path = Path(str(scenario.scene.file))
+    path = Path(str(scene.file))
     readers = {".ply": _read_ply, ".obj": _read_obj}
     if path.suffix.lower() not in readers:
         raise ValueError(
@@ -52,13 +54,13 @@ def read_mesh(scenario: Scenario) -> Mesh:
             f"{bad.sum()} of {len(bad)} vertices of {path} are not numbers "
             f"(first: vertex {np.argmax(bad) + 1})."
         )
-    triangles = vertices[corners] - np.array(scenario.origin)
+    triangles = vertices[corners] - np.array(origin)
     edges = triangles[:, 1:] - triangles[:, :1]
     flat = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) < 1e-12
     triangles = triangles[~flat]
     if not len(triangles):
         raise ValueError(f"All {len(corners)} triangles of {path} are without area.")
-    return Mesh(triangles, np.full(len(triangles), scenario.scene.reflectance))
+    return Mesh(triangles, np.full(len(triangles), scene.reflectance))
 
 
 def _read_ply(path):
@@ -155,7 +157,7 @@ def line_on_mesh(scenario: Scenario, line: CentreLine, length: float) -> CentreL
     ValueError
         A way that leaves the mesh.
     """
-    mesh = read_mesh(scenario)
+    mesh = read_mesh(scenario.scene, scenario.origin)
     s = np.arange(line.curve.x[0], line.curve.x[-1] + 1e-9, 1.0)
     place = line.curve(s)
     levels = Ground(mesh).levels(place)
@@ -198,11 +200,8 @@ class MeshSite:
 
     def __init__(self, scenario: Scenario, line: CentreLine, length, rng):
         self.line, self.length = line, length
-        self.mesh = read_mesh(scenario)
-
-    @cached_property
-    def _ground(self):
-        return Ground(self.mesh)
+        self.mesh = read_mesh(scenario.scene, scenario.origin)
+        self._ground = Ground(self.mesh)
 
     def spot(
         self, s: float, side: int, support: str, half: float, rng: Generator
