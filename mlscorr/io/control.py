@@ -20,6 +20,7 @@ from mlscorr.io.control_lists import (
     unnamed_columns,
     with_check_points,
 )
+from mlscorr.io.nearness import check_together
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
@@ -101,6 +102,29 @@ def read_control(
         warn_of_cut(path)
     sentence = None if layout.is_own else sentence_on(layout, has_axes, given, section.check)
     return ControlList(control, check, sentence)
+
+
+def read_surveyed(
+    path: Path | None, section: ControlSection, trajectory: Trajectory
+) -> ControlList:
+    """Points of a list that lies near a trajectory; none of none, and of an empty file.
+
+    Parameters
+    ----------
+    path : Path or None
+    section : ControlSection
+    trajectory : Trajectory
+
+    Raises
+    ------
+    ValueError
+        As of read_control and check_together.
+    """
+    if path is None or not holds_points(path):
+        return NOTHING_SURVEYED
+    points = read_control(path, section, trajectory)
+    check_together(path, points.control + points.check, trajectory)
+    return points
 
 
 def holds_points(path: str | Path) -> bool:
@@ -242,3 +266,4 @@ def _points(rows):
 
 
 NO_POINTS = _points([])
+NOTHING_SURVEYED = ControlList(NO_POINTS, NO_POINTS)

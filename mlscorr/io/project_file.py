@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.io.control import NO_POINTS, holds_points, read_control
+from mlscorr.io.control import NOTHING_SURVEYED, read_surveyed
 from mlscorr.io.inputs import input_file
-from mlscorr.io.nearness import check_together
 from mlscorr.io.project_sections import ProjectFile
 from mlscorr.io.projection import check_crs
 from mlscorr.io.storage import as_path, beside, is_folder, is_there, resolved
@@ -122,11 +121,11 @@ def read_project(path: str | Path) -> ProjectParts:
     _check_alike(path, settings, drives)
     drives = tuple(_with_beliefs(path, drives))
     crs = settings.crs or drives[0].parts.settings.crs
-    inputs, surveyed = [input_file("project", path)], (NO_POINTS, NO_POINTS, None)
+    inputs, surveyed = [input_file("project", path)], NOTHING_SURVEYED
     if settings.control is not None:
         file = existing(path, "control.file", settings.control.file)
         inputs.append(input_file("control", file))
-        surveyed = _surveyed(file, settings.control, _everywhere(drives))
+        surveyed = read_surveyed(file, settings.control, _everywhere(drives))
     name = settings.name or path.absolute().parent.name
     return ProjectParts(name, path, crs, drives, *surveyed, tuple(inputs))
 
@@ -267,12 +266,3 @@ def _everywhere(drives):
     position = np.concatenate(places)
     number = np.arange(len(position), dtype=float)
     return Trajectory(number, position, Rotation.identity(len(position)))
-
-
-def _surveyed(path, section, trajectory):
-    """Control points, check points, and how their list was understood."""
-    if not holds_points(path):
-        return NO_POINTS, NO_POINTS, None
-    points = read_control(path, section, trajectory)
-    check_together(path, points.control + points.check, trajectory)
-    return points.control, points.check, points.layout

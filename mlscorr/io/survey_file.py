@@ -5,13 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mlscorr.io.control import NO_POINTS, holds_points, read_control
+from mlscorr.io.control import read_surveyed
 from mlscorr.io.conversion import conversion_notes
 from mlscorr.io.inputs import input_file
 from mlscorr.io.las import read_chunks, spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
-from mlscorr.io.nearness import check_together
 from mlscorr.io.projection import check_crs, crs_notes
 from mlscorr.io.session_points import check_belongings
 from mlscorr.io.storage import as_path, is_folder, is_there
@@ -153,17 +152,8 @@ def read_parts(path: Path, settings: PlannedSurveyFile) -> SurveyParts:
     files = files_of(path, settings)
     inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
     recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
-    surveyed = _surveyed(files.control, settings.control, recorded.trajectory)
+    surveyed = read_surveyed(files.control, settings.control, recorded.trajectory)
     return SurveyParts(path, settings, files, recorded, *surveyed, inputs)
-
-
-def _surveyed(path, section, trajectory):
-    """Control points, check points, and how their list was understood."""
-    if path is None or not holds_points(path):
-        return NO_POINTS, NO_POINTS, None
-    points = read_control(path, section, trajectory)
-    check_together(path, points.control + points.check, trajectory)
-    return points.control, points.check, points.layout
 
 
 def stated_pos(settings: PlannedSurveyFile) -> Pos | None:
