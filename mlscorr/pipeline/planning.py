@@ -242,11 +242,7 @@ class PlannedSurvey(Summary):
 
 
 def too_little(
-    survey: Survey,
-    rows: Rows,
-    items: int,
-    library: Iterable[type[Effect]],
-    notes: tuple[str, ...] = (),
+    survey: Survey, rows: Rows, items: int, library: Iterable[type[Effect]], notes: tuple[str, ...]
 ) -> str:
     """The sentence for a survey that shows too little: what is missing, and the plan.
 
