@@ -219,9 +219,7 @@ class AppliedSurvey(Summary):
         mounting, files = correction.corrected_mounting, []
         with output_folder(out, survey.inputs, overwrite) as folder:
             done = (progress or silent)("Writing the cloud", survey.points)
-            for path, points, outside in write_clouds(
-                survey, folder, correction, lambda times: done(len(times))
-            ):
+            for path, points, outside in write_clouds(survey, folder, correction, done):
                 files.append({"name": path.name, "points": points, "untouched": outside})
             trajectory = None
             if any(effect.name not in MOUNTING for effect in self.effects):

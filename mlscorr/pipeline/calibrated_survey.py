@@ -117,7 +117,7 @@ class CalibratedSurvey(Summary):
             if clouds:
                 done = (progress or silent)("Writing the cloud", self.survey.points)
                 correction = drift or self.calibration.correction()
-                write_clouds(self.survey, folder, correction, lambda times: done(len(times)))
+                write_clouds(self.survey, folder, correction, done)
             trajectory = "trajectory.csv" if clouds and with_drift else None
             write_calibrated_survey(folder, out, [self], clouds, trajectory)
         return content

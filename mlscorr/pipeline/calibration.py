@@ -153,7 +153,7 @@ class CalibratedScanners(Summary):
             if clouds:
                 done = (progress or silent)("Writing the cloud", self.survey.points)
                 moved = {name: p.calibration.correction() for name, p in self.by_scanner.items()}
-                write_clouds(self.survey, folder, moved, lambda times: done(len(times)))
+                write_clouds(self.survey, folder, moved, done)
             write_calibrated_survey(folder, out, parts, clouds)
         return content
 

@@ -21,7 +21,7 @@ def write_clouds(
     survey: Survey,
     folder: Path,
     correction: Correcting | Mapping[str, Correcting],
-    watch: Callable[[np.ndarray], object],
+    done: Callable[[int], object],
 ) -> list[tuple[Path, int, int]]:
     """Write a survey's clouds into a folder, under their names, as LAZ what was no LAS.
 
@@ -30,8 +30,8 @@ def write_clouds(
     survey : Survey
     folder : Path
     correction : anything with ``apply(cloud) -> cloud``, or that of each scanner by its name
-    watch : function of gps_time (n,)
-        Is told the times of the points that are written.
+    done : function of a number of points
+        Is told how many were just written.
 
     Returns
     -------
@@ -42,7 +42,8 @@ def write_clouds(
     for name, part in survey.by_scanner.items():
         moved = correction[name] if isinstance(correction, Mapping) else correction
         for file in part.clouds:
-            parts.setdefault(file.path, []).append(CorrectedPart(file, moved, watch=watch))
+            corrected = CorrectedPart(file, moved, watch=lambda times: done(len(times)))
+            parts.setdefault(file.path, []).append(corrected)
     written = []
     for source, some in parts.items():
         path = folder / written_name(source)

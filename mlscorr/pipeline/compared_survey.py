@@ -155,10 +155,7 @@ class ComparedSurvey(Summary):
         files = []
         for name in names:
             (folder / name).mkdir()
-            correction = self.corrections[name]
-            clouds = write_clouds(
-                self.survey, folder / name, correction, lambda times: done(len(times))
-            )
+            clouds = write_clouds(self.survey, folder / name, self.corrections[name], done)
             files += [
                 {
                     "method": name,

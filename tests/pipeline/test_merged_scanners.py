@@ -138,7 +138,7 @@ def test_points_of_each_scanner_move_by_its_own_mounting(apart, merged, tmp_path
             for (name, part), turn in zip(survey.by_scanner.items(), (0.01, -0.02), strict=True)
         }
         out.mkdir()
-        files = write_clouds(survey, out, moved, lambda times: None)
+        files = write_clouds(survey, out, moved, lambda points: None)
         assert sum(points for _, points, _ in files) == survey.points
         mountings = [correction.corrected_mounting for correction in moved.values()]
         names = [[file.path.name for file in part.clouds] for part in survey.by_scanner.values()]
