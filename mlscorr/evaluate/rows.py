@@ -42,10 +42,8 @@ class Statistics:
         >>> statistics.rmse[:3].round(4).tolist(), float(statistics.maximum[3])
         ([0.3536, 0.0, 0.1], 0.4)
         """
-        n, lengths = (
-            len(residuals),
-            [np.linalg.norm(residuals[:, :axes], axis=1) for axes in (2, 3)],
-        )
+        n = len(residuals)
+        lengths = [np.linalg.norm(residuals[:, :axes], axis=1) for axes in (2, 3)]
 
         def measured(function, smallest=1):
             if n < smallest:

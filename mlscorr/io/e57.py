@@ -111,10 +111,8 @@ class _Scan:
                 f"{', '.join(self.fields)}. Export it with {', '.join(CARTESIAN)}."
             )
         self.colours = COLOURS if set(COLOURS) <= {*self.fields} else ()
-        self.start, self.end = (
-            self._value("acquisitionStart", "dateTimeValue"),
-            self._value("acquisitionEnd", "dateTimeValue"),
-        )
+        self.start = self._value("acquisitionStart", "dateTimeValue")
+        self.end = self._value("acquisitionEnd", "dateTimeValue")
 
     def _value(self, *names):
         """A number of the scan's header; zero where there is none."""

@@ -95,10 +95,8 @@ def write_contact_sheet(
         if best:
             figure.legend(handles=_legend(), loc="outside lower left", ncols=6)
         for i, row in enumerate(best):
-            axes, target = (
-                figure.add_subplot(lines, columns, i + 1),
-                fitted[row["pass"], row["gps_time"]],
-            )
+            axes = figure.add_subplot(lines, columns, i + 1)
+            target = fitted[row["pass"], row["gps_time"]]
             name = row["name"] or f"row {rows.index(row) + 1}"
             _draw(axes, target)
             red = target.score < SETTINGS.low_score

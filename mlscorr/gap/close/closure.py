@@ -193,10 +193,8 @@ class _Ruler:
             chance = position_terms(observations, nothing, drawn)
             each = [position_terms(observations, p, residual)[:, 0] for p in folds.predicted]
             after = np.choose(folds.of_rows[observations.row], each)
-            before, keep = (
-                position_terms(observations, nothing, residual)[:, 0],
-                observations.second,
-            )
+            before = position_terms(observations, nothing, residual)[:, 0]
+            keep = observations.second
             return before[keep], after[keep], chance[keep], observations.row[keep]
         of_kind = rows.channel == ("roughness" if self.kind == "scatter" else "return_rate")
         drawn = np.sqrt(rows.noise)[:, None] * rng.standard_normal((len(rows), replicas))

@@ -146,11 +146,9 @@ def _passing_any(start, end, place, squared_extent):
         x, y, z = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1], end[i, 2] - start[i, 2]
         length = np.sqrt(x**2 + y**2 + z**2)
         for k in range(len(place)):
-            a, b, c = (
-                place[k, 0] - start[i, 0],
-                place[k, 1] - start[i, 1],
-                place[k, 2] - start[i, 2],
-            )
+            a = place[k, 0] - start[i, 0]
+            b = place[k, 1] - start[i, 1]
+            c = place[k, 2] - start[i, 2]
             along = (a * x + b * y + c * z) / length
             if along > 0 and a**2 + b**2 + c**2 - along**2 <= squared_extent[k]:
                 near[i] = True

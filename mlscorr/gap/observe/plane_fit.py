@@ -142,10 +142,8 @@ def _on_planes(chunk, rows, count, sample, normal):
     origin = chunk.xyz[sample[np.arange(len(count)), in_time]]
     height = np.einsum("ni,ni->n", chunk.xyz[rows] - origin[group], normal[group])
     heights = np.einsum("gsi,gi->gs", chunk.xyz[sample] - origin[:, None], normal)
-    middle, sigma = (
-        np.median(heights, axis=1),
-        np.maximum(heights.std(axis=1), SETTINGS.file_step / 2),
-    )
+    middle = np.median(heights, axis=1)
+    sigma = np.maximum(heights.std(axis=1), SETTINGS.file_step / 2)
     for _ in range(4):
         on = np.abs(height - middle[group]) <= SETTINGS.trims[-1] * sigma[group]
         held = np.add.reduceat(on.astype(float), first)
@@ -232,10 +230,8 @@ def _misses(gps_time, rows, first, group):
     follows = np.append((np.diff(rows) == 1) & (np.diff(group) == 0), False) & (pause > 0)
     step = np.minimum.reduceat(np.where(follows, pause, np.finfo(float).max), first)
     pulses = np.where(follows, pause / step[group], np.finfo(float).max)
-    near, longer = (
-        pulses <= SETTINGS.longest_miss,
-        (pulses > SETTINGS.longest_miss) & (pulses <= SETTINGS.line_pause),
-    )
+    near = pulses <= SETTINGS.longest_miss
+    longer = (pulses > SETTINGS.longest_miss) & (pulses <= SETTINGS.line_pause)
     pulses = np.where(near, pulses, 0.0)
 
     def count(which):

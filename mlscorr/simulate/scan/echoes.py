@@ -106,11 +106,9 @@ class Surfaces:
         triangle = self.cast(fan.reshape(-1, 6)).reshape(n, -1)
         constants = origin, offsets, POWER, self._planes, *limits, max_range, SETTINGS.pulse_length
         later = in_slices(n, _wide, (rays.ray, triangle, *first), constants)
-        pulse, more, hit = (
-            np.concatenate([start + rows[0] for start, rows in later]),
-            np.concatenate([rows[1] for _, rows in later]),
-            np.concatenate([rows[2] for _, rows in later]),
-        )
+        pulse = np.concatenate([start + rows[0] for start, rows in later])
+        more = np.concatenate([rows[1] for _, rows in later])
+        hit = np.concatenate([rows[2] for _, rows in later])
         point = origin + rays.ray[pulse, :3] + more[:, :1] * rays.ray[pulse, 3:6]
         whole = [np.concatenate(pair) for pair in zip(first, (more, hit, point), strict=True)]
         whole = [*whole[0].T, *whole[1:], pulse]

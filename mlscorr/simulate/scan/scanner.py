@@ -206,10 +206,8 @@ def shoot(
         rays = platform.aim(np.arange(i * step, i * step + size), turn, start, room, divergence > 0)
         hits = surfaces.hits(rays, origin, divergence, scanner.max_range, room)
         # the next block's noise is drawn while this one is used
-        noise, ahead = (
-            ahead,
-            ScannerNoise(scanner, streams, sizes[i + 1]) if i + 1 < len(sizes) else None,
-        )
+        noise = ahead
+        ahead = ScannerNoise(scanner, streams, sizes[i + 1]) if i + 1 < len(sizes) else None
         yield _measure(rays, hits, noise)
 
 

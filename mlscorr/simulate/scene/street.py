@@ -92,10 +92,8 @@ class Street:
         """Carriageway with crown, kerbs, pavements and gardens, as strips of 1 m."""
         s = np.arange(-SETTINGS.margin, self.length + SETTINGS.margin)
         edge = self.section.half_width(s)
-        fence, garden = (
-            edge + self.section.pavement,
-            edge + self.section.pavement + self.section.garden,
-        )
+        fence = edge + self.section.pavement
+        garden = fence + self.section.garden
         kerb, flat = np.full_like(s, self.section.kerb), np.zeros_like(s)
         rows = [
             (-garden, kerb, "garden"),
