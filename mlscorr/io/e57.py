@@ -45,9 +45,7 @@ def open_e57(path: Path) -> CloudSource:
         For a file that is damaged or none, and a scan without coordinates or times.
     """
     with _opened(path) as root:
-        scans = [_Scan(path, scan, f"{k + 1} of {len(root['data3D'])}")
-                 for k, scan in enumerate(root["data3D"])]  # fmt: skip
-        scans = [scan for scan in scans if scan.points]
+        scans = _scans(path, root)
         metadata = (
             root["coordinateMetadata"].value() if root.isDefined("coordinateMetadata") else ""
         )
@@ -178,7 +176,8 @@ class _Scan:
 
 def _scans(path, root):
     """Scans that hold points."""
-    scans = (_Scan(path, scan, str(k + 1)) for k, scan in enumerate(root["data3D"]))
+    count = len(root["data3D"])
+    scans = [_Scan(path, scan, f"{k + 1} of {count}") for k, scan in enumerate(root["data3D"])]
     return [scan for scan in scans if scan.points]
 
 
