@@ -15,18 +15,14 @@ from mlscorr.io.text_files import shown
 KINDS = {  # types of properties by their names
     name: kind
     for kind, names in (
-        *(
-            ("i1", "char int8"),
-            ("u1", "uchar uint8"),
-            ("i2", "short int16"),
-            ("u2", "ushort uint16"),
-        ),
-        *(
-            ("i4", "int int32"),
-            ("u4", "uint uint32"),
-            ("f4", "float float32"),
-            ("f8", "double float64"),
-        ),
+        ("i1", "char int8"),
+        ("u1", "uchar uint8"),
+        ("i2", "short int16"),
+        ("u2", "ushort uint16"),
+        ("i4", "int int32"),
+        ("u4", "uint uint32"),
+        ("f4", "float float32"),
+        ("f8", "double float64"),
     )
     for name in names.split()
 }
