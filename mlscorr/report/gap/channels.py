@@ -1,7 +1,6 @@
 """Channels beside geometry, and distances as other fields state them: sentences, rows, a figure."""
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from mlscorr.effects.wording import joined, known
 from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.labels import lowered
 from mlscorr.report.gap.numbers import numbers, plain
+from mlscorr.report.gap.rows import bin_names
 from mlscorr.report.headline import Statement
 from mlscorr.report.style import BLUE, GREY, VERMILLION, legend_above, new_figure, styled
 
@@ -95,9 +95,9 @@ def channel_rows(document: dict) -> list[ChannelRow]:
     for each in document.get("contrasts", ()):
         whole = [] if each["whole"] is None else [each["whole"]]
         for table in [*each["tables"], *whole]:
-            names = _names(table)
             columns = (table[key] for key in ("real", "simulated", "value", "sigma", "blocks"))
-            for name, differs, *values in zip(names, table["differs"], *columns, strict=True):
+            bins = zip(bin_names(table), table["differs"], *columns, strict=True)
+            for name, differs, *values in bins:
                 texts = [plain(value) for value in values]
                 title, by = WORDS[each["channel"]][0], SPLITS[table["by"]]
                 rows.append(ChannelRow(title, by, name, texts, differs))
@@ -121,12 +121,6 @@ def distance_rows(document: dict) -> list[DistanceRow]:
         )
         for each in document.get("distances", ())
     ]  # fmt: skip
-
-
-def _names(table):
-    if "edges" in table:
-        return [f"{plain(a)} to {plain(b)}" for a, b in pairwise(table["edges"])]
-    return table["bins"]
 
 
 @styled

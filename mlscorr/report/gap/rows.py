@@ -139,14 +139,23 @@ def bin_rows(document: dict) -> list[BinRow]:
     """
     rows = []
     for split in document["where"]:
-        names = split.get("bins")
-        if split.get("edges") is not None:
-            names = [f"{plain(a)} to {plain(b)}" for a, b in pairwise(split["edges"])]
         columns = (split[key] for key in ("count", "before", "after", "share", "null_band"))
-        rows += [
-            BinRow(split_title(split), *values) for values in zip(names, *columns, strict=True)
-        ]
+        bins = zip(bin_names(split), *columns, strict=True)
+        rows += [BinRow(split_title(split), *values) for values in bins]
     return rows
+
+
+def bin_names(split: dict) -> list[str]:
+    """Names of the bins of a split: their own, or from edge to edge.
+
+    Parameters
+    ----------
+    split : dict
+        With bins, or edges.
+    """
+    if split.get("edges") is None:
+        return split["bins"]
+    return [f"{plain(a)} to {plain(b)}" for a, b in pairwise(split["edges"])]
 
 
 def cause_rows(document: dict) -> list[CauseRow]:
