@@ -79,11 +79,7 @@ def read_sbet(path: str | Path, crs: str | None, accuracy: str | Path | None = N
         For a missing or unsuitable CRS, a file that is not a whole number of records, values that
         are no radians, or a geoid grid that is not installed.
     """
-    if crs is None:
-        raise ValueError(
-            f"{path} is an SBET with latitude and longitude: set crs in survey.toml "
-            'to the projected CRS of cloud and control, e.g. crs = "EPSG:32650".'
-        )
+    _check_known(path, crs, "an SBET")
     record = _read_records(path, SBET_FIELDS, "SBET")
     _check_radians(path, record)
     return _in_map(path, crs, record, accuracy, 0.0)
@@ -113,16 +109,21 @@ def read_riegl(
         As read_sbet and read_pof.
     """
     record, constant, layout = read_pof(path)
-    if crs is None:
-        raise ValueError(
-            f"{path} is a POF with latitude and longitude: set crs in survey.toml "
-            'to the projected CRS of cloud and control, e.g. crs = "EPSG:32650".'
-        )
+    _check_known(path, crs, "a POF")
     trajectory = _in_map(path, crs, record | {"wander": 0.0}, accuracy, constant)
     return trajectory, (
         f"{layout}; latitude and longitude in the datum of {crs}, altitudes as heights above the "
         "ellipsoid; heading clockwise from true north, pitch nose up, roll right side down."
     )
+
+
+def _check_known(path, crs, kind):
+    """Refuse geographic positions for which no CRS is given."""
+    if crs is None:
+        raise ValueError(
+            f"{path} is {kind} with latitude and longitude: set crs in survey.toml "
+            'to the projected CRS of cloud and control, e.g. crs = "EPSG:32650".'
+        )
 
 
 def _in_map(path, crs, record, accuracy, constant):
