@@ -18,6 +18,7 @@ from mlscorr.gap.train.errors import process
 from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
 from mlscorr.gap.train.worlds import World
 from mlscorr.simulate.mechanisms import load_mechanisms, training_mechanisms
+from mlscorr.simulate.pos import interpolate
 from mlscorr.survey import Survey
 
 SHARES = {  # of cases: as the blind check's, with more noise, of which there are fewer names
@@ -190,9 +191,7 @@ def _of_pose(case, effect, rng):
     """What a noisy position makes of residuals (m,)."""
     rows, path = case.rows, case.survey.trajectory
     moved = effect.apply(path, rows.reference, rng).position - path.position
-    return _by_position(rows, lambda time: np.column_stack(
-        [np.interp(time, path.gps_time, column) for column in moved.T]
-    ))  # fmt: skip
+    return _by_position(rows, lambda at: interpolate(at, path.gps_time, moved))
 
 
 def _drifting(case, rng, size):
@@ -208,9 +207,7 @@ def _drifting(case, rng, size):
     if not everywhere:  # grows until GNSS is back
         part = (grid - start) / length
         drift *= np.where((part >= 0) & (part < 1), 2.0 * part, 0.0)[:, None]
-    shift = sigma * _by_position(rows, lambda at: np.column_stack(
-        [np.interp(at, grid, column) for column in drift.T]
-    ))  # fmt: skip
+    shift = sigma * _by_position(rows, lambda at: interpolate(at, grid, drift))
     rows = replace(rows, residual=rows.residual + shift)
     return replace(case, names=("position_noise",), mdb=size, rows=rows)
 

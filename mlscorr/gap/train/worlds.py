@@ -17,7 +17,7 @@ from mlscorr.gap.observe.rows import Background, Rows, background
 from mlscorr.gap.signatures.signatures import Signature, signatures
 from mlscorr.gap.train.errors import process, scatter
 from mlscorr.gap.train.features import Geometry, geometry
-from mlscorr.simulate.pos import PosError, pos_error
+from mlscorr.simulate.pos import PosError, interpolate, pos_error
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Survey, Trajectory
 
@@ -78,10 +78,10 @@ class World:
         m, known = len(rows), survey.trajectory.gps_time
         time = np.append(rows.gps_time, np.where(rows.two_times, rows.gps_time_2, rows.gps_time))
         if kind == "sensors":
-            pose = _interpolated(time, known, np.hstack([error.position, error.attitude]))
+            pose = interpolate(time, known, np.hstack([error.position, error.attitude]))
         else:
             sigmas = np.hstack([error.position_sigma, error.attitude_sigma])
-            pose = _interpolated(time, known, sigmas) * np.exp(SCALE * rng.standard_normal())
+            pose = interpolate(time, known, sigmas) * np.exp(SCALE * rng.standard_normal())
             pose[:, :3] *= self._growth(rng, time, survey)[:, None]
             order = np.argsort(time)
             for i in range(6):
@@ -128,7 +128,3 @@ def _recorded(survey, scenario, rng):
         position_sigma=error.position_sigma, attitude_sigma=error.attitude_sigma,
     )  # fmt: skip
     return replace(survey, trajectory=recorded), error
-
-
-def _interpolated(time, known, columns):
-    return np.column_stack([np.interp(time, known, column) for column in columns.T])
