@@ -11,9 +11,7 @@ from mlscorr.gap.signatures.changes import Bench, Change
 from mlscorr.survey import Survey
 
 
-def expected(
-    rows: Rows, survey: Survey, effects: Iterable[Effect], rng: np.random.Generator | None = None
-) -> Change:
+def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
     """What effects that a simulator has already make of the rows: one Change of all.
 
     Take ``shift + log(1 + growth)`` from the residuals, add ``variance`` to their noise.
@@ -23,13 +21,11 @@ def expected(
     rows : Rows
     survey : Survey
     effects : iterable of Effect
-    rng : numpy.random.Generator, optional
-        For random ones.
     """
     bench, m = Bench(rows, survey), len(rows)
     shift, variance, growth = np.zeros(m), np.zeros(m), np.zeros(m)
     for effect in effects:
-        change = bench.change(effect, rng)
+        change = bench.change(effect)
         shift, variance = shift + change.shift, variance + change.variance
         growth = growth + change.growth
     return Change(shift, variance, growth)
