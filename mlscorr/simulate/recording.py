@@ -147,19 +147,9 @@ def split_passes(trajectory: Trajectory, lengths: Iterable[int]) -> tuple[Trajec
     lengths : iterable of int
         Epochs of each pass.
     """
-
-    def part(rows):
-        sigmas = (trajectory.position_sigma, trajectory.attitude_sigma)
-        return Trajectory(
-            trajectory.gps_time[rows],
-            trajectory.position[rows],
-            trajectory.attitude[rows],
-            *(None if sigma is None else sigma[rows] for sigma in sigmas),
-        )
-
     lengths = list(lengths)
-    ends = np.cumsum(lengths)
-    return tuple(part(slice(end - n, end)) for end, n in zip(ends, lengths, strict=True))
+    parts = zip(np.cumsum(lengths), lengths, strict=True)
+    return tuple(trajectory.select(slice(end - n, end)) for end, n in parts)
 
 
 def surveyed_targets(

@@ -107,6 +107,18 @@ class Trajectory(Summary):
         starts, ends = self.gaps.T
         return float(end - start - (ends - starts)[(starts >= start) & (ends <= end)].sum())
 
+    def select(self, rows: slice | np.ndarray) -> Trajectory:
+        """Some of its epochs.
+
+        Parameters
+        ----------
+        rows : slice, or (n,) bool or (m,) int array
+            In the order of time.
+        """
+        optional = self.position_sigma, self.attitude_sigma, self.session
+        kept = (None if column is None else column[rows] for column in optional)
+        return Trajectory(self.gps_time[rows], self.position[rows], self.attitude[rows], *kept)
+
     def at(self, gps_time: ArrayLike) -> Trajectory:
         """Trajectory at other times, positions and sigmas linear, attitudes by slerp.
 

@@ -133,3 +133,17 @@ def test_sessions_part_a_trajectory_where_steps_do_not():
     assert whole.at(START + np.array([9.85, 11.0])).session.tolist() == [3, 1]
     with pytest.raises(ValueError, match="1 of 1 times lie outside"):
         whole.at(START + 9.95)
+
+
+def test_some_epochs_keep_all_that_is_known_of_them():
+    "Position, attitude, sigmas and session of chosen epochs are theirs; what isn't known stays so"
+    gps_time, sigma = START + np.arange(6.0), np.linspace(0.01, 0.06, 18).reshape(6, 3)
+    whole = drive(gps_time, position_sigma=sigma, session=np.array([0, 0, 0, 1, 1, 1]))
+    for rows in (slice(1, 4), np.array([0, 2, 5]), gps_time > START + 2.5):
+        part = whole.select(rows)
+        assert np.array_equal(part.gps_time, gps_time[rows])
+        assert np.array_equal(part.position, whole.position[rows])
+        assert np.array_equal(part.attitude.as_quat(), whole.attitude[rows].as_quat())
+        assert np.array_equal(part.position_sigma, sigma[rows])
+        assert np.array_equal(part.session, whole.session[rows])
+        assert part.attitude_sigma is None
