@@ -225,7 +225,7 @@ def _mutual(features, pairs, distance):
     pairs = pairs[np.argsort(distance, kind="stable")]
     nearest = np.ones(len(pairs), bool)
     for feature, partner in (pairs.T, pairs.T[::-1]):
-        key = feature * (features.pass_number.max() + 1) + features.pass_number[partner]
+        key = feature * (features.pass_number.max(initial=0) + 1) + features.pass_number[partner]
         is_first = np.zeros(len(pairs), bool)
         is_first[np.unique(key, return_index=True)[1]] = True
         nearest &= is_first

@@ -171,6 +171,11 @@ def test_one_pass_has_no_ties():
     assert len(pair(street.features(1, 1), 1.0)) == 0
 
 
+def test_nothing_has_no_ties():
+    "A street without a plane or pole is no error"
+    assert len(pair_features(street.features()[[]], np.zeros((0, 3)), np.zeros(0), 2.0)) == 0
+
+
 def test_a_loop_is_tied_to_itself():
     "The same pass 45 s later sees the wall again; 5 s later it still sees it for the first time"
     places = [[0, 0, 0], [0.05, 0, 0], [0.02, 0, 0]]
