@@ -20,7 +20,8 @@ from numba import njit
 from mlscorr.collocation.pattern import Pattern
 
 STRIP = 12  # columns of a panel factored by loops before BLAS takes them to the next ones
-NOTHING = 1e-150  # of smaller ones a product is subnormal: a processor takes 100 times as long
+# Products of smaller values are subnormal numbers, for which a processor takes 100 times as long
+NOTHING = float(np.sqrt(np.finfo(float).tiny))
 
 
 @njit(cache=True, nogil=True)
