@@ -58,13 +58,14 @@ class AddedUnknowns:
             One sigma of what is known of them without the survey.
         """
         solved = equations.solve(parameters)
-        taken = solved.projected.T @ columns
-        weights = solved.solver.solve(columns) - solved.projected @ taken  # P M
+        white = solved.solver.whiten(np.column_stack([solved.design, columns]))
+        trend, added = np.split(white, [solved.design.shape[1]], axis=1)
+        response = np.linalg.lstsq(trend, added, rcond=None)[0]  # Eq. 13 of each column
+        weights = solved.solver.solve(columns - solved.design @ response)  # P M
         covariance = np.linalg.inv(columns.T @ weights + np.diag(prior_sigma**-2.0))
         right = weights.T @ misclosures_of(equations)
         correction = covariance @ right
         critical = float(chi2.isf(SETTINGS.significance, len(correction)))
-        response = solved.trend_root @ taken
         return cls(correction, covariance, response, float(right @ correction), critical)
 
     @property

@@ -60,12 +60,10 @@ def all_tests(equations: Equations, posterior: Posterior) -> list[TargetTest]:
     posterior : Posterior
         Of the parameters, by these equations.
     """
-    targets = len(equations.target_rows)
-    return [
-        test
-        for block in Objective.of(equations).blocks
-        for test in _tests(block, block.target_rows, posterior, targets)
-    ]
+    tests, targets = [], len(equations.target_rows)
+    for block in Objective.of(equations).blocks:
+        tests += _tests(block, block.target_rows, posterior, targets)
+    return tests
 
 
 def single_test(equations: Equations, name: str, posterior: Posterior) -> TargetTest:

@@ -45,7 +45,7 @@ def test_the_response_is_what_the_trend_takes_of_a_unit(tied):
     added = AddedUnknowns.of(equations, parameters, columns, np.ones(2))
     changed = with_misclosures(equations, misclosures_of(equations) + columns @ sizes)
     before, after = (each.solve(parameters).trend for each in (equations, changed))
-    assert np.abs(after - before - added.response @ sizes).max() < 1e-7  # m
+    assert np.abs(after - before - added.response @ sizes).max() < 1e-9  # m
 
 
 def test_nothing_added_is_chance(tied):
