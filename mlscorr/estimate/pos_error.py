@@ -19,7 +19,7 @@ from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.orders import Alternative, affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.posterior import Objective, Posterior
-from mlscorr.estimate.prediction import pose_rows, predict_pose_error
+from mlscorr.estimate.prediction import GridPredictions, pose_rows, predict_pose_error
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.runs import find_windows, with_windows
 from mlscorr.estimate.screening import Outlier, Screening, screen
@@ -154,9 +154,8 @@ def estimate_correction(
     equations, screening, windows = _screened(filled, matched, pos, order)
     kept = equations.without({outlier.name for outlier in screening.outliers})
     sparse = sparse_warnings(kept, order, equations.order)
-    return _estimate(
-        trajectory, matched.name, kept, screening, (*notes, *map(str, windows), *sparse)
-    )
+    notes = (*notes, *map(str, windows), *sparse)
+    return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -183,7 +182,7 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
     objective = Objective.of(equations)
     mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
     screening = Screening(Posterior(mode, mode), (), (), (), ())
-    return _estimate(trajectory, (), equations, screening, notes)
+    return _estimate(trajectory, (), GridPredictions(equations), screening, notes)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -200,11 +199,11 @@ def with_ties(estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
         first is estimated with the drift, so that it doesn't pass for drift.
     """
     before, rows = _tie_equations(estimate.equations, ties, mountings)
-    kept, screening, is_used = screen_with_ties(before, estimate.screening, rows)
+    predictions, screening, is_used = screen_with_ties(before, estimate.screening, rows)
     names = np.full(len(estimate.used), "", dtype=object)
     names[estimate.used] = before.names
     trajectory = estimate.correction.recorded
-    changed = _estimate(trajectory, names, kept, screening, estimate.notes)
+    changed = _estimate(trajectory, names, predictions, screening, estimate.notes)
     return replace(changed, ties=TieResiduals.of(ties, is_used, changed.correction))
 
 
@@ -242,14 +241,17 @@ def _tie_equations(equations, ties, mountings):
     return with_mountings(equations, nothing, np.zeros(len(between)), between), rows
 
 
-def _estimate(trajectory, names, kept, screening, notes):
-    """The Estimate by equations and the parameters that were chosen for them."""
+def _estimate(trajectory, names, predictions, screening, notes):
+    """The Estimate by equations, as predictions have them, and the parameters chosen for them."""
+    kept = predictions.equations
     posterior, used = screening.posterior, np.isin(np.asarray(names, dtype=object), kept.names)
     parameters = posterior.modes[0][0]
     solved = kept.solve(parameters)
     left_out = np.full((len(names), 3), np.nan)
     left_out[used] = leave_targets_out(kept, solved)
-    correction = Correction.by_pose_error(trajectory, *predict_pose_error(kept, posterior))
+    correction = Correction.by_pose_error(
+        trajectory, *predict_pose_error(kept, posterior, predictions)
+    )
     return Estimate(
         correction=correction,
         equations=kept,

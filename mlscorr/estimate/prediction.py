@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from functools import cached_property
+
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from mlscorr.collocation import Collocation
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Posterior
 from mlscorr.estimate.settings import SETTINGS
@@ -13,7 +17,60 @@ from mlscorr.pos import Steps
 from mlscorr.survey import Trajectory
 
 
-def predict_pose_error(equations: Equations, posterior: Posterior) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class GridPredictions:
+    """POS errors (k, 6) and their variances (k, 6) at some epochs, by parameters.
+
+    Whoever holds a Collocation for another reason adds it: each costs a solution of all rows.
+
+    Parameters
+    ----------
+    equations : Equations
+    by_parameters : dict
+    """
+
+    equations: Equations
+    by_parameters: dict[SignalParameters, tuple[np.ndarray, np.ndarray]] = field(
+        default_factory=dict
+    )
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """Numbers of regular epochs, those before and after gaps, and those nearest to control."""
+        trajectory, n = self.equations.trajectory, len(self.equations.trajectory)
+        history = self.equations.stated.history
+        steps = np.concatenate([history.steps.before, history.steps.after, history.restarts])
+        edges = np.searchsorted(trajectory.gps_time, [*trajectory.gaps.ravel(), *steps])
+        control = np.searchsorted(trajectory.gps_time, self.equations.observed)
+        regular = np.linspace(0, n - 1, min(n, SETTINGS.prediction_epochs)).round().astype(int)
+        return np.unique(np.clip(np.concatenate([regular, edges, control]), 0, n - 1))
+
+    def add(self, parameters: SignalParameters, solved: Collocation) -> None:
+        """Predict under parameters, by their Collocation.
+
+        Parameters
+        ----------
+        parameters : SignalParameters
+        solved : Collocation
+        """
+        pose, spread = solved.predict(*pose_rows(self.equations, parameters, self.rows))
+        self.by_parameters[parameters] = pose, np.einsum("qii->qi", spread)
+
+    def under(self, parameters: SignalParameters) -> tuple[np.ndarray, np.ndarray]:
+        """The POS errors and variances under parameters.
+
+        Parameters
+        ----------
+        parameters : SignalParameters
+        """
+        if parameters not in self.by_parameters:
+            self.add(parameters, self.equations.solve(parameters))
+        return self.by_parameters[parameters]
+
+
+def predict_pose_error(
+    equations: Equations, posterior: Posterior, predictions: GridPredictions | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """POS error (n, 6) at every epoch, trend plus signals (Eq. 15), with covariance (n, 6, 6).
 
     Position in m, rotation about the map axes in rad. The most probable parameters predict every
@@ -25,18 +82,19 @@ def predict_pose_error(equations: Equations, posterior: Posterior) -> tuple[np.n
     ----------
     equations : Equations
     posterior : Posterior
+    predictions : GridPredictions, optional
+        By these equations, where some are known.
     """
     trajectory = equations.trajectory
     pose, covariance = predict_under(equations, posterior.modes[0][0])
     sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), SETTINGS.smallest_sigma**2))
-    rows = _grid(equations)
-    mean, square = 0.0, 0.0
+    predictions = predictions or GridPredictions(equations)
+    rows, mean, square = predictions.rows, 0.0, 0.0
     points = [point for point in posterior.points if point[1] > SETTINGS.smallest_weight]
     total = sum(weight for _, weight in points)
     for parameters, weight in points:
-        predicted, spread = predict_under(equations, parameters, rows)
+        predicted, variance = predictions.under(parameters)
         mean = mean + weight / total * predicted
-        variance = np.einsum("qii->qi", spread)
         square = square + weight / total * (variance + predicted**2)
     wider = np.sqrt(np.maximum(square - mean**2, 0.0)) / sigma[rows]
     moved = (mean - pose[rows]) / sigma[rows]
@@ -83,17 +141,6 @@ def bridge_steps(
         covariance[inside] = (1.0 - share) * covariance[first] + share * covariance[last]
         covariance[inside, :3, :3] += (4.0 * share * (1.0 - share) * sigma) ** 2 * np.eye(3)
     return pose, covariance
-
-
-def _grid(equations):
-    """Numbers of regular epochs, those before and after gaps, and those nearest to control."""
-    trajectory, n = equations.trajectory, len(equations.trajectory)
-    history = equations.stated.history
-    steps = np.concatenate([history.steps.before, history.steps.after, history.restarts])
-    edges = np.searchsorted(trajectory.gps_time, [*trajectory.gaps.ravel(), *steps])
-    control = np.searchsorted(trajectory.gps_time, equations.observed)
-    regular = np.linspace(0, n - 1, min(n, SETTINGS.prediction_epochs)).round().astype(int)
-    return np.unique(np.clip(np.concatenate([regular, edges, control]), 0, n - 1))
 
 
 def _interpolated(gps_time, rows, values):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +52,9 @@ class TargetTest:
         return self.statistic / self.critical if np.isfinite(self.statistic) else 0.0
 
 
-def all_tests(equations: Equations, posterior: Posterior) -> list[TargetTest]:
+def all_tests(
+    equations: Equations, posterior: Posterior, visit: Callable | None = None
+) -> list[TargetTest]:
     """TargetTest of each target by all others.
 
     Parameters
@@ -59,10 +62,13 @@ def all_tests(equations: Equations, posterior: Posterior) -> list[TargetTest]:
     equations : Equations
     posterior : Posterior
         Of the parameters, by these equations.
+    visit : function of SignalParameters and a Collocation, optional
+        Called with each solution of these equations while it is held, for what else it tells.
     """
     tests, targets = [], len(equations.target_rows)
     for block in Objective.of(equations).blocks:
-        tests += _tests(block, block.target_rows, posterior, targets)
+        whole = len(block.names) == len(equations.names) and block.order == equations.order
+        tests += _tests(block, block.target_rows, posterior, targets, visit if whole else None)
     return tests
 
 
@@ -81,11 +87,13 @@ def single_test(equations: Equations, name: str, posterior: Posterior) -> Target
     return _tests(block, [name], posterior, len(equations.target_rows))[0]
 
 
-def _tests(equations, names, posterior, targets):
+def _tests(equations, names, posterior, targets, visit=None):
     """TargetTests of some targets, by a Collocation after the other: many would fill the memory."""
     left_out = {name: [] for name in names}
     for chosen, weight in posterior.points:
         solved = equations.solve(chosen)
+        if visit is not None:
+            visit(chosen, solved)
         for name, of_target in left_out.items():
             rows = equations.target_rows[name]
             if solved.determined_without(rows):

@@ -17,6 +17,7 @@ from mlscorr.correction import Correction
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.outages import with_likely_starts
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters
+from mlscorr.estimate.prediction import GridPredictions
 from mlscorr.estimate.screening import Outlier, Screening, may_go
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
@@ -121,8 +122,8 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
 
 def screen_with_ties(
     equations: Equations, screening: Screening, ties: TieEquations
-) -> tuple[Equations, Screening, np.ndarray]:
-    """The equations with ties, what both say of the control points, and which ties hold (n,).
+) -> tuple[GridPredictions, Screening, np.ndarray]:
+    """Equations with ties and what they predict, what both say of control, which ties hold (n,).
 
     A control point that few others could test is tested again, now that ties hold the drive.
 
@@ -138,8 +139,9 @@ def screen_with_ties(
     while True:
         tied = add_ties(kept, parameters, ties)
         if tied.used.mean() < SETTINGS.tie_majority:
-            return equations, screening, np.zeros(len(ties), dtype=bool)
-        tests = all_tests(tied.equations, tied.posterior)
+            return GridPredictions(equations), screening, np.zeros(len(ties), dtype=bool)
+        predictions = GridPredictions(tied.equations)
+        tests = all_tests(tied.equations, tied.posterior, predictions.add)
         doubtful = sorted((t for t in tests if t.excess > 1.0), key=lambda t: -t.excess)
         if not doubtful or not may_go(kept, {doubtful[0].name}):
             break
@@ -159,7 +161,7 @@ def screen_with_ties(
             *(_contradiction(test, WRONG_BUT_USED) for test in doubtful),
         ),
     )
-    return tied.equations, changed, tied.used
+    return predictions, changed, tied.used
 
 
 def _contradiction(test, what):

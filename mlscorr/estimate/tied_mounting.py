@@ -49,7 +49,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     tied, correction = _converged(calibration, matched, ties, parameters)
     rows = replace(tied.ties, weight=np.ones(len(ties)))  # without those of robust estimation
     bare = replace(tied.equations, ties=None)
-    kept, screening, is_used = screen_with_ties(bare, calibration.screening, rows)
+    predictions, screening, is_used = screen_with_ties(bare, calibration.screening, rows)
     if not is_used.any():
         residuals = TieResiduals.of(ties, is_used, calibration.correction_with_drift)
         return replace(calibration, ties=residuals)
@@ -57,7 +57,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     changed = calibration_by(
         calibration.trajectory,
         calibration.recorded,
-        kept,
+        predictions.equations,
         screening,
         (correction, calibration.ls),
         used,

@@ -7,8 +7,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.estimate.posterior import Posterior
-from mlscorr.estimate.prediction import bridge_steps, predict_pose_error, predict_under
+from mlscorr.estimate.prediction import (
+    GridPredictions,
+    bridge_steps,
+    predict_pose_error,
+    predict_under,
+)
 from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.target_tests import all_tests
 from mlscorr.pos import find_steps
 from mlscorr.survey import Trajectory
 from tests.beds.pos_errors import EPOCHS, START, smooth_case
@@ -85,6 +91,19 @@ def test_parameters_of_no_weight_are_not_worked_out(equations, parameters):
     both = predict_pose_error(equations, sure((parameters, 1.0 - 1e-4), (wild, 1e-4)))
     for here, there in zip(both, alone, strict=True):
         np.testing.assert_allclose(here, there, rtol=1e-12, atol=1e-15)
+
+
+def test_solutions_that_others_made_predict_the_same(equations, posterior):
+    "What the tests of targets solved serves the prediction to the last bit, and isn't solved again"
+    known = GridPredictions(equations)
+    all_tests(equations, posterior, known.add)
+    assert set(known.by_parameters) == {parameters for parameters, _ in posterior.points}
+    for here, there in zip(
+        predict_pose_error(equations, posterior, known),
+        predict_pose_error(equations, posterior),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(here, there)
 
 
 def test_covariances_are_covariances(equations, posterior):
