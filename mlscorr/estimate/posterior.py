@@ -36,6 +36,13 @@ class Posterior:
     modes: tuple[tuple[SignalParameters, float], ...]
     points: tuple[tuple[SignalParameters, float], ...]
 
+    @property
+    def likely(self) -> list[tuple[SignalParameters, float]]:
+        """The points that are worth the work, with weights that sum up to one."""
+        worth = [point for point in self.points if point[1] > SETTINGS.smallest_weight]
+        total = sum(weight for _, weight in worth)
+        return [(parameters, weight / total) for parameters, weight in worth]
+
 
 @dataclass(frozen=True)
 class Objective:

@@ -90,12 +90,10 @@ def predict_pose_error(
     sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), SETTINGS.smallest_sigma**2))
     predictions = predictions or GridPredictions(equations)
     rows, mean, square = predictions.rows, 0.0, 0.0
-    points = [point for point in posterior.points if point[1] > SETTINGS.smallest_weight]
-    total = sum(weight for _, weight in points)
-    for parameters, weight in points:
+    for parameters, weight in posterior.likely:
         predicted, variance = predictions.under(parameters)
-        mean = mean + weight / total * predicted
-        square = square + weight / total * (variance + predicted**2)
+        mean = mean + weight * predicted
+        square = square + weight * (variance + predicted**2)
     wider = np.sqrt(np.maximum(square - mean**2, 0.0)) / sigma[rows]
     moved = (mean - pose[rows]) / sigma[rows]
     pose += sigma * _interpolated(trajectory.gps_time, rows, moved)
