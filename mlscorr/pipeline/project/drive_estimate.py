@@ -31,12 +31,9 @@ class DriveEstimate(Estimate):
     ----------
     held : Support
         What holds the correction along the drive.
-    orders : tuple of Alternative
-        Of the trend of all drives.
     """
 
     held: Support = field(default_factory=Support)
-    orders: tuple[Alternative, ...] = ()
 
     @property
     def support(self) -> Support:
@@ -45,8 +42,8 @@ class DriveEstimate(Estimate):
 
     @property
     def alternatives(self) -> tuple[Alternative, ...]:
-        """Other orders of the trend beside the one in use."""
-        return self.orders
+        """Of the shift that drives have in common there are no other orders."""
+        return ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -98,11 +95,11 @@ def drive_estimates(
     notes : sequence of str
         Sentences on each drive's ties with others.
     """
-    whole = estimate.support, estimate.alternatives
-    return [_part(joint, estimate, number, *whole, note) for number, note in enumerate(notes)]
+    support = estimate.support
+    return [_part(joint, estimate, number, support, note) for number, note in enumerate(notes)]
 
 
-def _part(joint, estimate, number, support, orders, note):
+def _part(joint, estimate, number, support, note):
     """The DriveEstimate of a drive."""
     trajectory, shift = joint.drives[number].survey.trajectory, joint.shifts[number]
     owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
@@ -129,7 +126,6 @@ def _part(joint, estimate, number, support, orders, note):
         ties=_ties(joint, estimate.ties, number),
         untied=note or estimate.untied,
         held=_held(support, trajectory, shift, chainage),
-        orders=orders,
     )
 
 
