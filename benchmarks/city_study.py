@@ -19,6 +19,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
@@ -27,9 +29,10 @@ from mlscorr.io.control import NO_POINTS
 from mlscorr.matching import Matches
 from mlscorr.pipeline.file_finding import DriveFinding
 from mlscorr.pipeline.finding import Finding
-from mlscorr.pipeline.project.corrected import corrected_drives, motion_of
+from mlscorr.pipeline.project.city import project_drives
+from mlscorr.pipeline.project.corrected import motion_of
 from mlscorr.pipeline.project.joint import FoundDrive
-from mlscorr.pipeline.project.joint_estimate import estimate_drives
+from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.survey import (
     ControlPoints,
     Matched,
@@ -48,6 +51,7 @@ BLOCK = 100.0  # m between crossings
 SPEED = 10.0  # m/s
 DURATION = 200.0  # s of a drive
 RATE = 10.0  # epochs a second
+TURN = 1.5  # s, one sigma of how a turn is smoothed: a jerk of 1.5 m/s^3, no step of the POS
 ORIGIN = np.array([532_000.0, 3_374_000.0, 40.0])
 START = 1_357_700_000.0  # s, GPS
 SIGMA = 0.5  # m, that the POS states
@@ -108,6 +112,7 @@ class City:
         times = start + np.arange(0.0, DURATION + 1e-9, 1 / RATE)
         passed = start + np.arange(len(way)) * BLOCK / SPEED
         plan = np.column_stack([np.interp(times, passed, BLOCK * xy) for xy in way.T])
+        plan = gaussian_filter1d(plan, TURN * RATE, axis=0, mode="nearest")
         knots = np.arange(start - 30.0, start + DURATION + 60.0, 30.0)
         error = CubicSpline(knots, rng.normal(scale=SIGMA, size=(len(knots), 3)))
         recorded = ORIGIN + np.column_stack([plan, np.full(len(plan), 2.5)]) + error(times)
@@ -131,12 +136,10 @@ class City:
         return FoundDrive(survey, DriveFinding(finding, features), control, control[[]])
 
     def left(self, name, correction):
-        "3D RMS of what a correction leaves of a drive's error. Units: m"
+        "What a correction leaves (n, 3) of a drive's error. Units: m"
         recorded, corrected = correction.recorded, correction.corrected
         added = corrected.position - recorded.position
-        return np.sqrt(
-            (np.linalg.norm(added + self.errors[name](recorded.gps_time), axis=1) ** 2).mean()
-        )
+        return added + self.errors[name](recorded.gps_time)
 
     def seen(self, way, passed, error):
         "TieFeatures of a drive"
@@ -174,34 +177,39 @@ class City:
         return Matched(observed, points)
 
 
-def run(number, tiles):
+def run(number, tiles, limit):
     "Print what a city of so many drives costs"
     begin = process_time()
     city = City(number, tiles)
     made, memory_before = process_time() - begin, memory()
+    places, left, within, states = [], [], [], []
     with threadpool_limits(1):
-        parts = estimate_drives(city.drives, 1, ORIGIN, True)
-        joined = process_time() - begin - made
-        left, states = [], []
-        for part in parts:
-            for corrected, state in corrected_drives(part):
-                motion_of(corrected, False)
-                states.append(state.state)
-                left.append(city.left(state.name, corrected.estimate.correction))
-    parted = process_time() - begin - made - joined
+        for corrected, state in project_drives(city.drives, 1, ORIGIN, True, limit=limit):
+            motion_of(corrected, False)
+            states.append(state.state)
+            correction = corrected.estimate.correction
+            remains = city.left(state.name, correction)
+            within.append(np.abs(remains) < 2 * correction.corrected.position_sigma)
+            rows = slice(None, None, round(RATE))
+            places.append(correction.recorded.position[rows])
+            left.append(remains[rows])
+    joined = process_time() - begin - made
     features = sum(len(drive.contents.features) for drive in city.drives)
     held = sum(state in ("controlled", "tied") for state in states)
+    size = [np.sqrt((part**2).sum(axis=1).mean()) for part in left]
     print(
-        number,
-        features,
-        made,
-        joined,
-        parted,
-        memory_before,
-        memory(),
-        held,
-        *np.percentile(left, [50, 95]),
-    )
+        number, features, made, joined, memory_before, memory(), held,
+        *np.percentile(size, [50, 95]), 100 * np.mean(within), _apart(places, left),
+    )  # fmt: skip
+
+
+def _apart(places, left):
+    "RMS of the difference of what is left in two drives at a place. Units: m"
+    drive = np.repeat(np.arange(len(places)), list(map(len, places)))
+    place, left = np.concatenate(places)[:, :2], np.concatenate(left)
+    first, second = cKDTree(place).query_pairs(SPEED / 2, output_type="ndarray").T
+    other = drive[first] != drive[second]
+    return np.sqrt(((left[first[other]] - left[second[other]]) ** 2).sum(axis=1).mean())
 
 
 def memory():
@@ -214,26 +222,29 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("drives", type=int, nargs="*", default=[1, 2])
     parser.add_argument("--tiles", type=int, default=4, help="Of each drive.")
+    parser.add_argument("--limit", type=int, default=SETTINGS.area_features, help="Of an area.")
     parser.add_argument("--run", action="store_true")
     given = parser.parse_args()
     if given.run:
-        run(given.drives[0], given.tiles)
+        run(given.drives[0], given.tiles, given.limit)
         return
     heads = (
         "drives",
         "planes, poles",
         "making, s",
         "joining, s",
-        "parting, s",
         "MB before",
         "MB",
         "held",
         "left of 0.87 m",
         "95 %",
+        "within 2 sigma, %",
+        "apart, m",
     )
     table = Table(*heads, title=f"{given.tiles} tiles a drive; what is left: 3D RMS of a drive")
     for number in given.drives:
-        command = [sys.executable, __file__, str(number), "--tiles", str(given.tiles), "--run"]
+        command = [sys.executable, __file__, str(number), "--tiles", str(given.tiles)]
+        command += ["--limit", str(given.limit), "--run"]
         words = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
         table.add_row(*(f"{float(word):.4g}" for word in words))
     Console(width=120).print(table)

@@ -55,8 +55,11 @@ MODULES = sorted(
 PROJECT_FLOORS = (  # of the modules within pipeline/project, which stands on top of one survey
     ("settings", "engine", "tasks"),
     ("joint", "file_tasks", "running", "progress"),
-    ("drive_estimate", "joint_estimate"),
-    ("stages", "corrected"),
+    ("areas", "drive_estimate", "joint_estimate"),
+    ("corrected",),
+    ("merged",),
+    ("city",),
+    ("stages",),
     ("document",),
     ("correction", "checking"),
     ("status",),

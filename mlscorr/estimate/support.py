@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -119,7 +120,7 @@ def find_support(
     ends_by_step = np.append(np.isin(history.restarts, history.steps.middle), False)
     shown = np.isfinite(starts) & (ends_by_step | history.is_stated)
     return Support(
-        tuple(_stretches(codes, corrected)),
+        tuple(weak_stretches(codes, corrected)),
         tuple(
             (float(start), float(end))
             for start, end, is_shown in zip(starts, history.edges[1:], shown, strict=True)
@@ -185,8 +186,16 @@ def _is_drift_open(equations, solved, parameters, corrected):
     return is_open & (before > (stated.gnss**2).sum(axis=1))
 
 
-def _stretches(codes, trajectory):
-    """A WeakStretch for each run of epochs with one reason, parted at the trajectory's gaps."""
+def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakStretch]:
+    """A WeakStretch for each run of epochs with one reason, parted at the trajectory's gaps.
+
+    Parameters
+    ----------
+    codes : (n,) int array
+        Numbers of the REASONS.
+    trajectory : Trajectory
+        With its sigmas.
+    """
     time, part = trajectory.gps_time, trajectory.segment(trajectory.gps_time)
     size = np.linalg.norm(trajectory.position_sigma, axis=1)
     way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)

@@ -60,6 +60,8 @@ def _share(section, control):
             "part, and an error that all passes share stays in the cloud."
         )
         return
+    if "share" not in section:  # an area's, of which the drive is a piece
+        return
     share = section["share"]["control"]
     yield (
         f"Of what the result knows of the drive, {percent(share)} comes from control points and "

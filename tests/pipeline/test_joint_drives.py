@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 
 from mlscorr.io.project_file import read_project
+from mlscorr.io.task_store import TaskStore
 from mlscorr.io.time_systems import WEEK
 from mlscorr.pipeline.file_finding import find_in_file
+from mlscorr.pipeline.project.areas import areas_of, pieces_of
+from mlscorr.pipeline.project.city import drives_by_areas, project_drives
 from mlscorr.pipeline.project.corrected import corrected_drives, found_drive
+from mlscorr.pipeline.project.engine import engine
 from mlscorr.pipeline.project.joint import distinct_times, join_drives
-from mlscorr.pipeline.project.joint_estimate import JointEstimate, estimate_drives
+from mlscorr.pipeline.project.joint_estimate import JointEstimate
+from mlscorr.pipeline.project.running import Run
+from mlscorr.pipeline.project.stages import area_tasks
 from mlscorr.pipeline.tying import estimate_together
 from tests.beds import project_street as bed
 
@@ -32,10 +38,8 @@ def drives(tmp_path_factory):
 
 def results(drives):
     "CorrectedSurvey and DriveState of each drive by its name"
-    parts = estimate_drives(drives, 1, ORIGIN, True)
-    return {
-        state.name: (corrected, state) for p in parts for corrected, state in corrected_drives(p)
-    }
+    parted = project_drives(drives, 1, ORIGIN, True)
+    return {state.name: (corrected, state) for corrected, state in parted}
 
 
 @pytest.fixture(scope="module")
@@ -115,6 +119,94 @@ def test_epochs_of_a_long_project_are_thinned(drives, together):
         assert np.abs(added(corrected) - added(whole)).max() < 0.002
         ratio = corrected.trajectory.position_sigma / whole.trajectory.position_sigma
         assert np.abs(ratio - 1).max() < 0.1
+
+
+@pytest.fixture(scope="module")
+def by_areas(drives):
+    "Results of both drives by two areas, cut in the middle of the street"
+    areas = cut(drives)
+    parted = drives_by_areas(drives, areas, 1, ORIGIN)
+    return areas, {state.name: (corrected, state) for corrected, state in parted}
+
+
+def cut(drives):
+    "Two areas with margins of 4 m"
+    places = np.vstack([drive.contents.features.centre for drive in drives])
+    areas = areas_of(places, int(0.6 * len(places)), 4.0)
+    assert len(areas) == 2
+    return areas
+
+
+def test_areas_give_what_all_give_together(drives, together, by_areas):
+    "Cut in two, a street is corrected as whole, within its sigmas and 3 cm, and nothing jumps"
+    for drive in drives:
+        whole, (parted, state) = together[drive.survey.name], by_areas[1][drive.survey.name]
+        change = added(parted) - added(whole[0])
+        assert np.linalg.norm(change, axis=1).max() < 0.03  # m
+        sigma = [c.trajectory.position_sigma for c in (parted, whole[0])]
+        assert (np.abs(change) < 3 * sigma[0]).all()
+        assert 0.95 < sigma[0].mean() / sigma[1].mean() < 3
+        assert np.linalg.norm(np.diff(added(parted), axis=0), axis=1).max() < 0.002  # m
+        assert state.state == whole[1].state
+        assert parted.estimate.used.tolist() == whole[0].estimate.used.tolist()
+        assert {test.name for test in parted.estimate.tests} == set(drive.control.name)
+        assert np.isfinite(parted.estimate.left_out).any() == bool(len(drive.control))
+
+
+def test_two_visits_move_alike_across_an_edge(together, by_areas):
+    "Both drives are no farther apart in a place than by one estimate of all, but for 5 mm"
+
+    def apart(results):
+        (first, _), (second, _) = results["first"], results["second"]
+        place = [c.survey.trajectory.position[:, :2] for c in (first, second)]
+        away = np.linalg.norm(place[0][:, None] - place[1], axis=2)
+        left = added(first) - (added(second) + bed.SHIFT)[away.argmin(axis=1)]
+        return np.linalg.norm(left[away.min(axis=1) < 3.0], axis=1)
+
+    whole, parted = apart(together), apart(by_areas[1])
+    assert parted.max() < whole.max() + 0.005  # m
+
+
+def test_areas_are_tasks_of_workers(drives, by_areas, tmp_path):
+    "By two workers each area is estimated to the same bytes, and a second run finds them done"
+    store, ended = TaskStore(tmp_path), []
+    with engine(2, None) as workers:
+        run = Run(store, workers, ended.append)
+
+        def work(areas):
+            return list(run.results(area_tasks(store, "key", areas)).values())
+
+        for _ in range(2):
+            parted = drives_by_areas(drives, by_areas[0], 1, ORIGIN, work)
+            for corrected, state in parted:
+                assert np.array_equal(added(corrected), added(by_areas[1][state.name][0]))
+                assert state == by_areas[1][state.name][1]
+    assert [outcome.seconds > 0 for outcome in ended] == [True, True, False, False]
+    assert not run.faults
+
+
+def test_ties_of_areas_count_once(together, by_areas):
+    "The ties of all areas are as many as those of the whole to a fifth, and name their drive"
+    whole, parted = (part["second"][1].tied_with["first"] for part in (together, by_areas[1]))
+    assert parted["n"] == pytest.approx(whole["n"], rel=0.2)
+    assert parted["before"] == pytest.approx(whole["before"], rel=0.1)
+    assert parted["after"] < 0.02  # m
+    notes = by_areas[1]["second"][0].survey.notes
+    assert sum("with first" in note for note in notes) == 1
+
+
+def test_pieces_hold_what_lies_in_their_area(drives):
+    "Epochs, control and planes of a piece lie in its area or margin, and all have one at least"
+    areas = cut(drives)
+    for drive in drives:
+        pieces = [piece for area in areas for piece in pieces_of([drive], area)]
+        assert np.sum([piece.rows for piece in pieces], axis=0).min() >= 1
+        held = sum(len(piece.drive.contents.features) for piece in pieces)
+        assert len(drive.contents.features) <= held < 2 * len(drive.contents.features)
+        for area, piece in zip(areas, pieces, strict=True):
+            weight = area.weight(piece.drive.survey.trajectory.position)
+            assert (weight[1:-1] > 0).all() and piece.rows.sum() == len(weight)
+            assert piece.control.sum() == len(piece.drive.control)
 
 
 def test_nothing_corrects_a_drive_elsewhere(drives):

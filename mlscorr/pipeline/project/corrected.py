@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from mlscorr.correction import Correction
-from mlscorr.estimate import place_control
+from mlscorr.estimate import Estimate, place_control
 from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.evaluate.ties import misfit, misfit_section, tie_section
 from mlscorr.pipeline.clouds import MovedClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.file_finding import FileFinding, join_findings
+from mlscorr.pipeline.project.areas import Area
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, drive_estimates
 from mlscorr.pipeline.project.joint import FoundDrive
 from mlscorr.pipeline.project.joint_estimate import JointEstimate
@@ -61,21 +63,26 @@ def found_drive(survey: Survey, files: Sequence[FileFinding]) -> FoundDrive:
     return FoundDrive(survey, contents, matched[is_control], matched[~is_control])
 
 
-def corrected_drives(part: JointEstimate) -> list[tuple[CorrectedSurvey, DriveState]]:
+def corrected_drives(
+    part: JointEstimate, area: Area | None = None
+) -> list[tuple[CorrectedSurvey, DriveState]]:
     """The results of drives that were estimated together.
 
     Parameters
     ----------
     part : JointEstimate
+    area : Area, optional
+        Of which the drives are pieces: ties elsewhere don't count.
     """
     joint, estimate = part.joint, part.estimate
-    states = [_state(part, number) for number in range(len(joint.drives))]
-    if joint.is_single:
-        whole = CorrectedSurvey(**_fields(joint.drives[0], estimate))
+    states = [_state(part, number, area) for number in range(len(joint.drives))]
+    if joint.is_single and area is None:
+        whole = CorrectedSurvey(**drive_fields(joint.drives[0], estimate))
         return [(whole, states[0])]
-    notes = [_tied_with(state) for state in states]
+    notes = [tied_sentence(state) for state in states]
     estimates = drive_estimates(joint, estimate, notes)
-    places, section = place_control(estimate), tie_section(estimate) or {}
+    places = place_control(estimate)
+    section = {} if area is not None else tie_section(estimate) or {}  # an area is no drive
     results = []
     for drive, own, shift, note in zip(joint.drives, estimates, joint.shifts, notes, strict=True):
         first, last = drive.survey.trajectory.gps_time[[0, -1]]
@@ -85,9 +92,10 @@ def corrected_drives(part: JointEstimate) -> list[tuple[CorrectedSurvey, DriveSt
         }
         misfits = misfit_section(own.ties) or {"n": 0, "used": 0, "reason": own.untied}
         ties = misfits | (shared if own.ties else {})
-        survey = replace(drive.survey, notes=(*drive.survey.notes, *joint.survey.notes, note))
+        notes_of = (*drive.survey.notes, *joint.survey.notes, *filter(None, [note]))
+        survey = replace(drive.survey, notes=notes_of)
         corrected = CorrectedDrive(
-            **_fields(replace(drive, survey=survey), own),
+            **drive_fields(replace(drive, survey=survey), own),
             places=tuple(place for place in near if first <= place.gps_time <= last),
             section=ties,
         )
@@ -95,8 +103,15 @@ def corrected_drives(part: JointEstimate) -> list[tuple[CorrectedSurvey, DriveSt
     return list(zip(results, states, strict=True))
 
 
-def _fields(drive, estimate):
-    """Fields of a CorrectedSurvey."""
+def drive_fields(drive: FoundDrive, estimate: Estimate) -> dict[str, Any]:
+    """Fields of a CorrectedSurvey.
+
+    Parameters
+    ----------
+    drive : FoundDrive
+    estimate : Estimate
+        Of its own control points and epochs.
+    """
     survey, finding = drive.survey, drive.contents.finding
     datum = datum_warnings(drive.control[estimate.used], survey.trajectory, survey.pos)
     missing = unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned)
@@ -111,7 +126,7 @@ def _fields(drive, estimate):
     }
 
 
-def _state(part, number):
+def _state(part, number, area):
     """The DriveState of one of some drives that were estimated together."""
     joint, estimate, drive = part.joint, part.estimate, part.joint.drives[number]
     owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
@@ -121,18 +136,21 @@ def _state(part, number):
         state = "tied"
     else:
         state = "relative" if part.is_tied else "uncorrected"
-    return DriveState(drive.survey.name, state, _ties(part, number))
+    return DriveState(drive.survey.name, state, _ties(part, number, area))
 
 
-def _ties(part, number):
-    """Used ties of a drive with each other one."""
+def _ties(part, number, area):
+    """Used ties of a drive with each other one, of those in an area."""
     residuals = part.estimate.ties
     shared: dict[str, dict] = {}
     if residuals is None:
         return shared
     owner = part.joint.drive_numbers(residuals.ties.pass_number)
+    counted = residuals.used
+    if area is not None:
+        counted = counted & area.contains(residuals.ties.place[:, 0])
     for other, drive in enumerate(part.joint.drives):
-        rows = residuals.used & (np.sort(owner) == sorted((number, other))).all(axis=1)
+        rows = counted & (np.sort(owner) == sorted((number, other))).all(axis=1)
         if other != number and rows.any():
             shared[drive.survey.name] = {
                 "n": int(rows.sum()),
@@ -142,8 +160,15 @@ def _ties(part, number):
     return shared
 
 
-def _tied_with(state):
-    """A sentence on a drive's ties with others."""
+def tied_sentence(state: DriveState) -> str:
+    """A sentence on a drive's ties with others; empty without any.
+
+    Parameters
+    ----------
+    state : DriveState
+    """
+    if not state.tied_with:
+        return ""
     listed = "; ".join(
         f"{ties['n']} with {name}, {ties['before']:.3f} m apart before and {ties['after']:.3f} m "
         "after (RMS)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,8 @@ from mlscorr.io.storage import as_path, is_folder, is_remote
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.io.trajectory_exports import check_exports
 from mlscorr.pipeline.clouds import WrittenClouds
-from mlscorr.pipeline.project.corrected import corrected_drives, found_drive, motion_of
+from mlscorr.pipeline.project.city import project_drives
+from mlscorr.pipeline.project.corrected import found_drive, motion_of
 from mlscorr.pipeline.project.document import (
     ProjectResult,
     drive_result,
@@ -25,11 +27,11 @@ from mlscorr.pipeline.project.document import (
 )
 from mlscorr.pipeline.project.engine import engine
 from mlscorr.pipeline.project.file_tasks import ReportInput
-from mlscorr.pipeline.project.joint_estimate import estimate_drives
 from mlscorr.pipeline.project.progress import Progress, logged
 from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.stages import (
     PlannedDrive,
+    area_tasks,
     cloud_tasks,
     finding_tasks,
     planned_drive,
@@ -215,13 +217,24 @@ class _Work:
             drives.append(found_drive(drive.survey, own))
         if self.ties != "only" and not any(len(drive.control) for drive in drives):
             raise ValueError(_nothing_found(self.project, drives))
-        parts = estimate_drives(drives, self.options.order, origin, self.ties != "off")
-        for part in parts:
-            for corrected, state in corrected_drives(part):
-                key = keys[state.name]
-                self.run.store.put("motions", key, motion_of(corrected, self.options.sigma))
-                self.run.store.put("corrected", key, corrected)
-                self.run.store.put("states", key, drive_result(corrected, state))
+        key = digest(sorted(keys.values()))
+        results = project_drives(
+            drives, self.options.order, origin, self.ties != "off", partial(self._areas, key)
+        )
+        for corrected, state in results:
+            key = keys[state.name]
+            self.run.store.put("motions", key, motion_of(corrected, self.options.sigma))
+            self.run.store.put("corrected", key, corrected)
+            self.run.store.put("states", key, drive_result(corrected, state))
+
+    def _areas(self, key, areas):
+        """The results of each AreaInput."""
+        tasks = area_tasks(self.run.store, key, areas)
+        self.progress.begin("areas", tasks)
+        results = self.run.results(tasks)
+        if len(results) < len(tasks):
+            raise ValueError(self.run.faults[-1].fault)
+        return list(results.values())
 
     def _clouds(self, planned, keys):
         """WrittenClouds of each drive by its name."""

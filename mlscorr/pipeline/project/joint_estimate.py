@@ -38,27 +38,20 @@ class JointEstimate:
         return self.estimate.ties is not None and bool(self.estimate.ties.used.any())
 
 
-def estimate_drives(
-    drives: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool
+def estimate_group(
+    group: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool
 ) -> list[JointEstimate]:
-    """The POS errors of drives, of those together that saw the same things.
+    """The POS errors of drives near each other, of those together that ties join.
 
     Parameters
     ----------
-    drives : sequence of FoundDrive
+    group : sequence of FoundDrive
     order : int
         Of the trend of a drive by itself; drives together have a shift in common.
     origin : (3,) array
         Of planes and poles. Units: m.
     with_ties : bool
-        Else each drive is by itself.
     """
-    groups = _near(drives) if with_ties else [[drive] for drive in drives]
-    return [part for group in groups for part in _estimated(group, order, origin, with_ties)]
-
-
-def _estimated(group, order, origin, with_ties):
-    """JointEstimates of drives near each other, of those together that ties join."""
     joint = join_drives(group)
     features = joint.features(origin) if with_ties else None
     least = order if len(group) == 1 else min(order, 0)
@@ -66,7 +59,7 @@ def _estimated(group, order, origin, with_ties):
     parts = _tied(joint, estimate)
     if len(parts) == 1:
         return [JointEstimate(joint, estimate)]
-    return [result for part in parts for result in _estimated(part, order, origin, with_ties)]
+    return [result for part in parts for result in estimate_group(part, order, origin, with_ties)]
 
 
 def _tied(joint, estimate):
@@ -80,8 +73,13 @@ def _tied(joint, estimate):
     return _grouped(joint.drives, connected_components(graph, directed=False)[1])
 
 
-def _near(drives):
-    """Lists of drives whose planes and poles lie within the search radius, or about so."""
+def near_drives(drives: Sequence[FoundDrive]) -> list[list[FoundDrive]]:
+    """Lists of drives whose planes and poles lie within the search radius, or about so.
+
+    Parameters
+    ----------
+    drives : sequence of FoundDrive
+    """
     radius = max(drive.survey.search_radius for drive in drives)
     rows, cells = [np.empty(0, int)], [np.empty((0, 2), int)]
     for number, drive in enumerate(drives):

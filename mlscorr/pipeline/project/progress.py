@@ -19,6 +19,7 @@ from mlscorr.pipeline.project.tasks import Outcome, Task
 TITLES = {
     "tiles": "Reading headers",
     "findings": "Reading the clouds",
+    "areas": "Estimating areas",
     "clouds": "Writing the clouds",
     "reports": "Reporting",
 }
@@ -110,9 +111,10 @@ class Progress:
         elapsed = monotonic() - counts["start"]
         share = counts["points"] / total if total else counts["done"] / len(tasks)
         left = elapsed / share - elapsed if share else 0.0
-        drives = {task["drive"] for task in tasks}
+        drives = {task["drive"] for task in tasks} - {""}
+        files = f" files of {len(drives)} drives" if drives else ""
         return (
-            f"{TITLES[kind]}: {counts['done']} of {len(tasks)} files of {len(drives)} drives, "
+            f"{TITLES[kind]}: {counts['done']} of {len(tasks)}{files}, "
             f"{100 * share:.0f} %, {counts['points'] / elapsed / 1e6:.1f} M points/s, "
             f"{duration(left)} left, {counts['faults']} failures"
         )

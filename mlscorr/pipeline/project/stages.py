@@ -14,6 +14,7 @@ from mlscorr.io.project_sections import SHARED_TILES
 from mlscorr.io.storage import resolved
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.pipeline.clouds import WrittenClouds
+from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.file_tasks import (
     CloudInput,
     FindingInput,
@@ -205,6 +206,26 @@ def cloud_tasks(
         inputs = CloudInput(store.folder, used, path, identity, out / folder, with_sigma)
         task = Task("clouds", key, folder, task_name(folder, path), points, write, (inputs,))
         tasks.append((task, [survey.name for survey in surveys]))
+    return tasks
+
+
+def area_tasks(store: TaskStore, key: str, areas: Iterable[AreaInput]) -> list[Task]:
+    """Tasks that estimate areas.
+
+    Parameters
+    ----------
+    store : TaskStore
+        In which what each area holds is kept, for the tasks.
+    key : str
+        Of all that these depend on.
+    areas : iterable of AreaInput
+    """
+    tasks = []
+    for number, area in enumerate(areas, start=1):
+        own = digest(key, number, area.area)
+        store.put("pieces", own, area)
+        given = store.folder, own
+        tasks.append(Task("areas", own, "", f"area {number}", area.features, stored_results, given))
     return tasks
 
 

@@ -47,7 +47,7 @@ def project_status(out: str | Path) -> dict:
         for task in stages.get(kind, ())
     ]
     drives: dict[str, list[dict]] = {}
-    for task in tasks:
+    for task in (task for task in tasks if task["drive"]):  # an area is of many
         drives.setdefault(task["drive"], []).append(task)
     lines = read_bytes(out / "log.txt").decode().splitlines()
     return document(

@@ -1,0 +1,164 @@
+"""Areas of a city, each estimated by itself with a margin about it.
+
+Ties may join the drives of a whole city, and what solves them together grows faster than they do.
+What a place far away tells of a drive here has faded on the way. So a city is cut where as much
+lies on both sides, until no part holds more planes and poles than a machine takes at once. Areas
+share no estimate: each uses what was recorded in it and in its margin, and no more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.pipeline.project.joint import FoundDrive
+from mlscorr.pipeline.project.settings import SETTINGS
+from mlscorr.ties import SETTINGS as TIES
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle of the map; areas cover it, and don't overlap.
+
+    Parameters
+    ----------
+    low, high : (2,) array
+        Its corners, infinite where the city ends. Units: m.
+    margin : float
+        How far it is estimated beyond them. Units: m.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    margin: float = SETTINGS.margin
+
+    def contains(self, position: np.ndarray) -> np.ndarray:
+        """Which positions (n,) are its own.
+
+        Parameters
+        ----------
+        position : (n, 3) array
+            Units: m.
+        """
+        plan = position[:, :2]
+        return np.all((plan >= self.low) & (plan < self.high), axis=1)
+
+    def weight(self, position: np.ndarray) -> np.ndarray:
+        """How much (n,) its estimate counts beside its neighbours': from one inside to zero.
+
+        A half at its edge, with which that of the area beyond sums up to one.
+
+        Parameters
+        ----------
+        position : (n, 3) array
+            Units: m.
+        """
+        plan = position[:, :2]
+        inside = np.minimum(plan - self.low, self.high - plan).min(axis=1)
+        return np.clip((1.0 + inside / self.margin) / 2, 0.0, 1.0)
+
+    def parted(self, axis: int, at: float) -> tuple[Area, Area]:
+        """Both sides of a cut.
+
+        Parameters
+        ----------
+        axis : int
+        at : float
+            Units: m.
+        """
+        edge = np.where(np.arange(2) == axis, at, np.nan)
+        low, high = (np.where(np.isnan(edge), corner, edge) for corner in (self.low, self.high))
+        return replace(self, high=high), replace(self, low=low)
+
+
+def areas_of(
+    places: np.ndarray, limit: int = SETTINGS.area_features, margin: float = SETTINGS.margin
+) -> list[Area]:
+    """Areas that hold so many of some places at most; wider than four margins in any case.
+
+    Parameters
+    ----------
+    places : (n, 3) array
+        Units: m.
+    limit : int
+    margin : float
+        Units: m.
+    """
+    waiting = [(Area(np.full(2, -np.inf), np.full(2, np.inf), margin), places[:, :2])]
+    areas = []
+    while waiting:
+        area, inside = waiting.pop()
+        size = np.ptp(inside, axis=0) if len(inside) else np.zeros(2)
+        axis = int(np.argmax(size))
+        if len(inside) <= limit or size[axis] < 4 * margin:
+            areas.append(area)
+            continue
+        cut = float(np.median(inside[:, axis]))
+        first, second = area.parted(axis, cut)
+        is_first = inside[:, axis] < cut
+        waiting += [(second, inside[~is_first]), (first, inside[is_first])]
+    return areas
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What of a drive lies in an area and its margin.
+
+    Parameters
+    ----------
+    drive : FoundDrive
+        Of these epochs alone.
+    rows : (n,) bool array
+        Which epochs of the whole drive.
+    control : (m,) bool array
+        Which of its observations of control points.
+    """
+
+    drive: FoundDrive
+    rows: np.ndarray
+    control: np.ndarray
+
+
+def pieces_of(drives: Sequence[FoundDrive], area: Area) -> list[Piece]:
+    """The Pieces of drives that come into an area or its margin.
+
+    Parameters
+    ----------
+    drives : sequence of FoundDrive
+    area : Area
+    """
+    rows = [_epochs_in(drive, area) for drive in drives]
+    return [_piece(*pair) for pair in zip(drives, rows, strict=True) if pair[1].any()]
+
+
+def _epochs_in(drive, area):
+    """Which epochs (n,) of a drive lie there, those beside them and short excursions included."""
+    trajectory = drive.survey.trajectory
+    inside = area.weight(trajectory.position) > 0.0
+    there = np.flatnonzero(inside)
+    times = trajectory.gps_time[there]
+    for gap in np.flatnonzero(np.diff(times) <= TIES.pause):
+        inside[there[gap] : there[gap + 1]] = True
+    beside = np.convolve(inside, np.ones(3), "same") > 0.5
+    return inside | beside
+
+
+def _piece(drive, rows):
+    """The Piece of some epochs of a drive."""
+    recorded, contents = drive.survey.trajectory, drive.contents
+    last = len(recorded) - 1
+
+    def within(gps_time):
+        after = np.clip(np.searchsorted(recorded.gps_time, gps_time), 1, last)
+        return rows[after] & rows[after - 1]
+
+    control = within(drive.control.gps_time)
+    part = FoundDrive(
+        replace(drive.survey, trajectory=recorded.select(rows)),
+        replace(contents, features=contents.features[within(contents.features.gps_time)]),
+        drive.control[control],
+        drive.check[within(drive.check.gps_time)],
+    )
+    return Piece(part, rows, control)

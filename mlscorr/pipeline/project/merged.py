@@ -1,0 +1,237 @@
+"""A drive through several areas: what each tells of it, as one result.
+
+Corrections are averaged by weights of the place, so that two visits of a place move alike. What is
+said of a moment, a control point or a tie is said by the area in which it lies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.correction import Correction
+from mlscorr.estimate import Support, TieResiduals, guards_of
+from mlscorr.estimate.assembly import position_equations
+from mlscorr.estimate.inputs import filled_sigmas
+from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate.support import HELD, REASONS, weak_stretches
+from mlscorr.evaluate.ties import misfit_section
+from mlscorr.pipeline.project.areas import Area, Piece
+from mlscorr.pipeline.project.corrected import STATES, DriveState, drive_fields, tied_sentence
+from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, DriveEstimate
+from mlscorr.pipeline.project.joint import FoundDrive
+from mlscorr.survey import Ties, Trajectory
+
+
+@dataclass(frozen=True)
+class AreaResult:
+    """What an area tells of a drive.
+
+    Parameters
+    ----------
+    area : Area
+    rows, control : bool array
+        Of which of the drive's epochs and observations of control points, as of Piece.
+    corrected : CorrectedDrive
+        These epochs.
+    estimate : DriveEstimate
+        Of these, without covariances.
+    state : DriveState
+    """
+
+    area: Area
+    rows: np.ndarray
+    control: np.ndarray
+    corrected: CorrectedDrive
+    estimate: DriveEstimate
+    state: DriveState
+
+    @classmethod
+    def of(
+        cls, area: Area, piece: Piece, corrected: CorrectedDrive, state: DriveState
+    ) -> AreaResult:
+        """The result of a piece of a drive."""
+        estimate = corrected.estimate
+        assert isinstance(estimate, DriveEstimate)
+        bare = replace(estimate, correction=replace(estimate.correction, covariance=None))
+        corrected = replace(corrected, estimate=bare)
+        return cls(area, piece.rows, piece.control, corrected, bare, state)
+
+
+def merged_drive(
+    drive: FoundDrive, parts: Sequence[AreaResult]
+) -> tuple[CorrectedDrive, DriveState]:
+    """A drive as one, and what holds it.
+
+    Parameters
+    ----------
+    drive : FoundDrive
+    parts : sequence of AreaResult
+        Of all areas through which it comes.
+    """
+    position = drive.survey.trajectory.position
+    home = np.array([part.area.contains(position) for part in parts])
+    main = parts[int(np.argmax(home.sum(axis=1)))]
+    estimate = _estimate(drive, parts, home, main)
+    state = _state(parts, home, estimate.used)
+    sentence = tied_sentence(state)
+    estimate = replace(estimate, untied=sentence or main.estimate.untied)
+    known = [*drive.survey.notes, *(tied_sentence(part.state) for part in parts)]
+    notes = _distinct([part.corrected.survey.notes for part in parts], known)
+    notes = (*drive.survey.notes, *notes, *filter(None, [sentence]))
+    misfits = misfit_section(estimate.ties) or {"n": 0, "used": 0, "reason": estimate.untied}
+    whole = replace(drive, survey=replace(drive.survey, notes=notes))
+    corrected = CorrectedDrive(
+        **drive_fields(whole, estimate),
+        places=_places(drive, parts, home),
+        section=misfits,
+    )
+    return corrected, state
+
+
+def _estimate(drive, parts, home, main):
+    """The DriveEstimate of a drive; what is of no moment is that of its main area."""
+    survey = drive.survey
+    correction = _averaged(survey.trajectory, parts)
+    used, left_out = _control(drive, parts, home)
+    names = set(np.array(drive.control.name, dtype=object)[~used])
+    screening = main.estimate.screening
+    of_parts = [part.estimate.screening for part in parts]
+    outliers = {out.name: out for part in of_parts for out in part.outliers if out.name in names}
+    tests = {test.name: test for part in of_parts for test in part.tests if test.name not in names}
+    order, filled = main.estimate.order, filled_sigmas(survey.trajectory)[0]
+    equations = position_equations(filled, drive.control[used], survey.pos, order, position_prior)
+    return replace(
+        main.estimate,
+        correction=correction,
+        equations=equations,
+        screening=replace(
+            screening,
+            outliers=tuple(outliers.values()),
+            tests=tuple(tests.values()),
+            warnings=_distinct([part.warnings for part in of_parts]),
+        ),
+        used=used,
+        left_out=left_out,
+        guards=guards_of(survey.trajectory.passes, equations.observed, main.estimate.guards),
+        notes=_distinct([part.estimate.notes for part in parts]),
+        ties=_ties(parts, correction),
+        held=_support(parts, home, correction.corrected),
+    )
+
+
+def _averaged(trajectory: Trajectory, parts: Sequence[AreaResult]) -> Correction:
+    """The Correction by those of all areas; its sigmas are averaged, as if they erred alike."""
+    n, total = len(trajectory), np.zeros(len(trajectory))
+    mean = np.zeros((n, 12))  # change, turn, sigmas of position and attitude
+    for part in parts:
+        old, new = part.estimate.correction.recorded, part.estimate.correction.corrected
+        weight = part.area.weight(old.position)
+        turn = (new.attitude * old.attitude.inv()).as_rotvec()
+        columns = new.position - old.position, turn, new.position_sigma, new.attitude_sigma
+        mean[part.rows] += weight[:, None] * np.hstack(columns)
+        total[part.rows] += weight
+    change, turn, *sigmas = np.split(mean / total[:, None], 4, axis=1)
+    position, attitude = trajectory.position + change, Rotation.from_rotvec(turn)
+    attitude = attitude * trajectory.attitude
+    corrected = replace(
+        trajectory,
+        position=position,
+        attitude=attitude,
+        position_sigma=sigmas[0],
+        attitude_sigma=sigmas[1],
+    )
+    return Correction(trajectory, corrected)
+
+
+def _epochs(drive, gps_time):
+    """Numbers of the epochs at or after times."""
+    known = drive.survey.trajectory.gps_time
+    return np.clip(np.searchsorted(known, gps_time), 0, len(known) - 1)
+
+
+def _control(drive, parts, home):
+    """Which observations of control points took part (m,), and what they leave (m, 3) left out."""
+    at = _epochs(drive, drive.control.gps_time)
+    used, left_out = np.zeros(len(at), bool), np.full((len(at), 3), np.nan)
+    for part, is_home in zip(parts, home, strict=True):
+        own = is_home[at[part.control]]
+        rows = np.flatnonzero(part.control)[own]
+        used[rows], left_out[rows] = part.estimate.used[own], part.estimate.left_out[own]
+    return used, left_out
+
+
+def _ties(parts, correction):
+    """TieResiduals of a drive's own passes; None without any."""
+    ties, used = [], []
+    for part in parts:
+        if (residuals := part.estimate.ties) is not None:
+            own = part.area.contains(residuals.ties.place[:, 0])
+            ties.append(residuals.ties[own])
+            used.append(residuals.used[own])
+    if sum(map(len, ties)) == 0:
+        return None
+    return TieResiduals.of(Ties.concatenate(ties), np.concatenate(used), correction)
+
+
+def _support(parts, home, corrected):
+    """The Support of a drive."""
+    time, codes = corrected.gps_time, np.full(len(corrected), HELD)
+    for part, is_home in zip(parts, home, strict=True):
+        for stretch in part.estimate.support.weak:
+            inside = is_home & (time >= stretch.start) & (time <= stretch.end)
+            codes[inside] = REASONS.index(stretch.why)
+    outages: list[tuple[float, float]] = []
+    for each in sorted(span for part in parts for span in part.estimate.support.outages):
+        joins = bool(outages) and each[0] <= outages[-1][1]
+        first, last = outages.pop() if joins else each
+        outages.append((first, max(last, each[1])))
+    steps = {step for part in parts for step in part.estimate.support.steps}
+    return Support(tuple(weak_stretches(codes, corrected)), tuple(outages), tuple(sorted(steps)))
+
+
+def _places(drive, parts, home):
+    """Where one more control point each would help most, the best first; as many as of an area."""
+    places = [
+        place
+        for part, is_home in zip(parts, home, strict=True)
+        for place in part.corrected.places
+        if is_home[_epochs(drive, place.gps_time)]
+    ]
+    most = max(len(part.corrected.places) for part in parts)
+    return tuple(sorted(places, key=lambda place: place.sigma_after - place.sigma_before)[:most])
+
+
+def _state(parts, home, used):
+    """The DriveState of a drive: without control of its own as of the area that holds it least."""
+    order = list(STATES)
+    least = max(
+        order.index(part.state.state)
+        for part, is_home in zip(parts, home, strict=True)
+        if is_home.any()
+    )
+    state = order[0] if used.any() else order[max(least, 1)]
+    rows: dict[str, list[dict]] = {}
+    for part in parts:
+        for name, row in part.state.tied_with.items():
+            rows.setdefault(name, []).append(row)
+    tied_with = {name: _joined(own) for name, own in rows.items()}
+    return DriveState(parts[0].state.name, state, tied_with)
+
+
+def _joined(rows):
+    """Numbers of ties and their RMS before and after, by those of some areas."""
+    number = np.array([row["n"] for row in rows])
+
+    def rms(key):
+        return float(np.sqrt(number @ [row[key] ** 2 for row in rows] / number.sum()))
+
+    return {"n": int(number.sum()), "before": rms("before"), "after": rms("after")}
+
+
+def _distinct(parts, known=()):
+    """Sentences of some parts, each once, but for known ones."""
+    return tuple(dict.fromkeys(text for part in parts for text in part if text not in known))
