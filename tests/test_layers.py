@@ -195,7 +195,13 @@ def test_the_simulator_does_not_know_the_estimator():
 
 def test_open3d_is_loaded_only_to_cast_rays():
     "Importing the simulator or the report does not load Open3D"
-    assert "open3d" not in loaded_by("import mlscorr.simulate, mlscorr.report")
+    assert "open3d" not in loaded_by("import mlscorr.simulate, mlscorr.report.correction_page")
+
+
+def test_what_the_terminal_says_loads_no_figures():
+    "A command without a page never pays for Matplotlib"
+    loaded = loaded_by("import mlscorr.cli, mlscorr.pipeline, mlscorr.report.headline")
+    assert "matplotlib" not in loaded
 
 
 def test_studies_import_what_there_is():

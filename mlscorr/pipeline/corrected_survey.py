@@ -126,7 +126,7 @@ class CorrectedSurvey(Summary):
         ValueError
             Where there is no such figure.
         """
-        from mlscorr.report import draw_figure
+        from mlscorr.report.figures import draw_figure
 
         return draw_figure(name, self.estimate.correction, self._draft, self.estimate.ties)
 
@@ -202,7 +202,7 @@ class CorrectedSurvey(Summary):
         trajectories: Sequence[str] = (),
     ) -> dict:
         """Write all but the clouds into a folder that is there, as ``write`` does."""
-        from mlscorr.report import first_screen
+        from mlscorr.report.headline import first_screen
 
         write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
         exports = [
@@ -222,7 +222,9 @@ class CorrectedSurvey(Summary):
 
     def _draw(self, folder, report, progress):
         """Write report.html and the pictures."""
-        from mlscorr.report import view_cloud, write_pictures, write_report
+        from mlscorr.report.cloud import view_cloud
+        from mlscorr.report.correction_page import write_report
+        from mlscorr.report.figures import write_pictures
 
         correction, ties = self.estimate.correction, self.estimate.ties
         views = view_cloud(self.survey, correction, report.targets, progress, ties)
