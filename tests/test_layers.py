@@ -29,7 +29,7 @@ GAP_FLOORS = (  # of the rooms within gap, likewise
     ("signatures",),
     ("infer",),
     ("close", "plan", "train", "contrast"),
-    ("document",),  # and the door, __init__, which opens on all of them
+    ("document",),  # and __init__, which offers the costs of mistakes
 )
 GAP_FLOOR = {room: number for number, rooms in enumerate(GAP_FLOORS) for room in rooms}
 ROOMS_OF = {
@@ -127,7 +127,7 @@ def test_the_gap_is_a_story_of_few_rooms():
 
 @pytest.mark.parametrize("path", sorted((PACKAGE / "pipeline").glob("*.py")), ids=lambda p: p.stem)
 def test_the_pipeline_enters_the_gap_by_its_doors(path):
-    "Commands import from mlscorr.gap and from its rooms, not from modules within these"
+    "Commands import from the rooms of mlscorr.gap, not from modules within these"
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.module.startswith("mlscorr.gap"):
             assert len(node.module.split(".")) <= 3, node.module
