@@ -222,16 +222,14 @@ class CorrectedSurvey(Summary):
 
     def _draw(self, folder, report, progress):
         """Write report.html and the pictures."""
-        from mlscorr.report.cloud import view_cloud
-        from mlscorr.report.correction_page import write_report
-        from mlscorr.report.figures import write_pictures
+        from mlscorr.report import cloud, correction_page, figures
 
         correction, ties = self.estimate.correction, self.estimate.ties
-        views = view_cloud(self.survey, correction, report.targets, progress, ties)
-        page = folder / "report.html"
-        write_report(page, self.survey, correction, report, views, self.fitted, ties)
+        views = cloud.view_cloud(self.survey, correction, report.targets, progress, ties)
+        shown = self.survey, correction, report, views, self.fitted, ties
+        correction_page.write_report(folder / "report.html", *shown)
         (folder / "pictures").mkdir()
-        write_pictures(folder / "pictures", correction, report, ties)
+        figures.write_pictures(folder / "pictures", correction, report, ties)
 
     @cached_property
     def next_control(self) -> tuple[NextControl, ...]:

@@ -121,12 +121,12 @@ def _labels(keys, steps):
     for step in steps:
         above = 0
         for low in range(count):
-            wanted = occupied[low] + step
-            while above < count and occupied[above] < wanted:
+            key = occupied[low] + step
+            while above < count and occupied[above] < key:
                 above += 1
             if above == count:
                 break
-            if occupied[above] == wanted:
+            if occupied[above] == key:
                 a, b = root_of(parent, low), root_of(parent, above)
                 parent[max(a, b)] = min(a, b)
     number, components = np.empty(count, np.int64), 0
