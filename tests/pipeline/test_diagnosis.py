@@ -20,6 +20,7 @@ from mlscorr.gap.train.cases import RANDOM
 from mlscorr.io.las import read_chunks
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator
+from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
 from tests.beds.shared import shared
 
@@ -35,17 +36,8 @@ KEYS = {
 @pytest.fixture(scope="module")
 def late(tmp_path_factory):
     "A survey whose scanner clock is 20 ms off, without its truth"
-    scenario = Scenario(
-        drive={"duration": 30.0},
-        targets={"control": 12, "check": 3},
-        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
-        effects=[{"name": "time_offset", "magnitude": OFFSET}],
-    )
-    folder = tmp_path_factory.mktemp("late") / "survey"
-    simulate(scenario, np.random.default_rng(3)).write(folder)
-    for truth in ("truth.json", "truth.npz"):
-        (folder / truth).unlink()
-    return folder
+    effect = {"name": "time_offset", "magnitude": OFFSET}
+    return diagnosed_street.write(tmp_path_factory.mktemp("late") / "survey", effect)
 
 
 @pytest.fixture(scope="module")
@@ -239,14 +231,7 @@ def _with_control_moved(folder, out, names, away):
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
     "A survey in which nothing is wrong"
-    scenario = Scenario(
-        drive={"duration": 30.0},
-        targets={"control": 12, "check": 3},
-        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
-    )
-    folder = tmp_path_factory.mktemp("sound") / "survey"
-    simulate(scenario, np.random.default_rng(3)).write(folder)
-    return folder
+    return diagnosed_street.write(tmp_path_factory.mktemp("sound") / "survey")
 
 
 def test_a_moved_control_point_is_named_with_its_size(sound, tmp_path):

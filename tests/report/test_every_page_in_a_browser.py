@@ -93,9 +93,7 @@ async function run() {
     results[`${name} ${label}`] = await examine(name, label, width);
   return results;
 }
-run().then(found => JSON.stringify(found), error => "failed: " + error.stack).then(
-  text => { document.getElementById("result").textContent = text; });
-</script>"""
+"""
 
 
 @pytest.fixture(scope="module")
