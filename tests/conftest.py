@@ -4,14 +4,12 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mlscorr.simulate import Scenario, simulate
-
-MLSCORR = Path(sys.executable).with_name("mlscorr")
+from tests.beds.places import MLSCORR
 
 
 def pytest_configure(config):
