@@ -15,6 +15,7 @@ from statistics import median
 from time import perf_counter
 
 import numpy as np
+from bench import peak_memory
 from rich.console import Console
 from rich.table import Table
 
@@ -110,12 +111,6 @@ def memory_rows():
         peaks.append(peak)
         yield f"peak memory over imports, {pulses / 1e6:.1f} M pulses written", f"{peak} MB", ""
     yield "ten times the pulses take", f"{peaks[1] - peaks[0]} MB more", "<= 50 MB"
-
-
-def peak_memory():
-    """Of this process alone (ru_maxrss starts at that of the parent). Units: MB."""
-    status = Path("/proc/self/status").read_text()
-    return int(status.split("VmHWM:")[1].split()[0]) // 1024
 
 
 def main():

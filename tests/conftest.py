@@ -1,20 +1,24 @@
 """What several test files share."""
 
+import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mlscorr.simulate import Scenario, simulate
-
-MLSCORR = Path(sys.executable).with_name("mlscorr")
+from tests.beds.places import MLSCORR
 
 
 def pytest_configure(config):
-    "Files run in their order: with those of many tests first, a slow example would end alone"
+    """Files run in their order: with those of many tests first, a slow example would end alone
+
+    Bytecode is kept, as to compile 400 modules takes each process that a test starts 0.4 s.
+    """
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 

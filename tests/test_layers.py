@@ -29,7 +29,7 @@ GAP_FLOORS = (  # of the rooms within gap, likewise
     ("signatures",),
     ("infer",),
     ("close", "plan", "train", "contrast"),
-    ("document",),  # and the door, __init__, which opens on all of them
+    ("document",),  # and __init__, which offers the costs of mistakes
 )
 GAP_FLOOR = {room: number for number, rooms in enumerate(GAP_FLOORS) for room in rooms}
 ROOMS_OF = {
@@ -130,7 +130,7 @@ def test_the_gap_is_a_story_of_few_rooms():
 
 @pytest.mark.parametrize("path", sorted((PACKAGE / "pipeline").glob("*.py")), ids=lambda p: p.stem)
 def test_the_pipeline_enters_the_gap_by_its_doors(path):
-    "Commands import from mlscorr.gap and from its rooms, not from modules within these"
+    "Commands import from the rooms of mlscorr.gap, not from modules within these"
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.module.startswith("mlscorr.gap"):
             assert len(node.module.split(".")) <= 3, node.module
@@ -198,7 +198,13 @@ def test_the_simulator_does_not_know_the_estimator():
 
 def test_open3d_is_loaded_only_to_cast_rays():
     "Importing the simulator or the report does not load Open3D"
-    assert "open3d" not in loaded_by("import mlscorr.simulate, mlscorr.report")
+    assert "open3d" not in loaded_by("import mlscorr.simulate, mlscorr.report.correction_page")
+
+
+def test_what_the_terminal_says_loads_no_figures():
+    "A command without a page never pays for Matplotlib"
+    loaded = loaded_by("import mlscorr.cli, mlscorr.pipeline, mlscorr.report.headline")
+    assert "matplotlib" not in loaded
 
 
 def test_studies_import_what_there_is():

@@ -34,37 +34,3 @@ from mlscorr.estimate.support import Support, WeakStretch
 from mlscorr.estimate.tie_value import TieValue, tie_value
 from mlscorr.estimate.tied import TieResiduals
 from mlscorr.estimate.tied_mounting import calibration_with_ties, previewed_mounting
-
-__all__ = [
-    "COMPONENTS",
-    "SETTINGS",
-    "Alternative",
-    "Calibration",
-    "Estimate",
-    "MountingEstimate",
-    "NextControl",
-    "Outlier",
-    "PlannedAccuracy",
-    "SignalParameters",
-    "Support",
-    "TieResiduals",
-    "TieValue",
-    "WeakStretch",
-    "believed_correction",
-    "believed_mounting",
-    "calibration_with_ties",
-    "estimate_correction",
-    "estimate_mounting",
-    "find_mounting_error",
-    "guard_warnings",
-    "guards_of",
-    "mounting_warnings",
-    "place_control",
-    "predict_accuracy",
-    "previewed_correction",
-    "previewed_mounting",
-    "scanner_warnings",
-    "tie_value",
-    "with_scanner_errors",
-    "with_ties",
-]

@@ -11,27 +11,4 @@ The story, a room each:
 - document: all of it as plain numbers and words
 """
 
-from mlscorr.gap.agreement import agreements
-from mlscorr.gap.close import (
-    Beams,
-    BeamSimulator,
-    Closure,
-    FoundCause,
-    Surroundings,
-    cause_for_simulator,
-    close_gap,
-    collect_beams,
-)
-from mlscorr.gap.document import gap_document, map_document, separability_document
-from mlscorr.gap.infer import (
-    Costs,
-    Inference,
-    Observations,
-    Separability,
-    compare_signatures,
-    infer_causes,
-)
-from mlscorr.gap.observe import PatchCollector, Rows, background, build_rows
-from mlscorr.gap.observe.absence import Absence, find_absence
-from mlscorr.gap.plan import NextData, event_sizes, next_data, planned_rows
-from mlscorr.gap.signatures import as_believed, with_cause, without_effects
+from mlscorr.gap.infer import Costs

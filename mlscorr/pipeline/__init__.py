@@ -1,17 +1,30 @@
-"""The story from files to files, one module a command."""
+"""The story from files to files, one module a command, each loaded when it is used."""
 
-from mlscorr.pipeline.applying import AppliedSurvey, apply
-from mlscorr.pipeline.calibration import CalibratedScanners, CalibratedSurvey, calibrate
-from mlscorr.pipeline.checking import CheckedSurvey, check
-from mlscorr.pipeline.compared_survey import ComparedSurvey
-from mlscorr.pipeline.comparison import compare
-from mlscorr.pipeline.corrected_survey import CorrectedSurvey
-from mlscorr.pipeline.correction import correct
-from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose
-from mlscorr.pipeline.extraction import ExtractedSurvey, extract
-from mlscorr.pipeline.installation import Installation, doctor
-from mlscorr.pipeline.planning import PlannedSurvey, plan
-from mlscorr.pipeline.rendering import render
-from mlscorr.pipeline.simulation import demo, simulate_survey
-from mlscorr.pipeline.starting import StartedSurvey, init
-from mlscorr.pipeline.ties import TiedSurvey, find_ties
+from importlib import import_module
+from typing import Any
+
+_OFFERED = {
+    "applying": ("AppliedSurvey", "apply"),
+    "calibration": ("CalibratedScanners", "CalibratedSurvey", "calibrate"),
+    "checking": ("CheckedSurvey", "check"),
+    "compared_survey": ("ComparedSurvey",),
+    "comparison": ("compare",),
+    "corrected_survey": ("CorrectedSurvey",),
+    "correction": ("correct",),
+    "diagnosis": ("DiagnosedSurvey", "diagnose"),
+    "extraction": ("ExtractedSurvey", "extract"),
+    "installation": ("Installation", "doctor"),
+    "planning": ("PlannedSurvey", "plan"),
+    "rendering": ("render",),
+    "simulation": ("demo", "simulate_survey"),
+    "starting": ("StartedSurvey", "init"),
+    "ties": ("TiedSurvey", "find_ties"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load the module that offers a name, and the libraries it needs, only then."""
+    for module, names in _OFFERED.items():
+        if name in names:
+            return getattr(import_module(f"mlscorr.pipeline.{module}"), name)
+    raise AttributeError(f"module 'mlscorr.pipeline' has no attribute '{name}'")

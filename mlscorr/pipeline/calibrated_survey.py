@@ -130,7 +130,7 @@ class CalibratedSurvey(Summary):
         drift : Correction, optional
             Of mounting and POS error.
         """
-        from mlscorr.report import calibration_screen
+        from mlscorr.report.calibration_page import calibration_screen
 
         calibration, rows = self.calibration, self._rows(self.calibration.correction())
         content = {
@@ -196,7 +196,7 @@ def write_calibration(folder: Path, content: dict) -> None:
     content : dict
         The document.
     """
-    from mlscorr.report import calibration_page
+    from mlscorr.report.calibration_page import calibration_page
 
     write_json(folder / "calibration.json", content)
     calibration_page(content).write(folder / "calibration.html")

@@ -10,18 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.effects import Effect
-from mlscorr.gap import (
-    Absence,
-    Beams,
-    BeamSimulator,
-    PatchCollector,
-    Rows,
-    Surroundings,
-    build_rows,
-    collect_beams,
-    find_absence,
-    without_effects,
-)
+from mlscorr.gap.close import Beams, BeamSimulator, Surroundings, collect_beams
 from mlscorr.gap.contrast import (
     Contrast,
     DistributionDistance,
@@ -31,15 +20,20 @@ from mlscorr.gap.contrast import (
     contrast_returns,
 )
 from mlscorr.gap.observe import (
+    Absence,
     Pairing,
+    PatchCollector,
     Patches,
+    Rows,
     SimulatedBeams,
     SimulatedClouds,
+    build_rows,
+    find_absence,
     rows_against,
     spread_patches,
     without_unpaired,
 )
-from mlscorr.gap.signatures import expected
+from mlscorr.gap.signatures import expected, without_effects
 from mlscorr.io.simulated_clouds import simulated_survey
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.planning import too_little

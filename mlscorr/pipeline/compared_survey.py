@@ -66,7 +66,7 @@ class ComparedSurvey(Summary):
     @property
     def document(self) -> dict:
         """The document of compare.json."""
-        from mlscorr.report import comparison_screen
+        from mlscorr.report.comparison_screen import comparison_screen
 
         content = {
             "name": self.survey.name,
@@ -90,7 +90,7 @@ class ComparedSurvey(Summary):
 
     def plot(self) -> Figure:
         """The RMSE of every method on each axis, the best at the top."""
-        from mlscorr.report import comparison_figure
+        from mlscorr.report.comparison_page import comparison_figure
 
         return comparison_figure(self.document)
 
@@ -133,7 +133,7 @@ class ComparedSurvey(Summary):
         OSError
             When writing fails.
         """
-        from mlscorr.report import write_comparison
+        from mlscorr.report.comparison_page import write_comparison
 
         for name in clouds:
             self._check_cloud(name)

@@ -126,7 +126,7 @@ class CorrectedSurvey(Summary):
         ValueError
             Where there is no such figure.
         """
-        from mlscorr.report import draw_figure
+        from mlscorr.report.figures import draw_figure
 
         return draw_figure(name, self.estimate.correction, self._draft, self.estimate.ties)
 
@@ -202,7 +202,7 @@ class CorrectedSurvey(Summary):
         trajectories: Sequence[str] = (),
     ) -> dict:
         """Write all but the clouds into a folder that is there, as ``write`` does."""
-        from mlscorr.report import first_screen
+        from mlscorr.report.headline import first_screen
 
         write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
         exports = [
@@ -222,14 +222,14 @@ class CorrectedSurvey(Summary):
 
     def _draw(self, folder, report, progress):
         """Write report.html and the pictures."""
-        from mlscorr.report import view_cloud, write_pictures, write_report
+        from mlscorr.report import cloud, correction_page, figures
 
         correction, ties = self.estimate.correction, self.estimate.ties
-        views = view_cloud(self.survey, correction, report.targets, progress, ties)
-        page = folder / "report.html"
-        write_report(page, self.survey, correction, report, views, self.fitted, ties)
+        views = cloud.view_cloud(self.survey, correction, report.targets, progress, ties)
+        shown = self.survey, correction, report, views, self.fitted, ties
+        correction_page.write_report(folder / "report.html", *shown)
         (folder / "pictures").mkdir()
-        write_pictures(folder / "pictures", correction, report, ties)
+        figures.write_pictures(folder / "pictures", correction, report, ties)
 
     @cached_property
     def next_control(self) -> tuple[NextControl, ...]:

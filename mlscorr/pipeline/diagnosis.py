@@ -10,31 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlscorr.effects import Effect, known_effects
-from mlscorr.gap import (
-    Absence,
-    Closure,
-    Costs,
-    FoundCause,
-    Inference,
-    NextData,
-    Rows,
-    agreements,
-    as_believed,
-    background,
-    cause_for_simulator,
-    close_gap,
-    gap_document,
-    infer_causes,
-    next_data,
-    with_cause,
-)
+from mlscorr.gap.agreement import agreements
+from mlscorr.gap.close import Closure, FoundCause, cause_for_simulator, close_gap
 from mlscorr.gap.contrast import (
     Contrast,
     DistributionDistance,
     innovation_distances,
     replica_innovations,
 )
-from mlscorr.gap.signatures import Signature, select, signatures
+from mlscorr.gap.document import gap_document
+from mlscorr.gap.infer import Costs, Inference, infer_causes
+from mlscorr.gap.observe import Absence, Rows, background
+from mlscorr.gap.plan import NextData, next_data
+from mlscorr.gap.signatures import Signature, as_believed, select, signatures, with_cause
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent

@@ -229,7 +229,7 @@ class ExtractedSurvey(Summary):
         OSError
             When writing fails.
         """
-        from mlscorr.report import write_contact_sheet
+        from mlscorr.report.target_figures import write_contact_sheet
 
         rows = self.targets
         content = document(

@@ -32,25 +32,27 @@ def line_rate(cloud: PointCloud, trajectory: Trajectory) -> float | None:
         return None
     pose = trajectory.at(some.gps_time)
     beam = pose.attitude.inv().apply(some.xyz - pose.position)
-    time, angle = some.gps_time - some.gps_time[0], np.arctan2(beam[:, 2], beam[:, 0])
+    time = some.gps_time - some.gps_time[0]
+    direction = np.exp(1j * np.arctan2(beam[:, 2], beam[:, 0]))
     length = float(np.ptp(time))
     if length < SETTINGS.turning_time / 10:
         return None
     step = 0.25 / length
     lowest, highest = SETTINGS.turning_rates
     rates = np.arange(lowest, highest, step)
+    forward, backward = _evenness(rates, time, direction, direction.conj())
     rates = np.concatenate([-rates[::-1], rates])
-    evenness = _evenness(rates, time, angle)
+    evenness = np.concatenate([backward[::-1], forward])
     best = int(np.argmax(evenness))
     others = np.abs(rates - rates[best]) > 2.0 / length
     near = rates[best] + np.linspace(-2, 2, 81) * step
-    finest = _evenness(near, time, angle)
+    (finest,) = _evenness(near, time, direction)
     if 1.0 - finest.max() > SETTINGS.uneven_turn * (1.0 - evenness[others].max()):
         return None
     return float(abs(near[np.argmax(finest)]))
 
 
-def _evenness(rates, time, angle):
-    """Length (k,) of the mean direction left by each rate: 1 where it explains all angles."""
-    direction = np.exp(1j * angle)
-    return np.array([abs(np.mean(direction * np.exp(-2j * np.pi * r * time))) for r in rates])
+def _evenness(rates, time, *directions):
+    """Length (d, k) of the mean of directions (n,) left by each rate: 1 where it explains all."""
+    turns = (np.exp(-2j * np.pi * rate * time) for rate in rates)
+    return np.array([[abs(np.mean(each * turn)) for each in directions] for turn in turns]).T

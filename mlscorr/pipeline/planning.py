@@ -11,19 +11,10 @@ import numpy as np
 
 from mlscorr.effects import Effect, known_effects
 from mlscorr.estimate import PlannedAccuracy, predict_accuracy
-from mlscorr.gap import (
-    NextData,
-    Observations,
-    Rows,
-    Separability,
-    background,
-    compare_signatures,
-    event_sizes,
-    map_document,
-    next_data,
-    planned_rows,
-    separability_document,
-)
+from mlscorr.gap.document import map_document, separability_document
+from mlscorr.gap.infer import Observations, Separability, compare_signatures
+from mlscorr.gap.observe import Rows, background
+from mlscorr.gap.plan import NextData, event_sizes, next_data, planned_rows
 from mlscorr.gap.signatures import signatures
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.survey import Matched, Survey, TargetObservations

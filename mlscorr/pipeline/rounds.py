@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.effects import Effect
-from mlscorr.gap import Costs
 from mlscorr.gap.close import LoneEffect, lone_effects
+from mlscorr.gap.infer import Costs
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate.simulator_file import Simulator

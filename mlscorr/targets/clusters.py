@@ -5,11 +5,10 @@ single threshold serves. Each component at each level is a candidate; the shape 
 """
 
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from numba import njit
 
 from mlscorr.targets.settings import SETTINGS
 
@@ -53,12 +52,6 @@ def bright_components(
                     yield float(level), rows
 
 
-def _cells(xyz, edge):
-    """Cube (n, d) of this edge (m) that each point lies in, counted from the lowest."""
-    cells = np.floor(xyz / edge).astype(np.int64)
-    return cells - cells.min(axis=0)
-
-
 def components(points: np.ndarray, link: float) -> list[np.ndarray]:
     """Connected components of enough points to be a target.
 
@@ -75,9 +68,9 @@ def components(points: np.ndarray, link: float) -> list[np.ndarray]:
         Rows of each, in order.
     """
     label = connected(points, link)
-    order = np.argsort(label, kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    return [part for part in parts if len(part) >= SETTINGS.smallest_count]
+    order, counts = np.argsort(label, kind="stable"), np.bincount(label)
+    ends, large = np.cumsum(counts), np.flatnonzero(counts >= SETTINGS.smallest_count)
+    return [order[ends[number] - counts[number] : ends[number]] for number in large]
 
 
 def connected(points: np.ndarray, link: float) -> np.ndarray:
@@ -96,11 +89,65 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
     """
     if len(points) == 0:
         return np.empty(0, int)
-    cells = _cells(points, link / 3)
-    keys = np.ravel_multi_index(tuple(cells.T), cells.max(axis=0) + 1)
-    _, first, cell_of = np.unique(keys, return_index=True, return_inverse=True)
-    cells = cells[first]
-    link_cells = np.nextafter(3.0, 0.0)  # three voxels apart is a tie that rounding would decide
-    pairs = cKDTree(cells).query_pairs(link_cells, output_type="ndarray").T
-    graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(len(cells),) * 2)
-    return connected_components(graph, directed=False)[1][cell_of]
+    cells = np.floor(points / (link / 3)).astype(np.int64)
+    cells -= cells.min(axis=0)
+    shape = cells.max(axis=0) + 3  # with room for two voxels: no edge is near another
+    keys = np.ravel_multi_index(tuple(cells.T), shape)
+    order = np.argsort(keys, kind="stable")
+    label = np.empty(len(keys), np.int64)
+    steps = _offsets(len(shape)) @ np.cumprod([1, *shape[:0:-1]])[::-1]
+    label[order] = _labels(keys[order], steps[steps > 0])
+    return label
+
+
+@cache
+def _offsets(dimensions):
+    """Offsets (m, d) of voxels less than three apart; three apart is a tie of rounding."""
+    around = np.stack(np.meshgrid(*[np.arange(-2, 3)] * dimensions), axis=-1)
+    offsets = around.reshape(-1, dimensions)
+    return offsets[np.sum(offsets**2, axis=1) < 9]
+
+
+@njit(cache=True)
+def _labels(keys, steps):
+    """Component number (n,) of keys in increasing order, which these steps connect."""
+    voxel, occupied, count = np.empty(len(keys), np.int64), np.empty_like(keys), 0
+    for i in range(len(keys)):
+        if count == 0 or keys[i] != occupied[count - 1]:
+            occupied[count] = keys[i]
+            count += 1
+        voxel[i] = count - 1
+    parent = np.arange(count)
+    for step in steps:
+        above = 0
+        for low in range(count):
+            key = occupied[low] + step
+            while above < count and occupied[above] < key:
+                above += 1
+            if above == count:
+                break
+            if occupied[above] == key:
+                a, b = root_of(parent, low), root_of(parent, above)
+                parent[max(a, b)] = min(a, b)
+    number, components = np.empty(count, np.int64), 0
+    for i in range(count):  # the root of each is the lowest of its voxels
+        is_root = parent[i] == i
+        number[i] = components if is_root else number[root_of(parent, i)]
+        components += is_root
+    return number[voxel]
+
+
+@njit(cache=True)
+def root_of(parent: np.ndarray, i: int) -> int:
+    """What stands for the component of i, with the way to it shortened.
+
+    Parameters
+    ----------
+    parent : (n,) int array
+        What each was joined with; of a root, itself.
+    i : int
+    """
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from mlscorr.targets.clusters import root_of
 from mlscorr.targets.jaccard import jaccard_index
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.voxels import key_of, neighbours, number_voxels, sort_by_voxel
@@ -101,14 +102,6 @@ def _background(cell, keys_of, keys, number, level):
 
 
 @njit(cache=True)
-def _root(parent, i):
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
-
-
-@njit(cache=True)
 def _component_tree(local, level, edge, limits):
     """Components (k, 17) of bright points (n, 3) at each level, those that may be a target.
 
@@ -146,7 +139,7 @@ def _component_tree(local, level, edge, limits):
                     _join(parent, table, v, near)
             end += 1
         for k in range(first, end):
-            root = _root(parent, order[k])
+            root = root_of(parent, order[k])
             if touched[root] != now and count < len(result) and _may_be_target(table[root], limits):
                 result[count] = table[root]
                 result[count, 0] = now
@@ -159,7 +152,7 @@ def _component_tree(local, level, edge, limits):
 @njit(cache=True)
 def _join(parent, table, voxel, beside):
     """Join the components of two voxels."""
-    a, b = _root(parent, voxel), _root(parent, beside)
+    a, b = root_of(parent, voxel), root_of(parent, beside)
     if a == b:
         return
     parent[b] = a

@@ -5,7 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.baselines import Undetermined, fit_gaussian_process, fit_linear, fit_pchip
-from mlscorr.survey import ControlPoints, Matched, TargetObservations, Trajectory
+from mlscorr.survey import Matched, Trajectory
+from tests.beds.discs import observed_discs, surveyed_discs
 
 START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
 TIME = np.arange(0.0, 200.0, 0.1)
@@ -19,20 +20,11 @@ def drive(error):
 
 def control(trajectory, error, times):
     "Targets 5 m beside the vehicle, seen without noise"
-    n = len(times)
     rows = np.searchsorted(TIME, times)
     place = trajectory.position[rows] + [5.0, 0.0, 1.0]
-    up, kind, size = np.tile([0.0, 0.0, 1.0], (n, 1)), ("circle",) * n, np.full(n, 0.6)
-    name = tuple(f"T{i}" for i in range(n))
-    points = ControlPoints(name, place + error[rows], np.full((n, 3), 0.003), kind, size, up)
-    covariance = np.tile(1e-6 * np.eye(3), (n, 1, 1))
-    return Matched(
-        TargetObservations(
-            name, np.ones(n, int), START + TIME[rows], place, covariance, up, kind, size,
-            np.full(n, 300),
-        ),
-        points,
-    )  # fmt: skip
+    name = tuple(f"T{i}" for i in range(len(times)))
+    observed = observed_discs(name, START + TIME[rows], place, 0.001)
+    return Matched(observed, surveyed_discs(name, place + error[rows], 0.003))
 
 
 def left(correction, error):

@@ -9,6 +9,9 @@ import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next((path for name in NAMES if (path := shutil.which(name))), None)
+ENDING = """run().then(found => JSON.stringify(found), error => "failed: " + error.stack).then(
+  text => { document.getElementById("result").textContent = text; });
+</script>"""
 ITS_OWN = ("GL Driver Message", "software WebGL")  # what Chromium says of a machine without a GPU
 
 
@@ -19,9 +22,9 @@ def need_browser():
 
 
 def browse(folder, wrapper):
-    "The text of a wrapper page's result element, and the lines of the console"
+    "What run() in the last script of a wrapper page finds, as text, and the lines of the console"
     path = folder / "wrapper.html"
-    path.write_text(wrapper, encoding="utf-8")
+    path.write_text(wrapper + ENDING, encoding="utf-8")
     command = [
         BROWSER, "--headless", "--no-sandbox", "--disable-background-networking",
         "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--allow-file-access-from-files",

@@ -25,6 +25,7 @@ from mlscorr.io.trajectory_exports import export_trajectory
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import Trajectory
 from tests.beds.foreign_clouds import points_of, write_e57, write_ply
+from tests.beds.las_crs import add_crs
 from tests.beds.pof import geographic, pof_bytes, poq_bytes
 
 CRS = "EPSG:32650"
@@ -106,10 +107,7 @@ def rewritten(path, source, version="1.4", form=6, crs=None, rows=slice(None), s
     header = laspy.LasHeader(point_format=form, version=version)
     header.scales, header.offsets = old.header.scales, old.header.offsets
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType(int(seconds is not None))
-    if crs:
-        wkt = pyproj.CRS.from_user_input(crs).to_wkt("WKT1_GDAL")
-        header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
-        header.global_encoding.wkt = True
+    add_crs(header, crs)
     las = laspy.LasData(header)
     las.xyz = np.asarray(old.xyz)[rows]
     las.gps_time = np.asarray(old.gps_time)[rows] + (seconds or 0.0)

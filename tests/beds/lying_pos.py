@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.survey import ControlPoints, Matched, TargetObservations, Trajectory
+from mlscorr.survey import Matched, Trajectory
+from tests.beds.discs import observed_discs, surveyed_discs
 
 START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
 TIME = np.arange(0.0, 240.0, 0.1)
@@ -24,13 +25,8 @@ def survey(rng, error, times):
     trajectory = Trajectory(START + TIME, path - error, Rotation.identity(len(TIME)))
     rows, n = np.searchsorted(TIME, times), len(times)
     place = trajectory.position[rows] + [6.4, -4.8, 0.5]
-    name, up = tuple(f"T{i:02d}" for i in range(n)), np.tile([0.0, 0.0, 1.0], (n, 1))
+    name = tuple(f"T{i:02d}" for i in range(n))
     surveyed = place + error[rows] + 0.003 * rng.normal(size=(n, 3))
-    looks = ("circle",) * n, np.full(n, 0.6)
-    points = ControlPoints(name, surveyed, np.full((n, 3), 0.003), *looks, up)
     place = place + 0.003 * rng.normal(size=(n, 3))
-    covariance = np.tile(0.003**2 * np.eye(3), (n, 1, 1))
-    observed = TargetObservations(
-        name, np.ones(n, int), START + TIME[rows], place, covariance, up, *looks, np.full(n, 300)
-    )
-    return trajectory, Matched(observed, points)
+    observed = observed_discs(name, START + TIME[rows], place, 0.003)
+    return trajectory, Matched(observed, surveyed_discs(name, surveyed, 0.003))

@@ -9,7 +9,8 @@ from mlscorr.estimate import estimate_correction
 from mlscorr.estimate.assembly import position_equations
 from mlscorr.estimate.prior import position_prior
 from mlscorr.frames import attitude_from_angles
-from mlscorr.survey import ControlPoints, Matched, Pos, TargetObservations, Trajectory
+from mlscorr.survey import Matched, Pos, Trajectory
+from tests.beds.discs import observed_discs, surveyed_discs
 
 START = 357_900.0  # s of week
 CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # m, UTM
@@ -49,21 +50,8 @@ class Case:
         observed = (
             recorded.position + recorded.attitude.apply(body) + NOISE * rng.normal(size=(n, 3))
         )
-        kind, size, normal = ("circle",) * n, np.full(n, 0.6), np.tile([0.0, 0.0, 1.0], (n, 1))
-        sigma = np.full((n, 3), SURVEYED)
-        self.control = ControlPoints(name, surveyed, sigma, kind, size, normal)
-        covariance = np.tile(NOISE**2 * np.eye(3), (n, 1, 1))
-        self.observations = TargetObservations(
-            name,
-            np.ones(n, int),
-            gps_time,
-            observed,
-            covariance,
-            normal,
-            kind,
-            size,
-            np.full(n, 300),
-        )
+        self.control = surveyed_discs(name, surveyed, SURVEYED)
+        self.observations = observed_discs(name, gps_time, observed, NOISE)
 
     def estimate(self, **arguments):
         return estimate_correction(self.recorded, self.matched, **arguments)

@@ -12,7 +12,7 @@ from mlscorr.estimate import Support, WeakStretch
 from mlscorr.estimate.support import REASONS
 from mlscorr.evaluate.rows import Score, Statistics, TargetRow
 from mlscorr.frames import attitude_from_angles
-from mlscorr.report import write_report
+from mlscorr.report.correction_page import write_report
 from mlscorr.report.correction_report import CorrectionReport, Coverage, FileRow, array
 from mlscorr.survey import CloudFile, ControlPoints, Survey, Trajectory
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.survey import ControlPoints, Matched, TargetObservations, Trajectory
+from mlscorr.survey import Matched, Trajectory
+from tests.beds.discs import observed_discs, surveyed_discs
 
 START = np.array([523000.0, 3378000.0, 20.0])
 TIME = 413200.0
@@ -44,25 +45,9 @@ def observed(place, time, surveyed, name=None):
     "Observations at places, matched to the control points that they belong to"
     n = len(place)
     name = tuple(f"T{i:02d}" for i in range(n)) if name is None else name
-    control = ControlPoints(
-        name, surveyed, np.full((n, 3), SIGMA), ("circle",) * n, np.full(n, 0.6), nan(n)
-    )
-    observations = TargetObservations(
-        name=name,
-        pass_number=np.ones(n, int),
-        gps_time=time,
-        position=place,
-        covariance=np.tile(1e-6 * np.eye(3), (n, 1, 1)),
-        normal=np.tile([0.6, -0.8, 0.0], (n, 1)),
-        kind=("circle",) * n,
-        size=np.full(n, 0.6),
-        points=np.full(n, 300),
-    )
+    control = surveyed_discs(name, surveyed, SIGMA, normal=np.nan)
+    observations = observed_discs(name, time, place, 0.001, normal=[0.6, -0.8, 0.0])
     return Matched(observations, control[control.rows(name)])
-
-
-def nan(n):
-    return np.full((n, 3), np.nan)
 
 
 def on_a_line(n, rng):

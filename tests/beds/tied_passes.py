@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.survey import ControlPoints, Matched, TargetObservations, Ties, Trajectory
+from mlscorr.survey import Matched, Ties, Trajectory
+from tests.beds.discs import observed_discs, surveyed_discs
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM
 START, LENGTH, PAUSE = 413_200.0, 60.0, 100.0  # s
@@ -63,14 +64,9 @@ def _matched(times, trajectory, seed, rng):
     n = len(times)
     place = ORIGIN + np.column_stack([SPEED * times, np.full(n, 8.0), np.full(n, 3.0)])
     seen = place - drift(times, seed) + NOISE * rng.standard_normal((n, 3))
-    names, kinds, size = tuple(f"T{i}" for i in range(n)), ("circle",) * n, np.full(n, 0.6)
-    normal, one = np.tile([0.0, -1.0, 0.0], (n, 1)), np.ones(n, int)
-    points = ControlPoints(names, place, np.full((n, 3), 0.003), kinds, size, normal)
-    covariance = np.tile(NOISE**2 * np.eye(3), (n, 1, 1))
-    observed = TargetObservations(
-        names, one, START + times, seen, covariance, normal, kinds, size, 300 * one
-    )
-    return Matched(observed, points)
+    names, normal = tuple(f"T{i}" for i in range(n)), [0.0, -1.0, 0.0]
+    observed = observed_discs(names, START + times, seen, NOISE, normal)
+    return Matched(observed, surveyed_discs(names, place, 0.003, normal))
 
 
 def _ties(number, wrong, apart, shared, rng, seed):
@@ -89,12 +85,19 @@ def _ties(number, wrong, apart, shared, rng, seed):
     of_second = shared * rng.standard_normal((int(LENGTH), 3))[first.astype(int)]
     noise += np.einsum("ni,ni->n", normal, of_second)
     views[:, 1] += noise[:, None] * normal
+    times = START + np.column_stack([first, second])
+    return ties_of_planes(times, views, normal, NOISE, ORIGIN)
+
+
+def ties_of_planes(gps_time, place, normal, sigma, origin=0.0):
+    "Ties of planes that two passes saw: times (n, 2), places (n, 2, 3) from an origin, one sigma"
+    number = len(normal)
     return Ties(
-        gps_time=START + np.column_stack([first, second]),
-        place=ORIGIN + views,
+        gps_time=gps_time,
+        place=origin + place,
         direction=normal,
-        misclosure=np.einsum("ni,ni->n", normal, views[:, 1] - views[:, 0]),
-        variance=np.full(number, NOISE**2),
+        misclosure=np.einsum("ni,ni->n", normal, place[:, 1] - place[:, 0]),
+        variance=np.full(number, sigma**2),
         kind=np.full(number, "plane"),
         pass_number=np.tile([1, 2], (number, 1)),
         scanner=np.zeros((number, 2), int),

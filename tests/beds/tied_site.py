@@ -6,14 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles, georeference, to_scanner
-from mlscorr.survey import (
-    ControlPoints,
-    Matched,
-    Mounting,
-    TargetObservations,
-    Ties,
-    Trajectory,
-)
+from mlscorr.survey import Matched, Mounting, Ties, Trajectory
+from tests.beds.discs import observed_discs, surveyed_discs
+from tests.beds.tied_passes import ties_of_planes
 
 START = 413_200.0  # s of week
 ORIGIN = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM
@@ -97,17 +92,10 @@ def _matched(true, targets, look, rng):
     place, second = _places(true, first, rng)
     n, times = 2 * targets, START + np.append(first, second)
     seen = look(times, np.vstack([place, place]), NOISE * rng.standard_normal((n, 3)))
-    names, normal = tuple(f"T{i}" for i in range(targets)), np.tile([0.0, 0.0, 1.0], (n, 1))
-    surveyed = place + SURVEYED * rng.standard_normal(place.shape)
-    kind, size = ("circle",) * n, np.full(n, 0.6)
-    sigma = np.full((targets, 3), SURVEYED)
-    control = ControlPoints(
-        names, surveyed, sigma, kind[:targets], size[:targets], normal[:targets]
-    )
-    observed = TargetObservations(
-        names * 2, np.repeat([1, 2], targets), times, seen,
-        np.tile(NOISE**2 * np.eye(3), (n, 1, 1)), normal, kind, size, np.full(n, 300),
-    )  # fmt: skip
+    names = tuple(f"T{i}" for i in range(targets))
+    control = surveyed_discs(names, place + SURVEYED * rng.standard_normal(place.shape), SURVEYED)
+    passes = np.repeat([1, 2], targets)
+    observed = observed_discs(names * 2, times, seen, NOISE, pass_number=passes)
     return Matched.by_name(observed, control)
 
 
@@ -123,14 +111,4 @@ def _ties(true, is_wrong, look, rng):
     none = np.zeros((number, 3))
     views = look(START + first, place, none), look(START + second, place_then, none)
     place = np.stack(views + noise, axis=1)
-    return Ties(
-        gps_time=START + np.column_stack([first, second]),
-        place=place,
-        direction=normal,
-        misclosure=np.einsum("ni,ni->n", normal, place[:, 1] - place[:, 0]),
-        variance=np.full(number, TIE_NOISE**2),
-        kind=np.full(number, "plane"),
-        pass_number=np.tile([1, 2], (number, 1)),
-        scanner=np.zeros((number, 2), int),
-        feature=np.arange(2 * number).reshape(number, 2),
-    )
+    return ties_of_planes(START + np.column_stack([first, second]), place, normal, TIE_NOISE)

@@ -16,9 +16,8 @@ from typer.testing import CliRunner
 
 from mlscorr.cli import app
 from tests.beds.documents import undocumented
-from tests.beds.places import ROOT
+from tests.beds.places import MLSCORR, ROOT
 
-MLSCORR = Path(sys.executable).with_name("mlscorr")
 STARTED = 357700.0  # s of the week, when the street's trajectory starts
 
 

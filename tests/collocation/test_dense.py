@@ -3,7 +3,6 @@ import pytest
 from scipy.stats import chi2
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
-from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation import (
     Noise,
@@ -18,13 +17,6 @@ from tests.beds.linked_rows import Street
 
 START = 413_200.0  # s of week
 SPAN = 200.0  # s
-
-
-@pytest.fixture(scope="module", autouse=True)
-def one_thread():
-    "The matrices are small: on a busy machine threads would wait longer than they work"
-    with threadpool_limits(1, "blas"):
-        yield
 
 
 def collocate(gps_time, misclosure, noise, design, signals):

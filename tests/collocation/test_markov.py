@@ -1,19 +1,11 @@
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation import Noise, Signal, collocate, collocate_dense
 from mlscorr.collocation.covariance import FAMILIES, Covariance
 
 START = 413_200.0  # s of week
 SPAN = 200.0  # s
-
-
-@pytest.fixture(scope="module", autouse=True)
-def one_thread():
-    "The matrices are small: on a busy machine threads would wait longer than they work"
-    with threadpool_limits(1, "blas"):
-        yield
 
 
 class Survey:

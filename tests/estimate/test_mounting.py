@@ -21,7 +21,8 @@ from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.io.survey_file import read_survey_file
 from mlscorr.pipeline.calibration import warn_of_scanners
 from mlscorr.simulate import Scenario, simulate
-from mlscorr.survey import ControlPoints, Matched, Mounting, TargetObservations, Trajectory
+from mlscorr.survey import Matched, Mounting, Trajectory
+from tests.beds.discs import observed_discs, surveyed_discs
 from tests.beds.places import EXAMPLES, MLSCORR
 
 START = 413_200.0  # s of week
@@ -82,27 +83,15 @@ class Site:
         number = np.tile(np.arange(targets), passes)
         seen = to_scanner(true, self.mounting, centre[number], times)
         seen += noise * NOISE * rng.normal(size=seen.shape)
-        n, names = len(times), tuple(f"T{i:02d}" for i in range(1, targets + 1))
-        normal = np.tile([0.0, 0.0, 1.0], (n, 1))
+        names = tuple(f"T{i:02d}" for i in range(1, targets + 1))
         surveyed = centre + noise * SURVEYED * rng.normal(size=centre.shape)
-        self.control = ControlPoints(
-            names,
-            surveyed,
-            np.full((targets, 3), SURVEYED),
-            ("circle",) * targets,
-            np.full(targets, 0.6),
-            normal[:targets],
-        )
-        self.observations = TargetObservations(
+        self.control = surveyed_discs(names, surveyed, SURVEYED)
+        self.observations = observed_discs(
             tuple(names[i] for i in number),
-            np.repeat(np.arange(1, passes + 1), targets),
             times,
             georeference(self.recorded, RECORDED, seen, times),
-            np.tile(NOISE**2 * np.eye(3), (n, 1, 1)),
-            normal,
-            ("circle",) * n,
-            np.full(n, 0.6),
-            np.full(n, 300),
+            NOISE,
+            pass_number=np.repeat(np.arange(1, passes + 1), targets),
         )
 
     @property

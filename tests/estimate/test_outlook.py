@@ -83,18 +83,23 @@ def test_the_best_target_is_the_one_that_lowers_the_variance_most(gapped):
     assert outlook.best(np.ones(len(rows), bool)) == int(np.argmin(left))
 
 
+def sigma_ratio(estimate, fewer, step):
+    "Median, over every so manieth epoch, of the sigma by fewer Equations over that by all"
+    rows = np.arange(0, len(fewer.trajectory), step)
+    some, complete = (
+        np.sqrt(variance(equations, estimate.families[0][0], rows))
+        for equations in (fewer, estimate.equations)
+    )
+    return np.median(some / complete)
+
+
 def test_fewer_rows_hold_the_drive_as_all_of_them_do():
     "A hundred ties, each as precise as the twelve that it stands for: its sigma to 10 %"
     case = tied_passes(1, number=1200)
     estimate = with_ties(estimate_correction(case.trajectory, case.matched), case.ties)
     fewer = with_fewer_rows(estimate.equations)
     assert len(fewer.ties) <= 100 and len(estimate.equations.ties) > 1000
-    rows = np.arange(0, len(case.trajectory), 20)
-    some, complete = (
-        np.sqrt(variance(equations, estimate.families[0][0], rows))
-        for equations in (fewer, estimate.equations)
-    )
-    assert np.median(some / complete) == pytest.approx(1.0, abs=0.1)
+    assert sigma_ratio(estimate, fewer, step=20) == pytest.approx(1.0, abs=0.1)
 
 
 def test_hundreds_of_control_points_are_thinned_alike():
@@ -104,9 +109,4 @@ def test_hundreds_of_control_points_are_thinned_alike():
     estimate = estimate_correction(trajectory, matched, BELIEVED)
     fewer = with_fewer_rows(estimate.equations)
     assert len(fewer.names) < 170
-    rows = np.arange(0, len(trajectory), 40)
-    some, complete = (
-        np.sqrt(variance(equations, estimate.families[0][0], rows))
-        for equations in (fewer, estimate.equations)
-    )
-    assert np.median(some / complete) == pytest.approx(1.0, abs=0.1)
+    assert sigma_ratio(estimate, fewer, step=40) == pytest.approx(1.0, abs=0.1)

@@ -30,8 +30,7 @@ def column(file, names, factor=1.0, added=0.0):
     "A fault: columns of a table times a factor, plus a constant"
 
     def change(folder):
-        with open(folder / file, newline="") as stream:
-            rows = list(csv.DictReader(stream))
+        rows = rows_of(folder / file)
         for row in rows:
             row |= {name: f"{float(row[name]) * factor + added:.9f}" for name in names}
         write(folder / file, rows)
@@ -43,11 +42,15 @@ def exchanged(file, first, second):
     "A fault: two columns of a table exchanged"
 
     def change(folder):
-        with open(folder / file, newline="") as stream:
-            rows = list(csv.DictReader(stream))
+        rows = rows_of(folder / file)
         write(folder / file, [row | {first: row[second], second: row[first]} for row in rows])
 
     return change
+
+
+def rows_of(path):
+    with open(path, newline="") as stream:
+        return list(csv.DictReader(stream))
 
 
 def write(path, rows):

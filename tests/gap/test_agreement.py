@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap import agreements
+from mlscorr.gap.agreement import agreements
 from mlscorr.gap.train import features
 
 

@@ -5,11 +5,11 @@ import struct
 
 import laspy
 import numpy as np
-import pyproj
 import pytest
 
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
+from tests.beds.las_crs import add_crs
 from tests.beds.shared import shared
 
 PLACE = np.array([532_000.0, 3_374_000.0, 40.0])  # in UTM zone 50
@@ -19,10 +19,7 @@ def written(path, crs=None, keys=(), place=PLACE):
     "LasLayout of a file of two points, with its CRS as WKT or as GeoKeys"
     header = laspy.LasHeader(point_format=6 if crs else 1, version="1.4" if crs else "1.2")
     header.scales, header.offsets = [0.001] * 3, place
-    if crs:
-        wkt = pyproj.CRS.from_user_input(crs).to_wkt("WKT1_GDAL")
-        header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
-        header.global_encoding.wkt = True
+    add_crs(header, crs)
     if keys:
         rows = [(1, 1, 0, len(keys)), *((key, 0, 1, value) for key, value in keys)]
         data = b"".join(struct.pack("<4H", *row) for row in rows)

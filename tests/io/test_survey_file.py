@@ -422,27 +422,16 @@ def test_normals_are_optional_by_point(tmp_path):
         ("0.003,0.004", "0,0.004", "T01 .* sigma_horizontal 0 m; it must be greater"),
         ("0.003,0.004", "0.003,-1", "T01 .* sigma_vertical -1 m"),
         (",circle,0.6,control", "", "Line 2 .* has 6 columns where the header has 9: .* cut off"),
+        (CONTROL, "", "is empty"),
+        (CONTROL, "\n \n", "is empty"),
+        (CONTROL, CONTROL.splitlines()[0], "header but no points"),
+        (CONTROL, CONTROL[: CONTROL.index("T03") + 20], "Line 4 .* cut off"),
     ],
 )
 def test_bad_control_is_refused(tmp_path, old, new, message):
-    "Every bad cell is named with its line or point, its value, and what is expected"
+    "Bad cells are named with line or point, value, and what is expected; lacking content too"
     with pytest.raises(ValueError, match=message):
         read_control(control(tmp_path, old, new))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "is empty"),
-        ("\n \n", "is empty"),
-        (CONTROL.splitlines()[0], "header but no points"),
-        (CONTROL[: CONTROL.index("T03") + 20], "Line 4 .* cut off"),
-    ],
-)
-def test_control_without_content_is_refused(tmp_path, text, message):
-    "Empty, header only, cut off"
-    with pytest.raises(ValueError, match=message):
-        read_control(control(tmp_path, text=text))
 
 
 def test_a_sigma_in_millimetres_is_warned_of(tmp_path):

@@ -4,9 +4,7 @@ import csv
 import json
 import shutil
 import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +18,8 @@ from mlscorr.survey import PointCloud, Survey, Trajectory
 from mlscorr.targets import SETTINGS, distinct, search_targets
 from mlscorr.targets.regions import bright_regions
 from tests.beds.documents import undocumented
+from tests.beds.places import MLSCORR
 
-MLSCORR = Path(sys.executable).with_name("mlscorr")
 CORNER = np.array([532_000.0, 3_374_000.0, 42.0])
 START = 413_200.0
 KEYS = ["name", "pass", "gps_time", "kind", "size", "size_sigma", "observed", "covariance",

@@ -4,14 +4,11 @@ import json
 import platform
 import re
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 from mlscorr.pipeline.installation import LIBRARIES, PACKAGES, Installation, InstalledPart, remedy
-
-MLSCORR = Path(sys.executable).with_name("mlscorr")
+from tests.beds.places import MLSCORR
 
 
 @pytest.fixture(scope="module")

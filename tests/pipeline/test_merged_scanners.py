@@ -17,7 +17,7 @@ from mlscorr.io.las import count_sources, read_chunks
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.pipeline.clouds import write_clouds
-from mlscorr.simulate import Scenario, simulate
+from tests.beds import scanner_pair
 
 FILES = {11: ["pass-1.laz", "pass-2.laz"], 12: ["pass-1-scanner-2.laz", "pass-2-scanner-2.laz"]}
 
@@ -25,21 +25,8 @@ FILES = {11: ["pass-1.laz", "pass-2.laz"], 12: ["pass-1-scanner-2.laz", "pass-2-
 @pytest.fixture(scope="module")
 def apart(tmp_path_factory):
     "Folder of a street driven there and back with two scanners, each with files of its own"
-    line = {"lines_per_second": 50, "points_per_line": 250}
-    scenario = Scenario(
-        drive={"duration": 6.0, "speed": 6.0, "passes": [{}, {"direction": "back"}]},
-        targets={"control": 4, "check": 1, "hidden": 0.0},
-        scanner=[
-            {"lever_arm": [-0.3, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0], **line},
-            {"lever_arm": [0.3, -0.6, 0.4], "boresight": [90.0, 0.0, -35.0], **line},
-        ],
-        pos={"grade": "tactical"},
-    )
-    folder = tmp_path_factory.mktemp("two files") / "survey"
-    simulate(scenario, np.random.default_rng(3)).write(folder)
-    with (folder / "survey.toml").open("a") as described:
-        described.write("[matching]\nsearch_radius = 1.5\n")  # m, for speed
-    return folder
+    survey = scanner_pair.simulated(6.0, control=4, points=250)
+    return scanner_pair.write(survey, tmp_path_factory.mktemp("two files") / "survey")
 
 
 @pytest.fixture(scope="module")

@@ -2,28 +2,20 @@
 
 import json
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
-from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.simulator_file import read_simulator
+from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
 
 
 @pytest.fixture(scope="module")
 def survey(tmp_path_factory):
     "A survey whose scanner clock is 20 ms off"
-    scenario = Scenario(
-        drive={"duration": 30.0},
-        targets={"control": 12, "check": 3},
-        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
-        effects=[{"name": "time_offset", "magnitude": 0.02}],
-    )
-    folder = tmp_path_factory.mktemp("rounds") / "survey"
-    simulate(scenario, np.random.default_rng(3)).write(folder)
-    return folder
+    effect = {"name": "time_offset", "magnitude": 0.02}
+    return diagnosed_street.write(tmp_path_factory.mktemp("rounds") / "survey", effect)
 
 
 def test_one_command_finds_the_cause_and_then_none(survey, tmp_path):

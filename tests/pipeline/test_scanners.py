@@ -20,8 +20,8 @@ from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.calibration import CalibratedScanners
 from mlscorr.pipeline.tying import tie_passes
 from mlscorr.report.provenance import systems
-from mlscorr.simulate import Scenario, simulate
 from mlscorr.ties import TieCollector
+from tests.beds import scanner_pair
 
 LACKS = np.array(  # right, forward, up: m and deg, of each scanner's recorded mounting
     [[0.03, -0.02, 0.0, 0.3, -0.3, 0.4], [-0.02, 0.0, 0.0, -0.4, 0.2, -0.3]]
@@ -36,23 +36,10 @@ def wrong(mounting, lacks):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     "Folder of a street driven there and back with a left and a right scanner, both mounted wrong"
-    line = {"lines_per_second": 50, "points_per_line": 300}
-    scenario = Scenario(
-        drive={"duration": 10.0, "speed": 6.0, "passes": [{}, {"direction": "back"}]},
-        targets={"control": 5, "check": 1, "hidden": 0.0},
-        scanner=[
-            {"lever_arm": [-0.3, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0], **line},
-            {"lever_arm": [0.3, -0.6, 0.4], "boresight": [90.0, 0.0, -35.0], **line},
-        ],
-        pos={"grade": "tactical"},
-    )
-    simulated = simulate(scenario, np.random.default_rng(3))
+    simulated = scanner_pair.simulated(10.0, control=5, points=300)
     mountings = tuple(map(wrong, simulated.mountings, LACKS))
-    folder = tmp_path_factory.mktemp("two scanners")
-    replace(simulated, mountings=mountings).write(folder)
-    with (folder / "survey.toml").open("a") as described:
-        described.write("[matching]\nsearch_radius = 1.5\n")  # m, for speed
-    return folder
+    survey = replace(simulated, mountings=mountings)
+    return scanner_pair.write(survey, tmp_path_factory.mktemp("two scanners"))
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from mlscorr.io.trajectory import read_trajectory
 from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.survey_text import SurveyText
 from mlscorr.survey import PointCloud
+from tests.beds.las_crs import add_crs
 from tests.beds.pof import pof_bytes, poq_bytes
 
 START, EAST, NORTH = 413_200.0, 532_000.0, 3_374_000.0
@@ -41,10 +42,7 @@ def write_cloud(path, crs=None, start=START + 2.0, standard=False):
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = [0.001] * 3, [EAST, NORTH, 0.0]
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType(int(standard))
-    if crs:
-        wkt = pyproj.CRS.from_user_input(crs).to_wkt("WKT1_GDAL")
-        header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
-        header.global_encoding.wkt = True
+    add_crs(header, crs)
     las = laspy.LasData(header)
     las.xyz = np.array([EAST, NORTH, 40.0]) + np.outer(np.arange(100), [1.0, 0.1, 0.0])
     las.gps_time = np.linspace(start, start + 15.0, 100) + (WEEK - 1e9) * standard

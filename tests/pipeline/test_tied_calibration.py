@@ -2,8 +2,6 @@
 
 import json
 import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +9,8 @@ import pytest
 import mlscorr
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.documents import undocumented
+from tests.beds.places import MLSCORR
 
-MLSCORR = Path(sys.executable).with_name("mlscorr")
 LACKS = [0.03, -0.02, 0.0]  # m, of the recorded lever arm
 
 

@@ -3,9 +3,7 @@
 import csv
 import json
 import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +14,7 @@ from mlscorr.simulate import Scenario, simulate
 from mlscorr.ties import search_ties
 from tests.beds import tie_streets as street
 from tests.beds.documents import undocumented
-
-MLSCORR = Path(sys.executable).with_name("mlscorr")
+from tests.beds.places import MLSCORR
 
 
 @pytest.fixture(scope="module")

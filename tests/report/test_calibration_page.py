@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from mlscorr.report import calibration_page, calibration_screen
+from mlscorr.report.calibration_page import calibration_page, calibration_screen
 from tests.beds.reports import drive, fabricate, score_of, words
 
 MOUNTING = {"lever_arm": [0.1, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0]}

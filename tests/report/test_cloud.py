@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.report import write_report
 from mlscorr.report.cloud import CloudViews, close_ups
+from mlscorr.report.correction_page import write_report
 from mlscorr.report.render import Picture
 from mlscorr.report.render.camera import Camera
 from mlscorr.report.render.views import View

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.report import comparison_screen, write_comparison
-from mlscorr.report.comparison_page import comparison_figure
-from mlscorr.report.comparison_screen import basis, ranking, verdict
+from mlscorr.report.comparison_page import comparison_figure, write_comparison
+from mlscorr.report.comparison_screen import basis, comparison_screen, ranking, verdict
 
 PLACE = np.array([532_000.0, 3_374_000.0, 42.0])
 UNSEEN = [TargetRow.unobserved("T9", 1, "check", PLACE, "No disc there.", True)]

@@ -8,7 +8,8 @@ import pytest
 
 from mlscorr.correction import Correction
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.report import tables, write_report
+from mlscorr.report import tables
+from mlscorr.report.correction_page import write_report
 from tests.beds.reports import Links, drive, fabricate, page, report_of, words
 from tests.beds.tied_reports import tied_report
 

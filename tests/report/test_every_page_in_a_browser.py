@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from mlscorr.report import calibration_page, write_comparison
+from mlscorr.report.calibration_page import calibration_page
+from mlscorr.report.comparison_page import write_comparison
 from mlscorr.report.gap import diagnosis_page, plan_page
 from tests.beds.browser import browse, need_browser
 from tests.beds.gap_documents import KINDS, plan_document
@@ -92,9 +93,7 @@ async function run() {
     results[`${name} ${label}`] = await examine(name, label, width);
   return results;
 }
-run().then(found => JSON.stringify(found), error => "failed: " + error.stack).then(
-  text => { document.getElementById("result").textContent = text; });
-</script>"""
+"""
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,7 @@
 
 import pytest
 
-from mlscorr.report import draw_figure, write_pictures
-from mlscorr.report.figures import drawings
+from mlscorr.report.figures import draw_figure, drawings, write_pictures
 from tests.beds.reports import drive, fabricate
 from tests.beds.tied_reports import tied_report
 

@@ -1,13 +1,10 @@
-import ast
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-import mlscorr.simulate
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
 from mlscorr.io.pos_error_series import PosErrorSeries, read_pos_error_series
 from mlscorr.simulate.pos import alignment, inertial, kalman
@@ -385,14 +382,3 @@ def test_a_bad_series_is_refused(text, message, tmp_path):
     path.write_text(text)
     with pytest.raises(ValueError, match=message):
         read_pos_error_series(path)
-
-
-def test_the_pos_does_not_know_the_estimators_model():
-    "Nothing in simulate imports covariance or collocation, inside functions either"
-    for path in Path(mlscorr.simulate.__file__).parent.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
-            if isinstance(node, ast.ImportFrom):
-                names = [f"{node.module}.{a.name}" for a in node.names]
-            for name in names:
-                assert "covariance" not in name and "collocation" not in name, path.name

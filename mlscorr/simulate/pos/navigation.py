@@ -1,6 +1,7 @@
 """Free inertial navigation, its aid by GNSS and odometer, and what filter and smoother leave."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.random import Generator
@@ -53,7 +54,9 @@ class Navigation:
         True R_P^G.
     error : (n, 15) array
         True error state of the free inertial navigation.
-    filtered, smoothed : StateEstimate
+    transition : (n - 1, 15, 15) array
+        Of the error state from epoch to epoch.
+    filtered, predicted : StateEstimate
         Of that error state.
     fix_time : (k,) array
         Units: s.
@@ -63,10 +66,16 @@ class Navigation:
     gps_time: np.ndarray
     attitude: Rotation
     error: np.ndarray
+    transition: np.ndarray
     filtered: StateEstimate
-    smoothed: StateEstimate
+    predicted: StateEstimate
     fix_time: np.ndarray
     fixes: Fixes
+
+    @cached_property
+    def smoothed(self) -> StateEstimate:
+        """The error state after smoothing, which takes as long as the filter."""
+        return smooth(self.transition, self.filtered, self.predicted)
 
     def at(self, gps_time: np.ndarray, smoothed: bool = True) -> PosError:
         """PosError that is left at times (m,), after smoothing or after the filter alone.
@@ -144,8 +153,7 @@ def navigate(
     measurements = _measurements(error[::every, POSITION], fixes, fix_scale, wheels)
     measurements = {every * i: measurement for i, measurement in measurements.items()}
     filtered, predicted = kalman_filter(transition, noise, start_sigma(imu) ** 2, measurements)
-    smoothed = smooth(transition, filtered, predicted)
-    return Navigation(gps_time, attitude, error, filtered, smoothed, fix_time, fixes)
+    return Navigation(gps_time, attitude, error, transition, filtered, predicted, fix_time, fixes)
 
 
 def _measurements(position_error, fixes, fix_scale, wheels):

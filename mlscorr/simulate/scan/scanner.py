@@ -13,26 +13,20 @@ import numpy as np
 from mlscorr.simulate.scan.echoes import POWER, Surfaces
 from mlscorr.simulate.scan.noise import ScannerNoise
 from mlscorr.simulate.scan.rays import Platform, Turn
+from mlscorr.simulate.scan.recorded import RecordedPulses
 from mlscorr.simulate.scan.threads import Workspace, pool
 from mlscorr.simulate.scenario import ScannerScenario
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.survey import Mounting, Trajectory
-from mlscorr.survey.columns import Columns
 
 
 @dataclass(frozen=True, repr=False)
-class MeasuredPulses(Columns):
-    """Measured returns in scan order, and what they truly hit.
+class MeasuredPulses(RecordedPulses):
+    """Measured returns in scan order, and what they truly hit: RecordedPulses by the mounting of
+    this scanner, and more.
 
     Parameters
     ----------
-    gps_time : (n,) array
-        Units: s.
-    angle, elevation, range : (n,) array
-        As measured: from the zero beam, out of the scan plane, and along the beam. Units: rad, m.
-    intensity : (n,) uint16 array
-    incidence : (n,) array
-        Cosine of the angle between beam and surface normal.
     return_number, number_of_returns : (n,) uint8 array
         Of the pulse, from 1.
     point : (n, 3) array
@@ -41,12 +35,6 @@ class MeasuredPulses(Columns):
         Triangle of the scene that was hit; of a mixed return, the strongest.
     """
 
-    gps_time: np.ndarray
-    angle: np.ndarray
-    elevation: np.ndarray
-    range: np.ndarray
-    intensity: np.ndarray
-    incidence: np.ndarray
     return_number: np.ndarray
     number_of_returns: np.ndarray
     point: np.ndarray

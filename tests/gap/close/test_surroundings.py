@@ -19,13 +19,19 @@ def pulses_about(surroundings, survey, rows, finding):
     ]
 
 
-def test_what_is_let_go_is_about_no_target(case):
-    "Narrowed while reading, the surroundings give the same pulses as all that was ever near"
-    survey, read, rows, _ = case
+def all_near(survey):
+    "Surroundings with all that was ever near"
     everything = Surroundings(survey)
     for file in survey.clouds:
         for chunk in read_chunks(file):
             everything.add(chunk)
+    return everything
+
+
+def test_what_is_let_go_is_about_no_target(case):
+    "Narrowed while reading, the surroundings give the same pulses as all that was ever near"
+    survey, read, rows, _ = case
+    everything = all_near(survey)
     kept = pulses_about(read.surroundings, survey, rows, read.finding)
     assert len(kept) >= 6 and min(number for number, _ in kept) > 100
     np.testing.assert_allclose(kept, pulses_about(everything, survey, rows, read.finding))
@@ -34,8 +40,4 @@ def test_what_is_let_go_is_about_no_target(case):
 def test_little_is_kept_once_targets_are_fitted(case):
     "Of points near surveyed places only those stay that pass a fitted target within a second"
     survey, read, _, _ = case
-    everything = Surroundings(survey)
-    for file in survey.clouds:
-        for chunk in read_chunks(file):
-            everything.add(chunk)
-    assert 0 < len(read.surroundings) < 0.8 * len(everything)
+    assert 0 < len(read.surroundings) < 0.8 * len(all_near(survey))

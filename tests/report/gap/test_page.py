@@ -193,9 +193,7 @@ async function run() {
   for (const [name, width] of PAGES) found[`${name} ${width}`] = await examine(name, width);
   return found;
 }
-run().then(found => JSON.stringify(found), error => "failed: " + error.stack).then(
-  text => { document.getElementById("result").textContent = text; });
-</script>"""
+"""
 SEEN = [("effect", 400), ("effect", 1280), ("none", 1280), ("alike", 1280), ("plan", 400)]
 SEEN += [("bump", 1600), ("plan", 1600)]
 
