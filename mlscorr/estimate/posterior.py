@@ -37,11 +37,11 @@ class Posterior:
     points: tuple[tuple[SignalParameters, float], ...]
 
     @property
-    def likely(self) -> list[tuple[SignalParameters, float]]:
+    def mixture(self) -> list[tuple[SignalParameters, float]]:
         """The points that are worth the work, with weights that sum up to one."""
-        worth = [point for point in self.points if point[1] > SETTINGS.smallest_weight]
-        total = sum(weight for _, weight in worth)
-        return [(parameters, weight / total) for parameters, weight in worth]
+        weighty = [point for point in self.points if point[1] > SETTINGS.smallest_weight]
+        total = sum(weight for _, weight in weighty)
+        return [(parameters, weight / total) for parameters, weight in weighty]
 
 
 @dataclass(frozen=True)

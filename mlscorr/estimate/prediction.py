@@ -90,7 +90,7 @@ def predict_pose_error(
     sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), SETTINGS.smallest_sigma**2))
     predictions = predictions or GridPredictions(equations)
     rows, mean, square = predictions.rows, 0.0, 0.0
-    for parameters, weight in posterior.likely:
+    for parameters, weight in posterior.mixture:
         predicted, variance = predictions.under(parameters)
         mean = mean + weight * predicted
         square = square + weight * (variance + predicted**2)

@@ -90,7 +90,7 @@ def single_test(equations: Equations, name: str, posterior: Posterior) -> Target
 def _tests(equations, names, posterior, targets, visit=None):
     """TargetTests of some targets, by a Collocation after the other: many would fill the memory."""
     left_out = {name: [] for name in names}
-    for chosen, weight in posterior.likely:
+    for chosen, weight in posterior.mixture:
         solved = equations.solve(chosen)
         if visit is not None:
             visit(chosen, solved)

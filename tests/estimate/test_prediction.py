@@ -97,7 +97,7 @@ def test_solutions_that_others_made_predict_the_same(equations, posterior):
     "What the tests of targets solved serves the prediction to the last bit, and isn't solved again"
     known = GridPredictions(equations)
     all_tests(equations, posterior, known.add)
-    assert set(known.by_parameters) == {parameters for parameters, _ in posterior.likely}
+    assert set(known.by_parameters) == {parameters for parameters, _ in posterior.mixture}
     for here, there in zip(
         predict_pose_error(equations, posterior, known),
         predict_pose_error(equations, posterior),

@@ -201,8 +201,8 @@ def _places(drive, parts, home):
         for place in part.corrected.places
         if is_home[_epochs(drive, place.gps_time)]
     ]
-    most = max(len(part.corrected.places) for part in parts)
-    return tuple(sorted(places, key=lambda place: place.sigma_after - place.sigma_before)[:most])
+    number = max(len(part.corrected.places) for part in parts)
+    return tuple(sorted(places, key=lambda place: place.sigma_after - place.sigma_before)[:number])
 
 
 def _state(parts, home, used):
