@@ -47,7 +47,7 @@ class AreaInput:
         pieces = {piece.drive.survey.name: piece for piece in self.pieces}
         results = []
         for group in near_drives([piece.drive for piece in self.pieces]):
-            for part in estimate_group(group, self.order, self.origin, True):
+            for part in estimate_group(group, min(self.order, 0), self.origin, True):
                 for corrected, state in corrected_drives(part, self.area):
                     assert isinstance(corrected, CorrectedDrive)
                     piece = pieces[state.name]
@@ -105,7 +105,7 @@ def project_drives(
     groups = near_drives(drives) if with_ties else [[drive] for drive in drives]
     for group in groups:
         areas = areas_of(np.vstack([drive.contents.features.centre for drive in group]), limit)
-        if with_ties and len(group) > 1 and len(areas) > 1:
+        if with_ties and len(areas) > 1:
             yield from drives_by_areas(group, areas, order, origin, work)
             continue
         for part in estimate_group(group, order, origin, with_ties):

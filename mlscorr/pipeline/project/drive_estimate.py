@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import (
@@ -136,8 +135,6 @@ def _cut(correction, trajectory, shift):
     first, last = np.searchsorted(whole.gps_time, ends)
     rows, way = slice(first, last + 1), np.diff(whole.position[: first + 1], axis=0)
     chainage = float(np.linalg.norm(way, axis=1).sum())
-    if last - first + 1 < len(trajectory):
-        return _interpolated(correction, rows, trajectory, shift), chainage
     corrected = Trajectory(
         trajectory.gps_time,
         whole.position[rows],
@@ -147,26 +144,6 @@ def _cut(correction, trajectory, shift):
         trajectory.session,
     )
     return Correction(trajectory, corrected, covariance=correction.covariance[rows]), chainage
-
-
-def _interpolated(correction, rows, trajectory, shift):
-    """The Correction of all epochs of a drive by that of some: its pose error is smooth."""
-    old, new = correction.recorded, correction.corrected
-    turn = (new.attitude[rows] * old.attitude[rows].inv()).as_rotvec()
-    known = new.position[rows] - old.position[rows], turn
-    times = trajectory.gps_time + shift
-    change, turn, *sigmas = (
-        np.column_stack([np.interp(times, new.gps_time[rows], column) for column in values.T])
-        for values in (*known, new.position_sigma[rows], new.attitude_sigma[rows])
-    )
-    corrected = Trajectory(
-        trajectory.gps_time,
-        trajectory.position + change,
-        Rotation.from_rotvec(turn) * trajectory.attitude,
-        *sigmas,
-        trajectory.session,
-    )
-    return Correction(trajectory, corrected)
 
 
 def _equations(equations, rows, trajectory, shift):

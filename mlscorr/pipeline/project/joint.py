@@ -11,7 +11,6 @@ from mlscorr.io.task_store import digest
 from mlscorr.io.time_systems import WEEK
 from mlscorr.io.trajectory_sessions import join_sessions, with_sigmas
 from mlscorr.pipeline.file_finding import DriveFinding
-from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.survey import (
     ControlPoints,
     Matched,
@@ -126,17 +125,14 @@ class JointDrives:
         return join_features(parts, origin)
 
 
-def join_drives(drives: Sequence[FoundDrive], limit: int = SETTINGS.epochs) -> JointDrives:
+def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
     """Drives as one survey.
 
     Parameters
     ----------
     drives : sequence of FoundDrive
-    limit : int
-        Of the epochs of all drives: of more, as few are left out as must be.
     """
-    step = -(-sum(len(drive.survey.trajectory) for drive in drives) // limit)
-    if len(drives) == 1 and step == 1:
+    if len(drives) == 1:
         return JointDrives(tuple(drives), np.zeros(1), drives[0].survey)
     shifts = distinct_times([drive.survey.trajectory for drive in drives])
     starts = np.array([drive.survey.trajectory.gps_time[0] for drive in drives])
@@ -145,7 +141,7 @@ def join_drives(drives: Sequence[FoundDrive], limit: int = SETTINGS.epochs) -> J
     surveys = [drive.survey for drive in drives]
     names = [survey.name for survey in surveys]
     parts = [
-        _shifted(survey.trajectory, shift, step)
+        replace(survey.trajectory, gps_time=survey.trajectory.gps_time + shift)
         for survey, shift in zip(surveys, shifts, strict=True)
     ]
     parts, notes = with_sigmas(names, parts, surveys[0].pos)
@@ -163,23 +159,6 @@ def join_drives(drives: Sequence[FoundDrive], limit: int = SETTINGS.epochs) -> J
         scanners=scanners,
     )
     return JointDrives(tuple(drives), shifts, joint)
-
-
-def _shifted(trajectory, shift, step):
-    """Each step-th epoch of a trajectory, and both ends of its passes, at other times."""
-    times = trajectory.gps_time
-    if step == 1:
-        return replace(trajectory, gps_time=times + shift)
-    edges = np.searchsorted(times, trajectory.passes.ravel())
-    rows = np.unique(np.append(np.arange(0, len(times), step), edges))
-    sigmas = trajectory.position_sigma, trajectory.attitude_sigma
-    return Trajectory(
-        times[rows] + shift,
-        trajectory.position[rows],
-        trajectory.attitude[rows],
-        *(None if sigma is None else sigma[rows] for sigma in sigmas),
-        session=trajectory.segment(times[rows]),
-    )
 
 
 def _scanners(surveys):

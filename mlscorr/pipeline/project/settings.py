@@ -11,7 +11,6 @@ class Settings:
     waiting: int = 2  # tasks for each worker that are handed out: the next is there when it ends
     area_features: int = 30_000  # of an area; with its margin it takes 1 to 2 GB and minutes
     margin: float = 150.0  # m beyond an area that are estimated with it: half a minute in a street
-    epochs: int = 2_000_000  # of drives together, at 288 B of covariance each; more are thinned
     interval: float = 10.0  # s between two lines on how far it has come
     cached: int = 2  # drives that a worker holds: that of this task, and of the one before
 
