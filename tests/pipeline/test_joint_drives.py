@@ -125,7 +125,7 @@ def by_areas(drives):
 def cut(drives):
     "Two areas with margins of 4 m"
     places = np.vstack([drive.contents.features.centre for drive in drives])
-    areas = areas_of(places, int(0.6 * len(places)), 4.0)
+    areas = areas_of(places, int(0.8 * len(places)), 4.0)
     assert len(areas) == 2
     return areas
 

@@ -76,7 +76,9 @@ class Area:
 def areas_of(
     places: np.ndarray, limit: int = SETTINGS.area_features, margin: float = SETTINGS.margin
 ) -> list[Area]:
-    """Areas that hold so many of some places at most; wider than four margins in any case.
+    """Areas that hold so many of some places at most, those in their margins too.
+
+    None is cut that is less than four margins wide.
 
     Parameters
     ----------
@@ -86,19 +88,18 @@ def areas_of(
     margin : float
         Units: m.
     """
-    waiting = [(Area(np.full(2, -np.inf), np.full(2, np.inf), margin), places[:, :2])]
+    waiting = [(Area(np.full(2, -np.inf), np.full(2, np.inf), margin), places)]
     areas = []
     while waiting:
-        area, inside = waiting.pop()
+        area, near = waiting.pop()
+        inside = near[area.contains(near), :2]
         size = np.ptp(inside, axis=0) if len(inside) else np.zeros(2)
         axis = int(np.argmax(size))
-        if len(inside) <= limit or size[axis] < 4 * margin:
+        if len(near) <= limit or size[axis] < 4 * margin:
             areas.append(area)
             continue
-        cut = float(np.median(inside[:, axis]))
-        first, second = area.parted(axis, cut)
-        is_first = inside[:, axis] < cut
-        waiting += [(second, inside[~is_first]), (first, inside[is_first])]
+        halves = area.parted(axis, float(np.median(inside[:, axis])))
+        waiting += [(half, near[half.weight(near) > 0.0]) for half in halves[::-1]]
     return areas
 
 

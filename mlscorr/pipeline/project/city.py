@@ -100,7 +100,7 @@ def project_drives(
     work : function of AreaInputs
         Gives the results of each.
     limit : int
-        Of planes and poles in an area.
+        Of planes and poles in an area and its margin.
     """
     groups = near_drives(drives) if with_ties else [[drive] for drive in drives]
     for group in groups:
