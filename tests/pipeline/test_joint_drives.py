@@ -9,7 +9,7 @@ from mlscorr.io.project_file import read_project
 from mlscorr.io.task_store import TaskStore
 from mlscorr.io.time_systems import WEEK
 from mlscorr.pipeline.file_finding import find_in_file
-from mlscorr.pipeline.project.areas import areas_of, pieces_of
+from mlscorr.pipeline.project.areas import areas_of, margin_of, pieces_of
 from mlscorr.pipeline.project.city import drives_by_areas, project_drives
 from mlscorr.pipeline.project.corrected import found_drive
 from mlscorr.pipeline.project.engine import engine
@@ -125,6 +125,7 @@ def by_areas(drives):
 def cut(drives):
     "Two areas with margins of 4 m"
     places = np.vstack([drive.contents.features.centre for drive in drives])
+    assert 20.0 < margin_of(drives) < 200.0  # m, of 10 s of driving: wider than half of this street
     areas = areas_of(places, int(0.8 * len(places)), 4.0)
     assert len(areas) == 2
     return areas

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mlscorr.pipeline.project.joint import FoundDrive
-from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.ties import SETTINGS as TIES
 
 
@@ -32,7 +31,7 @@ class Area:
 
     low: np.ndarray
     high: np.ndarray
-    margin: float = SETTINGS.margin
+    margin: float
 
     def contains(self, position: np.ndarray) -> np.ndarray:
         """Which positions (n,) are its own.
@@ -73,9 +72,20 @@ class Area:
         return replace(self, high=high), replace(self, low=low)
 
 
-def areas_of(
-    places: np.ndarray, limit: int = SETTINGS.area_features, margin: float = SETTINGS.margin
-) -> list[Area]:
+def margin_of(drives: Sequence[FoundDrive]) -> float:
+    """How far drives come, on average, while the POS error is about one. Units: m.
+
+    Parameters
+    ----------
+    drives : sequence of FoundDrive
+    """
+    recorded = [drive.survey.trajectory for drive in drives]
+    way = sum(np.linalg.norm(np.diff(t.position, axis=0), axis=1).sum() for t in recorded)
+    seconds = sum(float(np.ptp(t.gps_time)) for t in recorded)
+    return max(TIES.pause * float(way) / seconds, drives[0].survey.search_radius)
+
+
+def areas_of(places: np.ndarray, limit: int, margin: float) -> list[Area]:
     """Areas that hold so many of some places at most, those in their margins too.
 
     None is cut that is less than four margins wide.

@@ -10,7 +10,6 @@ class Settings:
     losses: int = 2  # times that a task may lose its worker alone, before it is to blame itself
     waiting: int = 2  # tasks for each worker that are handed out: the next is there when it ends
     area_features: int = 100_000  # of an area with its margin: 2 GB and some ten minutes
-    margin: float = 75.0  # m beyond an area: what a scanner sees there is estimated with it
     interval: float = 10.0  # s between two lines on how far it has come
     cached: int = 2  # drives that a worker holds: that of this task, and of the one before
 
