@@ -84,7 +84,7 @@ def corrected_drives(
     places = place_control(estimate)
     section = {} if area is not None else tie_section(estimate) or {}  # an area is no drive
     results = []
-    for drive, own, shift, note in zip(joint.drives, estimates, joint.shifts, notes, strict=True):
+    for drive, own, shift in zip(joint.drives, estimates, joint.shifts, strict=True):
         first, last = drive.survey.trajectory.gps_time[[0, -1]]
         near = [replace(place, gps_time=place.gps_time - shift) for place in places]
         shared = {
@@ -92,8 +92,7 @@ def corrected_drives(
         }
         misfits = misfit_section(own.ties) or {"n": 0, "used": 0, "reason": own.untied}
         ties = misfits | (shared if own.ties else {})
-        notes_of = (*drive.survey.notes, *joint.survey.notes, *filter(None, [note]))
-        survey = replace(drive.survey, notes=notes_of)
+        survey = replace(drive.survey, notes=(*drive.survey.notes, *joint.survey.notes))
         corrected = CorrectedDrive(
             **drive_fields(replace(drive, survey=survey), own),
             places=tuple(place for place in near if first <= place.gps_time <= last),

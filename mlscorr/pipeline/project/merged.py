@@ -77,11 +77,8 @@ def merged_drive(
     main = parts[int(np.argmax(home.sum(axis=1)))]
     estimate = _estimate(drive, parts, home, main)
     state = _state(parts, home, estimate.used)
-    sentence = tied_sentence(state)
-    estimate = replace(estimate, untied=sentence or main.estimate.untied)
-    known = [*drive.survey.notes, *(tied_sentence(part.state) for part in parts)]
-    notes = _distinct([part.corrected.survey.notes for part in parts], known)
-    notes = (*drive.survey.notes, *notes, *filter(None, [sentence]))
+    estimate = replace(estimate, untied=tied_sentence(state) or main.estimate.untied)
+    notes = _distinct([part.corrected.survey.notes for part in parts])
     misfits = misfit_section(estimate.ties) or {"n": 0, "used": 0, "reason": estimate.untied}
     whole = replace(drive, survey=replace(drive.survey, notes=notes))
     corrected = CorrectedDrive(
@@ -232,6 +229,6 @@ def _joined(rows):
     return {"n": int(number.sum()), "before": rms("before"), "after": rms("after")}
 
 
-def _distinct(parts, known=()):
-    """Sentences of some parts, each once, but for known ones."""
-    return tuple(dict.fromkeys(text for part in parts for text in part if text not in known))
+def _distinct(parts):
+    """Sentences of some parts, each once."""
+    return tuple(dict.fromkeys(text for part in parts for text in part))
