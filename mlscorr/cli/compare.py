@@ -5,24 +5,13 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import (
-    Exit,
-    Json,
-    Out,
-    Overwrite,
-    Quiet,
-    SurveyArgument,
-    exit_code,
-    say,
-    say_statements,
-    warn,
-)
+from mlscorr.cli import terminal
 from mlscorr.cli.work import print_json, work
 
 
 def compare(
-    survey: SurveyArgument,
-    out: Out,
+    survey: terminal.SurveyArgument,
+    out: terminal.Out,
     clouds: Annotated[
         list[str],
         typer.Option(
@@ -31,12 +20,12 @@ def compare(
             "given several times.",
         ),
     ] = (),
-    overwrite: Overwrite = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    overwrite: terminal.Overwrite = False,
+    as_json: terminal.Json = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
     """Correct a survey by every method, and score them by the same check points."""
-    with exit_code(Exit.USAGE):
+    with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.pipeline.methods import method_named
 
         clouds = list(dict.fromkeys(method_named(name).name for name in clouds))
@@ -48,23 +37,25 @@ def compare(
     _tell(report, out)
     left = [file for file in report["files"] if file["points_outside_trajectory"]]
     for file in left:
-        warn(
+        terminal.warn(
             f"{file['points_outside_trajectory']} of {file['points']} points of {file['name']} lie "
             "outside the trajectory or in its gaps and were left as they were."
         )
     if left:
-        raise typer.Exit(Exit.IN_PART)
+        raise typer.Exit(terminal.Exit.IN_PART)
 
 
 def _tell(report, out):
     """What stands first, the table of scores, and where the results lie."""
     by = report["scored_by"]
-    say_statements(report["statements"])
-    say(f"{'RMSE (m)':16s}{'E':>8s}{'N':>8s}{'H':>8s}{'3D':>9s}{'fit, 3D':>9s}")
+    terminal.say_statements(report["statements"])
+    terminal.say(f"{'RMSE (m)':16s}{'E':>8s}{'N':>8s}{'H':>8s}{'3D':>9s}{'fit, 3D':>9s}")
     scored = [row for row in report["methods"] if row[by]["rmse"] is not None]
     for row in sorted(scored, key=lambda row: row[by]["rmse_3d"]):
         axes = "".join(f"{value:8.3f}" for value in row[by]["rmse"])
-        say(f"{row['name']:16s}{axes}{row[by]['rmse_3d']:9.3f}{row['control']['rmse_3d']:9.3f}")
-    say(f"Report: {out / 'compare.html'}")
+        terminal.say(
+            f"{row['name']:16s}{axes}{row[by]['rmse_3d']:9.3f}{row['control']['rmse_3d']:9.3f}"
+        )
+    terminal.say(f"Report: {out / 'compare.html'}")
     for file in report["files"]:
-        say(f"Cloud:  {out / file['name']}")
+        terminal.say(f"Cloud:  {out / file['name']}")

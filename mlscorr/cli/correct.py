@@ -6,19 +6,8 @@ from typing import Annotated, Literal
 import typer
 
 import mlscorr
+from mlscorr.cli import terminal
 from mlscorr.cli.project import correct_drives
-from mlscorr.cli.terminal import (
-    Exit,
-    Json,
-    Out,
-    Overwrite,
-    Quiet,
-    exit_code,
-    path_or_url,
-    say,
-    say_statements,
-    warn,
-)
 from mlscorr.cli.work import print_json, work
 
 
@@ -27,10 +16,10 @@ def correct(
         Path,
         typer.Argument(
             help="survey.toml or project.toml, or the folder that holds it; a path or a URL.",
-            parser=path_or_url,
+            parser=terminal.path_or_url,
         ),
     ],
-    out: Out,
+    out: terminal.Out,
     order: Annotated[
         int, typer.Option(min=0, max=9, help="Order of the polynomial trend of the position.")
     ] = 1,
@@ -72,12 +61,12 @@ def correct(
         bool,
         typer.Option("--resume", help="Of a project.toml: do what is missing or changed in OUT."),
     ] = False,
-    overwrite: Overwrite = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    overwrite: terminal.Overwrite = False,
+    as_json: terminal.Json = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
     """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
-    with exit_code(Exit.USAGE):
+    with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.evaluate.quality import failures, read_gate
         from mlscorr.io.project_file import is_project
         from mlscorr.io.trajectory_exports import check_exports
@@ -102,7 +91,7 @@ def correct(
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
         for sentence in recorded.layouts:
-            say(sentence)
+            terminal.say(sentence)
         check_exports(trajectory, recorded.crs, is_read=True)
         result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
         report = result.write(
@@ -111,9 +100,9 @@ def correct(
     tell(report, out, as_json)
     failed = failures(gates, report)
     for sentence in failed:
-        warn(f"Quality gate failed: {sentence}")
+        terminal.warn(f"Quality gate failed: {sentence}")
     if failed or report["coverage"]["points_untouched"]:
-        raise typer.Exit(Exit.QUALITY_GATE if failed else Exit.IN_PART)
+        raise typer.Exit(terminal.Exit.QUALITY_GATE if failed else terminal.Exit.IN_PART)
 
 
 def tell(report: dict, out: Path, as_json: bool) -> None:
@@ -131,10 +120,10 @@ def tell(report: dict, out: Path, as_json: bool) -> None:
     from mlscorr.report.tie_words import tie_sentences
 
     print_json(report, as_json)
-    say_statements(report["statements"])
+    terminal.say_statements(report["statements"])
     for sentence in tie_sentences(report["ties"], report["control"]["n_scored"]):
-        say(sentence)
-    say(f"{'RMSE of misclosures (m)':24s}{'n':>4s}  {'E before':>9s}{'N':>8s}{'H':>8s}"
+        terminal.say(sentence)
+    terminal.say(f"{'RMSE of misclosures (m)':24s}{'n':>4s}  {'E before':>9s}{'N':>8s}{'H':>8s}"
          f"  {'E after':>9s}{'N':>8s}{'H':>8s}")  # fmt: skip
     rows = [
         ("control points", report["control"], "after"),
@@ -143,14 +132,14 @@ def tell(report: dict, out: Path, as_json: bool) -> None:
     ]
     for title, group, after in rows:
         if group["before"]["rmse"] is None or group[after]["rmse"] is None:
-            say(f"{title:24s}{group['n']:4d}  none")
+            terminal.say(f"{title:24s}{group['n']:4d}  none")
             continue
         numbers = [*group["before"]["rmse"], *group[after]["rmse"]]
         text = "".join(
             f"{'  ' * (i % 3 == 0)}{v:{9 - (i % 3 > 0)}.3f}" for i, v in enumerate(numbers)
         )
-        say(f"{title:24s}{group['n']:4d}{text}")
+        terminal.say(f"{title:24s}{group['n']:4d}{text}")
     if (out / "report.html").exists():
-        say(f"Report:    {out / 'report.html'}")
-        say(f"Pictures:  {out / 'pictures'}")
-    say(f"Corrected: {', '.join(str(out / file['name']) for file in report['files'])}")
+        terminal.say(f"Report:    {out / 'report.html'}")
+        terminal.say(f"Pictures:  {out / 'pictures'}")
+    terminal.say(f"Corrected: {', '.join(str(out / file['name']) for file in report['files'])}")

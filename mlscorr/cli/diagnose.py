@@ -6,23 +6,13 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import (
-    Exit,
-    Json,
-    Out,
-    Overwrite,
-    Quiet,
-    SurveyArgument,
-    exit_code,
-    say,
-    say_statements,
-)
+from mlscorr.cli import terminal
 from mlscorr.cli.work import print_json, work
 
 
 def diagnose(
-    survey: SurveyArgument,
-    out: Out,
+    survey: terminal.SurveyArgument,
+    out: terminal.Out,
     simulator: Annotated[
         Path | None,
         typer.Option(
@@ -55,12 +45,12 @@ def diagnose(
             "alarm, a miss and unknown, where a wrong name costs 1: 4,1,0.9 is the default."
         ),
     ] = "default",
-    overwrite: Overwrite = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    overwrite: terminal.Overwrite = False,
+    as_json: terminal.Json = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
     """Find where reality and simulation differ, why, and how far the gap can be closed."""
-    with exit_code(Exit.USAGE):
+    with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.effects import register_file
         from mlscorr.simulate.simulator_file import read_simulator
 
@@ -92,9 +82,9 @@ def diagnose(
         content = diagnosed.write(out, overwrite)
     print_json(content, as_json)
     _tell(content)
-    say(f"Page:      {out / 'gap.html'}")
-    say(f"Numbers:   {out / 'gap.json'}")
-    say(f"Simulator: {out / 'simulator.toml'}")
+    terminal.say(f"Page:      {out / 'gap.html'}")
+    terminal.say(f"Numbers:   {out / 'gap.json'}")
+    terminal.say(f"Simulator: {out / 'simulator.toml'}")
 
 
 def _costs(text):
@@ -117,20 +107,20 @@ def _costs(text):
 
 def _tell(content):
     """What stands first, and what to do."""
-    say_statements(content["statements"])
+    terminal.say_statements(content["statements"])
     if "ablation" in content:
         _tell_rounds(content["ablation"])
         return
     for number, sentence in enumerate(content["advice"], start=1):
-        say(f"{number}. {sentence}")
+        terminal.say(f"{number}. {sentence}")
 
 
 def _tell_rounds(ablation):
     """The gap with each effect by itself, and after each round."""
-    say(f"{'In the simulator':34s}{'gap before':>12s}{'after':>10s}")
+    terminal.say(f"{'In the simulator':34s}{'gap before':>12s}{'after':>10s}")
     for row in ablation["alone"]:
-        say(f"{row['effect'] + ' alone':34s}{row['before']:9.1f} mm{row['after']:7.1f} mm")
+        terminal.say(f"{row['effect'] + ' alone':34s}{row['before']:9.1f} mm{row['after']:7.1f} mm")
     for row in ablation["rounds"]:
         words, unit = f"round {row['round']}: {row['label']}", row["unit"]
-        say(f"{words:34s}{row['before']:9.1f} {unit:2s}{row['after']:7.1f} {unit:2s}")
-    say(ablation["ended"])
+        terminal.say(f"{words:34s}{row['before']:9.1f} {unit:2s}{row['after']:7.1f} {unit:2s}")
+    terminal.say(ablation["ended"])

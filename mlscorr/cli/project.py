@@ -7,17 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mlscorr.cli.terminal import (
-    Exit,
-    Json,
-    Quiet,
-    deafen,
-    exit_code,
-    path_or_url,
-    say,
-    say_statements,
-    warn,
-)
+from mlscorr.cli import terminal
 from mlscorr.cli.work import print_json
 
 if TYPE_CHECKING:
@@ -51,27 +41,27 @@ def correct_drives(
     from mlscorr.io.project_file import read_project_file
     from mlscorr.pipeline.project import check_engine, correct_project
 
-    with exit_code(Exit.USAGE):
+    with terminal.exit_code(terminal.Exit.USAGE):
         read_project_file(project)
         check_engine(options.workers, options.scheduler)
-    with exit_code(Exit.BAD_DATA, lambda: RESUMPTION):
+    with terminal.exit_code(terminal.Exit.BAD_DATA, lambda: RESUMPTION):
         result = correct_project(project, out, options, tell)
-        deafen()
+        terminal.deafen()
     print_json(result.document, as_json)
-    say_statements(result.document["statements"])
+    terminal.say_statements(result.document["statements"])
     for row in result.document["drives"]:
-        say(f"{row['name']}: {row['headline']}")
+        terminal.say(f"{row['name']}: {row['headline']}")
     if options.page:
-        say(f"Project:   {out / 'project.html'}")
+        terminal.say(f"Project:   {out / 'project.html'}")
     failed = [
         f"{name}: {sentence}"
         for name, report in result.reports.items()
         for sentence in failures(gates, report)
     ]
     for sentence in failed:
-        warn(f"Quality gate failed: {sentence}")
+        terminal.warn(f"Quality gate failed: {sentence}")
     if failed or not result.is_whole:
-        raise typer.Exit(Exit.QUALITY_GATE if failed else Exit.IN_PART)
+        raise typer.Exit(terminal.Exit.QUALITY_GATE if failed else terminal.Exit.IN_PART)
 
 
 def tell(sentence: str) -> None:
@@ -81,17 +71,19 @@ def tell(sentence: str) -> None:
     ----------
     sentence : str
     """
-    speak = warn if sentence.startswith(("Warning:", "Failed:")) else say
+    speak = terminal.warn if sentence.startswith(("Warning:", "Failed:")) else terminal.say
     speak(sentence)
 
 
 def status(
-    out: Annotated[Path, typer.Argument(help="Folder of a project's results.", parser=path_or_url)],
-    as_json: Json = False,
-    quiet: Quiet = False,
+    out: Annotated[
+        Path, typer.Argument(help="Folder of a project's results.", parser=terminal.path_or_url)
+    ],
+    as_json: terminal.Json = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
     """Tell how far the correction of a project has come, while it runs or afterwards."""
-    with exit_code(Exit.USAGE):
+    with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.pipeline.project import project_status
 
         content = project_status(out)
@@ -101,9 +93,9 @@ def status(
             f"{stage['title'].lower()} {stage['done']} of {stage['tasks']}"
             for stage in row["stages"]
         ]
-        say(f"{row['name']}: {', '.join(stages)}")
+        terminal.say(f"{row['name']}: {', '.join(stages)}")
     shares = [f"{stage['title'].lower()} {stage['share']:.0%}" for stage in content["all"]]
-    say(f"All: {', '.join(shares)}")
+    terminal.say(f"All: {', '.join(shares)}")
     for line in content["failures"]:
-        warn(line)
-    say(f"Last: {content['log']}")
+        terminal.warn(line)
+    terminal.say(f"Last: {content['log']}")

@@ -22,7 +22,6 @@ class MapRotation(Effect):
         Units: rad.
     """
 
-    name: ClassVar = "map_rotation"
     stage: ClassVar = "control"
     title: ClassVar = "Turned frame"
     meaning: ClassVar = "The frame of the surveyed targets is turned against that of the cloud."
@@ -61,7 +60,6 @@ class MapScale(Effect):
         Units: ratio.
     """
 
-    name: ClassVar = "map_scale"
     stage: ClassVar = "control"
     title: ClassVar = "Scale of the map"
     meaning: ClassVar = "The surveyed targets have another map scale than the cloud."
@@ -93,7 +91,6 @@ class HorizontalDatum(Effect):
         Easting and northing. Units: m.
     """
 
-    name: ClassVar = "horizontal_datum"
     stage: ClassVar = "control"
     title: ClassVar = "Horizontal datum"
     meaning: ClassVar = (
@@ -129,7 +126,6 @@ class VerticalDatum(Effect):
         Units: m.
     """
 
-    name: ClassVar = "vertical_datum"
     stage: ClassVar = "control"
     title: ClassVar = "Vertical datum"
     meaning: ClassVar = "Heights of the surveyed targets and of the cloud are in different systems."
@@ -171,7 +167,6 @@ class TargetOutlier(Effect):
         When no target has that name.
     """
 
-    name: ClassVar = "target_outlier"
     stage: ClassVar = "control"
     title: ClassVar = "One wrong target"
     meaning: ClassVar = "The surveyed coordinates of one target are wrong."

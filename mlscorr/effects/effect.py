@@ -1,5 +1,6 @@
 """What an effect is: a frozen value that changes one stage of a survey, and says so in words."""
 
+import re
 from dataclasses import MISSING, asdict, dataclass, fields, replace
 from typing import Any, ClassVar
 
@@ -25,7 +26,7 @@ class Effect:
         and ``width`` (s, from Reference.start) make it an event, ``phase`` (rad) a wave, of which
         both quadratures are estimated, and ``target`` an error of the target of that name.
     name : str
-        In files, of the class, as all that follow.
+        In files, of the class, as all that follow; unless it says another, range_bias of RangeBias.
     stage : str
         Of STAGES.
     title : str
@@ -64,6 +65,10 @@ class Effect:
     sides: ClassVar[tuple] = ("", "")
     parts: ClassVar[tuple[str, ...]] = ("magnitude",)
     worded_unit: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        if "name" not in vars(cls):
+            cls.name = re.sub("(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
 
     def __post_init__(self):
         for name, kind in self.quantities().items():

@@ -22,7 +22,6 @@ class AngleScale(Effect):
         Units: ratio.
     """
 
-    name: ClassVar = "angle_scale"
     stage: ClassVar = "angle"
     title: ClassVar = "Encoder scale"
     meaning: ClassVar = "Scan angles are wrong in proportion to the angle from the zero beam."
@@ -54,7 +53,6 @@ class AngleEccentricity(Effect):
         Angle from the zero beam at which the error rises through zero. Units: rad.
     """
 
-    name: ClassVar = "angle_eccentricity"
     stage: ClassVar = "angle"
     title: ClassVar = "Encoder off its axis"
     meaning: ClassVar = "Scan angles are wrong by a wave that comes once a turn."
@@ -87,7 +85,6 @@ class AngleNoise(Effect):
         Units: deg.
     """
 
-    name: ClassVar = "angle_noise"
     stage: ClassVar = "angle"
     random: ClassVar = True
     title: ClassVar = "Noisy scan angles"

@@ -24,7 +24,6 @@ class Boresight(Effect):
         Right, forward and up. Units: deg.
     """
 
-    name: ClassVar = "boresight"
     stage: ClassVar = "mounting"
     title: ClassVar = "Boresight"
     meaning: ClassVar = "The scanner is turned otherwise than the recorded mounting says."
@@ -60,7 +59,6 @@ class LeverArm(Effect):
         Right, forward and up. Units: m.
     """
 
-    name: ClassVar = "lever_arm"
     stage: ClassVar = "mounting"
     title: ClassVar = "Lever arm"
     meaning: ClassVar = "The scanner sits elsewhere on the vehicle than the recorded mounting says."

@@ -20,7 +20,6 @@ class BeamDivergence(Effect):
         Units: mrad.
     """
 
-    name: ClassVar = "beam_divergence"
     stage: ClassVar = "beam"
     title: ClassVar = "Wide beam"
     meaning: ClassVar = "The laser's footprint is wider than stated."
@@ -49,7 +48,6 @@ class RangeScale(Effect):
         Units: ratio.
     """
 
-    name: ClassVar = "range_scale"
     stage: ClassVar = "range"
     title: ClassVar = "Range scale"
     meaning: ClassVar = "Distances are wrong in proportion to their length."
@@ -78,7 +76,6 @@ class RangeBias(Effect):
         Units: m.
     """
 
-    name: ClassVar = "range_bias"
     stage: ClassVar = "range"
     title: ClassVar = "Range bias"
     meaning: ClassVar = "All distances that the scanner measures are wrong by a constant."
@@ -112,7 +109,6 @@ class RangeWalk(Effect):
         At which nothing is added. Units: counts of 16 bits.
     """
 
-    name: ClassVar = "range_walk"
     stage: ClassVar = "range"
     title: ClassVar = "Range walk"
     meaning: ClassVar = "Distances depend on how bright the return is."
@@ -156,7 +152,6 @@ class IncidenceBias(Effect):
         Units: m.
     """
 
-    name: ClassVar = "incidence_bias"
     stage: ClassVar = "range"
     title: ClassVar = "Incidence bias"
     meaning: ClassVar = "Distances depend on the angle at which the beam meets the surface."
@@ -188,7 +183,6 @@ class RangeNoise(Effect):
         Units: m.
     """
 
-    name: ClassVar = "range_noise"
     stage: ClassVar = "range"
     random: ClassVar = True
     title: ClassVar = "Noisy ranges"
@@ -223,7 +217,6 @@ class Dropout(Effect):
         Units: ratio.
     """
 
-    name: ClassVar = "dropout"
     stage: ClassVar = "return"
     random: ClassVar = True
     title: ClassVar = "Lost returns"

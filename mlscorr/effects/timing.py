@@ -22,7 +22,6 @@ class TimeOffset(Effect):
         Units: s.
     """
 
-    name: ClassVar = "time_offset"
     stage: ClassVar = "clock"
     title: ClassVar = "Scanner clock offset"
     meaning: ClassVar = "The clocks of scanner and POS differ by a constant."
@@ -54,7 +53,6 @@ class ClockDrift(Effect):
         Units: s per s.
     """
 
-    name: ClassVar = "clock_drift"
     stage: ClassVar = "clock"
     title: ClassVar = "Scanner clock drift"
     meaning: ClassVar = "The clock of the scanner runs faster or slower than the clock of the POS."
@@ -83,7 +81,6 @@ class TimeJitter(Effect):
         Units: s.
     """
 
-    name: ClassVar = "time_jitter"
     stage: ClassVar = "clock"
     random: ClassVar = True
     title: ClassVar = "Noisy time stamps"

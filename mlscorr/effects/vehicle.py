@@ -27,7 +27,6 @@ class HeadingDrift(Effect):
         Units: deg.
     """
 
-    name: ClassVar = "heading_drift"
     stage: ClassVar = "pos"
     title: ClassVar = "Heading drift"
     meaning: ClassVar = "The heading of the POS drifts away in the course of each pass."
@@ -75,7 +74,6 @@ class PositionStep(Effect):
         When it lies in no pass.
     """
 
-    name: ClassVar = "position_step"
     stage: ClassVar = "pos"
     title: ClassVar = "GNSS jump"
     meaning: ClassVar = (
@@ -130,7 +128,6 @@ class PositionBump(Effect):
         When the time is in no pass.
     """
 
-    name: ClassVar = "position_bump"
     stage: ClassVar = "pos"
     title: ClassVar = "Passing GNSS error"
     meaning: ClassVar = (
@@ -184,7 +181,6 @@ class PositionNoise(Effect):
         Units: m.
     """
 
-    name: ClassVar = "position_noise"
     stage: ClassVar = "pos"
     random: ClassVar = True
     title: ClassVar = "Noisy positions"

@@ -131,9 +131,8 @@ class PlainWriter:
         moved = self._output.tell() - layout.tail
         file.seek(layout.tail)
         shutil.copyfileobj(file, self._output, SETTINGS.copied_bytes)
-        positions = (227, 235)[
-            : max(0, layout.version[1] - 2)
-        ]  # of waveforms, since 1.3, and EVLRs
+        # of waveforms, since 1.3, and EVLRs
+        positions = (227, 235)[: max(0, layout.version[1] - 2)]
         for position in positions:
             value = layout.field("Q", position)[0]
             if value >= layout.tail:

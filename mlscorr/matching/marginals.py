@@ -10,16 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mlscorr.matching import hypotheses
 from mlscorr.matching.beliefs import Chain
 from mlscorr.matching.branching import heaviest, use
-from mlscorr.matching.hypotheses import (
-    Hypotheses,
-    displacement,
-    log_likelihoods,
-    predict,
-    select,
-    start,
-)
 from mlscorr.matching.settings import COMPILED, INNER
 
 
@@ -67,23 +60,23 @@ def _smooth(chain, result):
     """
     n = len(chain.gps_time)
     length = int(np.ceil(np.sqrt(n)))
-    now = start(chain)
+    now = hypotheses.start(chain)
     begins = [now]
     for row in range(1, n):
-        now = predict(use(now, chain, row - 1), chain, row - 1, row)
+        now = hypotheses.predict(use(now, chain, row - 1), chain, row - 1, row)
         if row % length == 0:
             begins.append(now)
-    future = start(chain)
+    future = hypotheses.start(chain)
     for part in range(len(begins) - 1, -1, -1):
         first, last = part * length, min((part + 1) * length, n) - 1
         past = [heaviest(begins[part], chain)]
         now = begins[part]
         for row in range(first + 1, last + 1):
-            now = predict(use(now, chain, row - 1), chain, row - 1, row)
+            now = hypotheses.predict(use(now, chain, row - 1), chain, row - 1, row)
             past.append(heaviest(now, chain))
         for row in range(last, first - 1, -1):
             if row + 1 < n:
-                future = predict(use(future, chain, row + 1), chain, row + 1, row)
+                future = hypotheses.predict(use(future, chain, row + 1), chain, row + 1, row)
             _fill(join(past[row - first], heaviest(future, chain), chain), chain, row, result)
 
 
@@ -92,7 +85,7 @@ def _fill(both, chain, row, result):
     """Fill in the marginals of an observation."""
     if len(both.weight) == 0:
         return  # past and future agree in no belief: nothing is said
-    density = log_likelihoods(both, chain, row)
+    density = hypotheses.log_likelihoods(both, chain, row)
     k, first = density.shape[1] // 2, chain.pairs.first[row]
     _normalize(density.reshape(-1))
     for hypothesis in range(len(density)):
@@ -101,7 +94,7 @@ def _fill(both, chain, row, result):
             result.moved[first + choice] += density[hypothesis, k + choice]
     share = both.weight
     _normalize(share)
-    value, variance = displacement(both, chain, row)
+    value, variance = hypotheses.displacement(both, chain, row)
     for axis in range(3):
         expected, square = 0.0, 0.0
         for hypothesis in range(len(share)):
@@ -126,7 +119,9 @@ def _normalize(weight):
 
 
 @njit(**COMPILED)
-def join(before: Hypotheses, after: Hypotheses, chain: Chain) -> Hypotheses:
+def join(
+    before: hypotheses.Hypotheses, after: hypotheses.Hypotheses, chain: Chain
+) -> hypotheses.Hypotheses:
     """Pairs (past, future) of hypotheses of one belief, joined; their prior counts once.
 
     With precisions L and means m, L = L1 + L2 - I and L m = L1 m1 + L2 m2. Both windows are
@@ -140,7 +135,7 @@ def join(before: Hypotheses, after: Hypotheses, chain: Chain) -> Hypotheses:
     """
     rows, others = _of_one_belief(before, after)
     w = len(before.window)
-    both = select(before, rows, w, w + len(after.window))
+    both = hypotheses.select(before, rows, w, w + len(after.window))
     precisions, vectors, weights = _information(before)
     later_precisions, later_vectors, later_weights = _information(after)
     precision, vector = np.empty((3, 3)), np.empty(3)

@@ -16,15 +16,9 @@ from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stat
 from mlscorr.io.nearness import far_cloud
 from mlscorr.io.preparation import glance
 from mlscorr.io.survey_file import read_survey
+from mlscorr.pipeline import needs
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
 from mlscorr.pipeline.near_points import check_control
-from mlscorr.pipeline.needs import (
-    Amount,
-    amounts_needed,
-    amounts_read,
-    amounts_written,
-    sample_clouds,
-)
 from mlscorr.pipeline.quick_look import QuickLook, look_near_control
 from mlscorr.survey import Survey
 
@@ -51,9 +45,9 @@ class CheckedSurvey:
     warnings: tuple[str, ...]
     notes: tuple[str, ...] = ()
     unchecked: tuple[str, ...] = ()
-    read: tuple[Amount, ...] = ()
-    written: tuple[Amount, ...] = ()
-    needed: tuple[Amount, ...] = ()
+    read: tuple[needs.Amount, ...] = ()
+    written: tuple[needs.Amount, ...] = ()
+    needed: tuple[needs.Amount, ...] = ()
 
 
 def check(path: str | Path) -> CheckedSurvey:
@@ -109,7 +103,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
             faults.add("data", sentence)
         elif sentence:  # by a header, which may be wrong
             faults.warn(sentence)
-    sample = faults.of("data", sample_clouds, survey)
+    sample = faults.of("data", needs.sample_clouds, survey)
     for sentence in sample.warnings if sample else ():
         faults.warn(sentence)
     probe, notes, unchecked = _looked(survey, faults, needs_control)
@@ -118,9 +112,9 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
         warnings=tuple(faults.warnings),
         notes=(*survey.notes, *notes),
         unchecked=unchecked,
-        read=amounts_read(survey, passes),
-        written=amounts_written(survey),
-        needed=amounts_needed(survey, sample, probe) if sample else (),
+        read=needs.amounts_read(survey, passes),
+        written=needs.amounts_written(survey),
+        needed=needs.amounts_needed(survey, sample, probe) if sample else (),
     )
 
 

@@ -17,9 +17,8 @@ class Settings:
     scanned_stride: int = 10  # points; balls of metres about targets hold hundreds
     tile_overlap: float = 0.1  # share of the shorter file's time; more: two scanners, not tiles
     looked_points: int = 8  # surveyed points looked at before a run: seconds, and enough to tell
-    looked_seconds: float = (
-        8.0  # s, of which a look at fewer of them is made where targets are dense
-    )
+    # s, of which a look at fewer of them is made where targets are dense
+    looked_seconds: float = 8.0
     looked_length: float = 15.0  # m, of the way to either side of one: beams may look 45 deg ahead
     listed_files: int = 5  # files; more are written as a pattern
     # Lines a second

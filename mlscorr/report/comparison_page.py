@@ -7,18 +7,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from mlscorr.report import style
 from mlscorr.report.comparison_screen import ranking, undetermined
 from mlscorr.report.pages import Page, data_uri
-from mlscorr.report.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    VERMILLION,
-    legend_above,
-    new_figure,
-    styled,
-    svg,
-)
 
 SECTIONS = {  # in their order; one without anything to show is left out
     "scores": "What remains",
@@ -29,10 +20,10 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "unseen": "Not seen",
 }
 KINDS = {  # colour, mark and words
-    "none": (GREY, "x", "as recorded"),
-    "one move": (VERMILLION, "s", "one move of the whole cloud, blind to time"),
-    "over time": (GREEN, "^", "polynomials and interpolation over time"),
-    "collocation": (BLUE, "o", "collocation: polynomials and the POS's own error over time"),
+    "none": (style.GREY, "x", "as recorded"),
+    "one move": (style.VERMILLION, "s", "one move of the whole cloud, blind to time"),
+    "over time": (style.GREEN, "^", "polynomials and interpolation over time"),
+    "collocation": (style.BLUE, "o", "collocation: polynomials and the POS's own error over time"),
 }
 
 
@@ -56,7 +47,7 @@ def write_comparison(path: str | Path, document: dict) -> None:
         "figure": bool(ranked),
         "unseen": bool(document["unseen"]),
     }
-    figures = {"comparison": data_uri(svg(comparison_figure(document)))} if ranked else {}
+    figures = {"comparison": data_uri(style.svg(comparison_figure(document)))} if ranked else {}
     content = {
         "document": document,
         "by": by,
@@ -75,7 +66,7 @@ def write_comparison(path: str | Path, document: dict) -> None:
     ).write(path)
 
 
-@styled
+@style.styled
 def comparison_figure(document: dict) -> Figure:
     """RMSE of every method on each axis, the best at the top; a logarithmic scale in m.
 
@@ -85,7 +76,7 @@ def comparison_figure(document: dict) -> Figure:
         The content of compare.json.
     """
     ranked, by = ranking(document), document["scored_by"]
-    figure = new_figure(1.6 + 0.27 * len(ranked))
+    figure = style.new_figure(1.6 + 0.27 * len(ranked))
     panels = figure.subplots(1, 3, sharey=True, sharex=True)
     values = np.maximum([row[by]["rmse"] for row in ranked], 1e-4)  # m, the left end at least
     places = np.arange(len(ranked))
@@ -95,7 +86,7 @@ def comparison_figure(document: dict) -> Figure:
         for place, row, value in zip(places, ranked, column, strict=True):
             color, mark, _ = KINDS[row["kind"]]
             panel.plot(value, place, mark, color=color, markersize=5.5, zorder=3)
-        panel.axvline(column.min(), color=BLUE, linewidth=0.7, linestyle=":", zorder=2)
+        panel.axvline(column.min(), color=style.BLUE, linewidth=0.7, linestyle=":", zorder=2)
         panel.set_title(("East", "North", "Height")[axis])
         panel.set_xlim(values.min() / 1.6, values.max() * 1.6)
         _ticks_in_words(panel)
@@ -107,7 +98,7 @@ def comparison_figure(document: dict) -> Figure:
         for name, (color, mark, words) in KINDS.items()
         if any(row["kind"] == name for row in ranked)
     ]
-    legend_above(figure, handles, columns=2)
+    style.legend_above(figure, handles, columns=2)
     return figure
 
 

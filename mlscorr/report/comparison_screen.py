@@ -7,14 +7,7 @@ from typing import Any
 
 from mlscorr.effects.wording import joined
 from mlscorr.evaluate.rows import PointCounts, TargetRow
-from mlscorr.report import tables
-from mlscorr.report.headline import (
-    Statement,
-    check_statement,
-    control_statement,
-    statements_section,
-    warning_statements,
-)
+from mlscorr.report import headline, tables
 from mlscorr.report.settings import SETTINGS
 
 COLLOCATION = "lsc"
@@ -37,14 +30,14 @@ def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[s
     facts = [
         _best(document),
         _scored(document),
-        check_statement(PointCounts.of(rows, "check")),
-        control_statement(PointCounts.of(rows, "control")),
+        headline.check_statement(PointCounts.of(rows, "check")),
+        headline.control_statement(PointCounts.of(rows, "control")),
         *_undetermined(document),
-        *warning_statements(
+        *headline.warning_statements(
             f"{row['name']}: {text}" for row in document["methods"] for text in row["warnings"]
         ),
     ]
-    return statements_section(facts)
+    return headline.statements_section(facts)
 
 
 def _best(document):
@@ -53,21 +46,21 @@ def _best(document):
     ranked = ranking(document)
     is_tested = document["scored_by"] != "control" and ranked and ranked[0]["name"] != "raw"
     items = tuple(("", sentence) for sentence in more)
-    return Statement("Result", "green" if is_tested else "amber", first, items)
+    return headline.Statement("Result", "green" if is_tested else "amber", first, items)
 
 
 def _scored(document):
     """What the scores rest on."""
     rating = "amber" if document["scored_by"] == "control" else "green"
-    return Statement("Scores", rating, basis(document))
+    return headline.Statement("Scores", rating, basis(document))
 
 
-def _undetermined(document) -> Iterator[Statement]:
+def _undetermined(document) -> Iterator[headline.Statement]:
     """Methods without a score."""
     absent = undetermined(document)
     if absent:
         count = f"{len(absent)} of {len(document['methods'])} methods have no score."
-        yield Statement("Not determined", "amber", count, tuple(absent))
+        yield headline.Statement("Not determined", "amber", count, tuple(absent))
 
 
 def undetermined(document: dict) -> list[tuple[str, str]]:

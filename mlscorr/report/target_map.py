@@ -9,21 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mlscorr.correction import Correction
+from mlscorr.report import style
 from mlscorr.report.correction_report import GROUPS, CorrectionReport, array, ordered
 from mlscorr.report.map_frame import frame, track
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.style import (
-    AFTER,
-    BEFORE,
-    MARKS,
-    TRACK,
-    label,
-    legend_above,
-    mark_handles,
-    new_figure,
-    nice,
-    styled,
-)
 
 WORDS = {"control": "Control point", "check": "Check point", "unused": "Not used"}
 NEXT: dict[str, Any] = {
@@ -36,7 +25,7 @@ NEXT: dict[str, Any] = {
 NEXT_WORDS = "Where another control point helps most"
 
 
-@styled
+@style.styled
 def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     """Plan of the trajectory and the targets with residual arrows before and after.
 
@@ -54,13 +43,13 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     tips = array(arrows, "surveyed")[:, :2] + times * array(arrows, "before")[:, :2]
     low, high, strip = _bounds(np.vstack([points, tips]), extent)
     width, height = high - low
-    figure = new_figure(1.25 + (SETTINGS.figure_width - 1.1) * height / width)
+    figure = style.new_figure(1.25 + (SETTINGS.figure_width - 1.1) * height / width)
     axes = figure.add_subplot()
-    axes.plot(*way.T, **TRACK)
+    axes.plot(*way.T, **style.TRACK)
     short = _arrows(axes, arrows, times, 0.008 * width) if times else 0  # hides under its mark
     for group in GROUPS[::-1]:
         places = array(ordered(rows, group), "surveyed")
-        axes.plot(*places[:, :2].T, linestyle="none", **MARKS[group])
+        axes.plot(*places[:, :2].T, linestyle="none", **style.MARKS[group])
     _names(axes, rows, width)
     mark_places(axes, [(place.easting, place.northing) for place in report.next_control])
     frame(axes, low, high)
@@ -68,7 +57,7 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     _key(axes, low, high, strip, times)
     handles = _legend(rows, len(arrows), times, short)
     handles += [Line2D([], [], label=NEXT_WORDS, **NEXT)] * bool(report.next_control)
-    legend_above(figure, handles)
+    style.legend_above(figure, handles)
     return figure
 
 
@@ -93,7 +82,7 @@ def mark_places(axes: Axes, places: Sequence[tuple[float, float]]) -> None:
 def _enlargement(residuals, extent):
     """How many times the arrows are larger than the map: 1, 2, 5, 10, ...; 0 without arrows."""
     longest = np.hypot(*residuals.T).max(initial=0.0)
-    return nice(SETTINGS.longest_arrow * extent / longest) if longest > 0 else 0.0
+    return style.nice(SETTINGS.longest_arrow * extent / longest) if longest > 0 else 0.0
 
 
 def _bounds(points, extent):
@@ -115,7 +104,7 @@ def _arrows(axes, rows, times, shortest):
     Returns how many after the correction are too short to draw.
     """
     place = array(rows, "surveyed")[:, :2]
-    for name, color, width in (("before", BEFORE, 0.026), ("after", AFTER, 0.018)):
+    for name, color, width in (("before", style.BEFORE, 0.026), ("after", style.AFTER, 0.018)):
         residual = times * array(rows, name)[:, :2]
         long = np.hypot(*residual.T) > shortest
         _quiver(axes, place[long], residual[long], color, width)
@@ -123,16 +112,16 @@ def _arrows(axes, rows, times, shortest):
 
 
 def _quiver(axes, place, vector, color, width):
-    style = {"units": "inches", "angles": "xy", "scale_units": "xy", "scale": 1.0, "zorder": 3}
+    symbol = {"units": "inches", "angles": "xy", "scale_units": "xy", "scale": 1.0, "zorder": 3}
     heads = {"headwidth": 4.5, "headlength": 5.0}
-    axes.quiver(*place.T, *vector.T, color=color, width=width, **style, **heads)
+    axes.quiver(*place.T, *vector.T, color=color, width=width, **symbol, **heads)
 
 
 def _names(axes, rows, width):
     """Each target's name once, beside its arrow; left out where it would cover another name."""
     taken, letter = np.empty((0, 4)), np.array([0.0105, 0.018]) * width  # m on the map
     for name, row in {row.name: row for row in rows[::-1]}.items():
-        text = label(name)
+        text = style.label(name)
         side = -1 if row.before[0] > 0 else 1
         half = letter * [len(text) / 2, 0.5]
         middle = np.add(row.surveyed[:2], [side * (half[0] + letter[0]), 0.0])
@@ -160,12 +149,12 @@ def _key(axes, low, high, strip, times):
     axes.axhline(low[1] + strip, color="#bbbbbb", linewidth=0.6, zorder=2.6)
     middle, top = low[1] + 0.35 * strip, low[1] + 0.62 * strip
     text = {"horizontalalignment": "left", "verticalalignment": "center", "fontsize": 8.5}
-    bar, west = nice(0.22 * width), low[0] + 0.03 * width
+    bar, west = style.nice(0.22 * width), low[0] + 0.03 * width
     axes.plot([west, west + bar], [middle] * 2, color="black", linewidth=3, zorder=3)
     axes.text(west, top, f"{bar:g} m on the map", **text)
     if times:
         west = low[0] + 0.36 * width
-        length = nice(SETTINGS.longest_arrow * width / times)
+        length = style.nice(SETTINGS.longest_arrow * width / times)
         _quiver(axes, np.array([[west, middle]]), np.array([[times * length, 0]]), "black", 0.02)
         axes.text(
             west, top, f"Residual of {length:g} m (arrows enlarged {times:,.0f} times)", **text
@@ -185,10 +174,13 @@ def _key(axes, low, high, strip, times):
 
 def _legend(rows, arrows, times, short):
     """Legend entries of what is really drawn."""
-    handles = [Line2D([], [], label="Trajectory (corrected)", **TRACK)]
-    handles += mark_handles(WORDS, {row.group for row in rows})
+    handles = [Line2D([], [], label="Trajectory (corrected)", **style.TRACK)]
+    handles += style.mark_handles(WORDS, {row.group for row in rows})
     if times:
         hidden = f" ({short} of {arrows} too short to show)" if short else ""
-        for text, color in (("Residual before", BEFORE), (f"Residual after{hidden}", AFTER)):
+        for text, color in (
+            ("Residual before", style.BEFORE),
+            (f"Residual after{hidden}", style.AFTER),
+        ):
             handles.append(Line2D([], [], color=color, linewidth=2.5, label=text))
     return handles

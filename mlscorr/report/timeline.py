@@ -9,24 +9,9 @@ from matplotlib.patches import Patch
 
 from mlscorr.correction import Correction
 from mlscorr.frames import angles_from_attitude
+from mlscorr.report import style
 from mlscorr.report.correction_report import CorrectionReport, array, ordered
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.style import (
-    BAND,
-    BLUE,
-    GAP,
-    GREY,
-    MARKS,
-    OUTAGE,
-    OUTSIDE,
-    STEP,
-    break_at_gaps,
-    legend_above,
-    mark_handles,
-    new_figure,
-    styled,
-    thin,
-)
 
 WORDS = {
     "control": "Control point: misclosure before, 1 sigma",
@@ -42,7 +27,7 @@ def attitude_change(correction: Correction) -> np.ndarray:
     return np.degrees((corrected - recorded + np.pi) % (2 * np.pi) - np.pi)
 
 
-@styled
+@style.styled
 def correction_figure(correction: Correction, report: CorrectionReport) -> Figure:
     """Correction of the position in three panels, with misclosures before as marks.
 
@@ -61,7 +46,7 @@ def correction_figure(correction: Correction, report: CorrectionReport) -> Figur
     return figure
 
 
-@styled
+@style.styled
 def attitude_figure(correction: Correction, report: CorrectionReport) -> Figure:
     """Correction of roll, pitch and heading in three panels.
 
@@ -81,7 +66,7 @@ def attitude_figure(correction: Correction, report: CorrectionReport) -> Figure:
 
 def _figure(height, correction, report, change, sigma, rows):
     """Curves (n, 3) with sigma (n, 3) or None, over them the marks of rows of targets."""
-    figure, new = new_figure(height), correction.corrected
+    figure, new = style.new_figure(height), correction.corrected
     panels = figure.subplots(3, 1, sharex=True)
     span = report.coverage.control_span
     for axis, panel in enumerate(panels):
@@ -95,7 +80,7 @@ def _figure(height, correction, report, change, sigma, rows):
     _shade(panels, new, span, report.support)
     groups = {row.group for row in rows}
     handles = _legend(new, groups, report.support, sigma is not None)
-    legend_above(figure, handles, columns=2)
+    style.legend_above(figure, handles, columns=2)
     return figure
 
 
@@ -109,13 +94,13 @@ def _curve(panel, trajectory, change, sigma, span):
     time, gaps = trajectory.gps_time, trajectory.gaps
     band = np.zeros_like(change) if sigma is None else sigma
     curves = np.column_stack([change - band, change, change + band])
-    rows = thin(curves, time, gaps)
-    at, broken = break_at_gaps(time[rows], gaps, curves[rows])
+    rows = style.thin(curves, time, gaps)
+    at, broken = style.break_at_gaps(time[rows], gaps, curves[rows])
     at = at - _start(trajectory)
-    panel.axhline(0.0, color=GREY, linewidth=0.8)
+    panel.axhline(0.0, color=style.GREY, linewidth=0.8)
     if sigma is not None:
-        panel.fill_between(at, broken[:, 0], broken[:, 2], **BAND)
-    panel.plot(at, broken[:, 1], color=BLUE)
+        panel.fill_between(at, broken[:, 0], broken[:, 2], **style.BAND)
+    panel.plot(at, broken[:, 1], color=style.BLUE)
     inside = (time >= span[0]) & (time <= span[1])
     inside |= not inside.any()
     return [0.0, curves[inside, 0].min(), curves[inside, 2].max()]
@@ -125,8 +110,8 @@ def _marks(panel, trajectory, rows, axis, group):
     """Draw misclosures of a group with sigma; returns the values to show."""
     time = np.array([row.gps_time for row in rows]) - _start(trajectory)
     value, sigma = array(rows, "before")[:, axis], np.nan_to_num(array(rows, "sigma")[:, axis])
-    style = {"linestyle": "none", "elinewidth": 0.9, "capsize": 2.0, **MARKS[group]}
-    panel.errorbar(time, value, sigma, **style)
+    symbol = {"linestyle": "none", "elinewidth": 0.9, "capsize": 2.0, **style.MARKS[group]}
+    panel.errorbar(time, value, sigma, **symbol)
     return [*(value - sigma), *(value + sigma)]
 
 
@@ -136,8 +121,8 @@ def _unused(panel, trajectory, rows, axis):
     for row in rows:
         value = row.before[axis]
         marker = "v" if value < low else "^" if value > high else "x"
-        style = {**MARKS["unused"], "marker": marker, "clip_on": False, "zorder": 4}
-        panel.plot(row.gps_time - _start(trajectory), np.clip(value, low, high), **style)
+        symbol = {**style.MARKS["unused"], "marker": marker, "clip_on": False, "zorder": 4}
+        panel.plot(row.gps_time - _start(trajectory), np.clip(value, low, high), **symbol)
 
 
 def _set_range(panel, values, change):
@@ -154,16 +139,21 @@ def _shade(panels, trajectory, span, support):
     for panel in panels:
         panel.set_xlim(first - start, last - start)
         for gap in trajectory.gaps - start:
-            panel.axvspan(*gap, zorder=0.6, linewidth=0, **GAP)
+            panel.axvspan(*gap, zorder=0.6, linewidth=0, **style.GAP)
         for stretch in support.weak:
-            panel.axvspan(stretch.start - start, stretch.end - start, zorder=0.5, **OUTSIDE)
+            panel.axvspan(stretch.start - start, stretch.end - start, zorder=0.5, **style.OUTSIDE)
         low = panel.get_xaxis_transform()
         for begin, end in support.outages:  # a strip, as an outage may be extrapolated as well
             panel.fill_between(
-                np.array([begin, end]) - start, 0.0, 0.06, transform=low, zorder=0.55, **OUTAGE
+                np.array([begin, end]) - start,
+                0.0,
+                0.06,
+                transform=low,
+                zorder=0.55,
+                **style.OUTAGE,
             )
         for step in support.steps:
-            panel.axvline(step - start, **STEP)
+            panel.axvline(step - start, **style.STEP)
         for edge in span:
             panel.axvline(edge - start, color="#8a6d00", linewidth=0.8, linestyle=(0, (4, 3)))
     panels[-1].set_xlabel(f"Time since gps_time {start:.0f} s (s)")
@@ -171,16 +161,16 @@ def _shade(panels, trajectory, span, support):
 
 def _legend(trajectory, groups, support, has_sigma):
     """Legend entries of what is really drawn."""
-    handles = [Line2D([], [], color=BLUE, label="Correction")]
+    handles = [Line2D([], [], color=style.BLUE, label="Correction")]
     if has_sigma:
-        handles.append(Patch(**BAND, label="1 sigma of the corrected value"))
-    handles += mark_handles(WORDS, groups)
+        handles.append(Patch(**style.BAND, label="1 sigma of the corrected value"))
+    handles += style.mark_handles(WORDS, groups)
     if support.weak:
-        handles.append(Patch(**OUTSIDE, label="Extrapolated: no control point holds it"))
+        handles.append(Patch(**style.OUTSIDE, label="Extrapolated: no control point holds it"))
     if support.outages:
-        handles.append(Patch(**OUTAGE, label="GNSS outage: the position drifts"))
+        handles.append(Patch(**style.OUTAGE, label="GNSS outage: the position drifts"))
     if support.steps:
-        handles.append(Line2D([], [], **STEP, label="Step of the recorded position"))
+        handles.append(Line2D([], [], **style.STEP, label="Step of the recorded position"))
     if len(trajectory.gaps):
-        handles.append(Patch(linewidth=0, **GAP, label="Gap of the trajectory"))
+        handles.append(Patch(linewidth=0, **style.GAP, label="Gap of the trajectory"))
     return handles

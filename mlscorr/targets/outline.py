@@ -9,18 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mlscorr.targets import shapes
 from mlscorr.targets.sequence import quasi_normal, quasi_random
 from mlscorr.targets.settings import SETTINGS
-from mlscorr.targets.shapes import (
-    CHECKERED,
-    PERIOD,
-    ROUND,
-    distance_inside,
-    distance_on_white,
-    form_of,
-    log_likelihood,
-    sides,
-)
 
 
 @dataclass(frozen=True)
@@ -106,19 +97,19 @@ def fit_outline(
     Source: population Monte Carlo (Cappe et al. 2004) on quasi-random trials; the blur starts wide
     and halves, so that the posterior's mode is not lost.
     """
-    form, side = form_of(kind, by_edges), sides(state, kind, by_edges)
-    period = PERIOD.get(kind, 0.0)
+    form, side = shapes.form_of(kind, by_edges), shapes.sides(state, kind, by_edges)
+    period = shapes.PERIOD.get(kind, 0.0)
     count = SETTINGS.trials // (1 + rough)
     trials, free = _first_trials(start, size, period, ring, count)
     spent = np.zeros(count)  # minus log of the density they were drawn from
     width = size.mean / SETTINGS.first_blur
     mean, spread = trials.mean(axis=0), np.ptp(trials, axis=0) / 2
-    rounds = SETTINGS.rough_rounds * (1 + (form == CHECKERED) if rough else 5)
+    rounds = SETTINGS.rough_rounds * (1 + (form == shapes.CHECKERED) if rough else 5)
     for number in range(1, rounds + 1):
         near = _informative(points, mean, spread, form, max(width, blur))
         if width > blur:
             near = _thinned(near, side, count // 5)
-        value = log_likelihood(points[near], side[near], trials, form, max(width, blur))
+        value = shapes.log_likelihood(points[near], side[near], trials, form, max(width, blur))
         value += spent + _log_prior(trials, size, start, ring)
         weight, effective = _weights(value)
         mean, covariance = _moments(trials, weight, period)
@@ -129,10 +120,10 @@ def fit_outline(
             width /= 2
         drawn = SETTINGS.proposal_width**2 * covariance[np.ix_(free, free)]
         trials, spent = _next_trials(mean, drawn, free, number, count)
-    inside, marked = distance_inside(points, mean, form) > 0, side == 1
-    if form == CHECKERED:
+    inside, marked = shapes.distance_inside(points, mean, form) > 0, side == 1
+    if form == shapes.CHECKERED:
         marked &= inside
-        inside &= distance_on_white(points, mean) > 0
+        inside &= shapes.distance_on_white(points, mean) > 0
     return Outline(
         mean[:2],
         covariance[:2, :2],
@@ -205,11 +196,11 @@ def _moments(trials, weight, period):
 
 def _informative(points, mean, spread, form, width):
     """Rows of the points that can lie near the outline: all others say the same of every trial."""
-    turned = mean[3] * spread[2] * (form != ROUND)
+    turned = mean[3] * spread[2] * (form != shapes.ROUND)
     play = np.hypot(spread[0], spread[1]) + turned + spread[3] / 2 + spread[4] + 6 * width
-    distance = np.abs(distance_inside(points, mean, form))
-    if form == CHECKERED:
-        distance = np.minimum(distance, np.abs(distance_on_white(points, mean)))
+    distance = np.abs(shapes.distance_inside(points, mean, form))
+    if form == shapes.CHECKERED:
+        distance = np.minimum(distance, np.abs(shapes.distance_on_white(points, mean)))
     return np.flatnonzero(distance < play)
 
 

@@ -10,14 +10,7 @@ from mlscorr.gap.close.surroundings import Surroundings
 from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.plane_fit import place_key
 from mlscorr.gap.observe.rows import Rows
-from mlscorr.simulate.scan import (
-    Boards,
-    MeshWorld,
-    RecordedPulses,
-    aim,
-    recorded_platform,
-    recorded_pulses,
-)
+from mlscorr.simulate import scan
 from mlscorr.simulate.scenario import SceneScenario
 from mlscorr.simulate.scene import read_mesh
 from mlscorr.survey import PointCloud, Survey
@@ -55,7 +48,7 @@ class Beams:
         Units: m.
     """
 
-    pulses: RecordedPulses
+    pulses: scan.RecordedPulses
     view: np.ndarray
     item: np.ndarray
     gps_time: np.ndarray
@@ -63,10 +56,10 @@ class Beams:
     target: np.ndarray
     point: np.ndarray
     normal: np.ndarray
-    boards: Boards
+    boards: scan.Boards
     beyond: np.ndarray
     behind: np.ndarray
-    reference: MeshWorld | None
+    reference: scan.MeshWorld | None
     facet: np.ndarray
     origin: np.ndarray
 
@@ -109,7 +102,7 @@ def collect_beams(
         For rows of another survey.
     """
     origin = np.round(rows.position.mean(axis=0))
-    platform = recorded_platform(survey, origin)
+    platform = scan.recorded_platform(survey, origin)
     about = [(s, surroundings.about(platform, s, origin)) for s in sightings_of(rows, finding)]
     targets = [
         (sighting, SightedTarget.join(sighting, parts)) for sighting, parts in about if parts
@@ -157,7 +150,7 @@ def _beams(survey, rows, platform, origin, patches, targets):
     item = np.array([part.item for part in [*patches, *(sighting for sighting, _ in targets)]])
     second = np.array([patch.second for patch in patches] + [False] * len(targets))
     normal = np.array([patch.normal for patch in patches] + [np.zeros(3)] * len(targets))
-    start, direction = aim(platform, pulses.gps_time, pulses.angle, pulses.elevation)
+    start, direction = scan.aim(platform, pulses.gps_time, pulses.angle, pulses.elevation)
     point = _middle(start + pulses.range[:, None] * direction, view, len(count))
     known, row = np.unique(rows.item, return_index=True)
     nothing = np.full(int(count[: len(patches)].sum()), np.nan)
@@ -176,7 +169,7 @@ def _beams(survey, rows, platform, origin, patches, targets):
         target=np.append(np.full(len(patches), -1), np.arange(len(targets))).astype(int),
         point=point,
         normal=normal,
-        boards=Boards.concatenate(boards),
+        boards=scan.Boards.concatenate(boards),
         beyond=np.concatenate([nothing, *(about.beyond for _, about in targets)]),
         behind=np.concatenate([nothing, *(about.behind for _, about in targets)]),
         reference=reference,
@@ -192,8 +185,8 @@ def _joined(platform, origin, patches, targets):
     if patches:
         cloud = PointCloud.concatenate([patch.cloud for patch in patches])
         normals = np.repeat([patch.normal for patch in patches], count[: len(patches)], axis=0)
-        parts.insert(0, recorded_pulses(platform, cloud, origin, normals))
-    return RecordedPulses.concatenate(parts) if parts else None, np.array(count)
+        parts.insert(0, scan.recorded_pulses(platform, cloud, origin, normals))
+    return scan.RecordedPulses.concatenate(parts) if parts else None, np.array(count)
 
 
 def _middle(xyz, view, count):
@@ -207,4 +200,4 @@ def _reference(survey, rows, origin):
     if survey.reference is None or not (rows.channel == "surface").any():
         return None
     scene = SceneScenario(kind="mesh", file=survey.reference)
-    return MeshWorld(read_mesh(scene, origin))
+    return scan.MeshWorld(read_mesh(scene, origin))

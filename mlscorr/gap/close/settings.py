@@ -24,9 +24,8 @@ class Settings:
     same: float = 0.5  # of its size, from where it is expected to where it is found
     block_length: float = 5.0  # s of a block of time: the drift of seconds is held out with it
     event_share: float = 0.25  # of an event's width that a block lasts: some is left to learn from
-    block_share: float = (
-        0.8  # of a cause's squared shift: one such block leaves nothing to judge by
-    )
+    # of a cause's squared shift: one such block leaves nothing to judge by
+    block_share: float = 0.8
     folds: int = 5  # of blocks: each size is found in four fifths of them
 
 

@@ -8,19 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mlscorr.report import style
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.settings import SETTINGS
-from mlscorr.report.style import (
-    BLACK,
-    GREEN,
-    GREY,
-    ORANGE,
-    SKY,
-    VERMILLION,
-    legend_above,
-    new_figure,
-    styled,
-)
 
 WINDOW, STRIPE = "#f3d9e6", "#efefef"
 
@@ -34,11 +24,11 @@ class ChannelStyle(NamedTuple):
 
 
 CHANNELS = {
-    "target": ChannelStyle(BLACK, "o", "Targets"),
-    "surface": ChannelStyle(SKY, "s", "Surfaces against the reference"),
-    "shared": ChannelStyle(GREEN, "^", "Surfaces seen in two passes"),
-    "roughness": ChannelStyle(ORANGE, "D", "Roughness"),
-    "return_rate": ChannelStyle(VERMILLION, "v", "Return rate"),
+    "target": ChannelStyle(style.BLACK, "o", "Targets"),
+    "surface": ChannelStyle(style.SKY, "s", "Surfaces against the reference"),
+    "shared": ChannelStyle(style.GREEN, "^", "Surfaces seen in two passes"),
+    "roughness": ChannelStyle(style.ORANGE, "D", "Roughness"),
+    "return_rate": ChannelStyle(style.VERMILLION, "v", "Return rate"),
 }
 
 
@@ -50,7 +40,9 @@ def channel_style(channel: str) -> ChannelStyle:
     channel : str
         As rows have it.
     """
-    return CHANNELS.get(channel, ChannelStyle(GREY, "x", channel.replace("_", " ").capitalize()))
+    return CHANNELS.get(
+        channel, ChannelStyle(style.GREY, "x", channel.replace("_", " ").capitalize())
+    )
 
 
 def passes_of(gps_time: np.ndarray) -> np.ndarray:
@@ -74,7 +66,7 @@ def passes_of(gps_time: np.ndarray) -> np.ndarray:
     return np.array([[part[0], part[-1]] for part in np.split(time, cut)])
 
 
-@styled
+@style.styled
 def innovations_figure(document: dict) -> Figure:
     """Innovations before (top) and after (bottom), each pass in a panel of its own.
 
@@ -91,7 +83,7 @@ def innovations_figure(document: dict) -> Figure:
     if len(passes) > SETTINGS.panels:
         passes = np.array([[passes[0, 0], passes[-1, 1]]])
     width = np.maximum(np.diff(passes)[:, 0], 0.12 * np.diff(passes).max())
-    figure = new_figure(4.6)
+    figure = style.new_figure(4.6)
     figure.set_dpi(180)  # of the marks, which are drawn as a picture
     panels = figure.subplots(
         2, len(passes), sharey=True, sharex="col", squeeze=False, width_ratios=np.maximum(width, 1)
@@ -108,20 +100,20 @@ def innovations_figure(document: dict) -> Figure:
     for number, (panel, (start, _)) in enumerate(zip(panels[1], passes, strict=True), start=1):
         text = f"s after gps_time {start:.0f} s"
         panel.set_xlabel(f"Pass {number}: s after {start:.0f}" if len(passes) > 1 else text)
-    legend_above(figure, _legend(styles, windows))
+    style.legend_above(figure, _legend(styles, windows))
     return figure
 
 
 def _draw(panel, time, values, channel, styles, limit):
     stripe = SETTINGS.stripe_sigmas
     panel.axhspan(-stripe, stripe, color=STRIPE, zorder=0.5)
-    panel.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
+    panel.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
     for line in (-stripe, stripe):
-        panel.axhline(line, color=GREY, linewidth=0.7, linestyle="--", zorder=1)
-    for name, style in styles.items():
+        panel.axhline(line, color=style.GREY, linewidth=0.7, linestyle="--", zorder=1)
+    for name, symbol in styles.items():
         rows, is_target = channel == name, name == "target"
         panel.plot(
-            time[rows], np.clip(values[rows], -limit, limit), style.mark, color=style.color,
+            time[rows], np.clip(values[rows], -limit, limit), symbol.mark, color=symbol.color,
             markersize=4.0 if is_target else 2.2, markeredgewidth=0, alpha=0.75, rasterized=True,
             zorder=4 if is_target else 3,
         )  # fmt: skip

@@ -102,9 +102,8 @@ class CentreLine:
             Along the line, from which on a place is of another part. Units: m.
         """
         lengths, tree = self._samples
-        near, number = tree.query(
-            points[:, :2], 64, distance_upper_bound=10.0
-        )  # three parts within
+        # three parts within
+        near, number = tree.query(points[:, :2], 64, distance_upper_bound=10.0)
         ahead = np.append(lengths, np.inf)[number] - s[:, None]
         other = ahead < -apart if earlier else np.abs(ahead) > apart
         return np.where(other & np.isfinite(near), near, np.inf).min(axis=1)
@@ -178,9 +177,8 @@ def line_along(position: np.ndarray, smoothing: float = 3.0) -> tuple[CentreLine
     lengths = np.linspace(0.0, s[-1], round(s[-1]) + 1)
     path = np.column_stack([np.interp(lengths, s, column) for column in path.T])
     path = _extend(gaussian_filter1d(_extend(path), smoothing, axis=0, mode="nearest"))
-    ends = 2 * round(
-        SETTINGS.margin
-    )  # of two extensions; the outer keeps the filter's own ends away
+    # of two extensions; the outer keeps the filter's own ends away
+    ends = 2 * round(SETTINGS.margin)
     s = _lengths(path)
     return CentreLine(CubicSpline(s - s[ends], path)), s[-1 - ends] - s[ends]
 

@@ -108,9 +108,8 @@ def place_targets(
     count = scenario.control + scenario.check
     s = _along(scenario, count, length, rng)
     start_side = rng.choice([-1, 1])
-    order = np.concatenate(
-        [rng.permutation(len(scenario.supports)) for _ in range(count)]  # all in turn, at random
-    )
+    # all in turn, at random
+    order = np.concatenate([rng.permutation(len(scenario.supports)) for _ in range(count)])
     steps = np.array([0, 0.03, -0.03, 0.08, -0.08, 0.15, -0.15, 0.25, -0.25, 0.4, -0.4])
     spots: list[TargetSpot] = []
     kinds, unplaced = [], []
