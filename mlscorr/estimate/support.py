@@ -143,10 +143,12 @@ def _reasons(equations, solved, parameters, corrected):
     """
     trajectory, stated = equations.trajectory, equations.stated_epochs
     time, control = trajectory.gps_time, np.sort(equations.observed)
+    if len(control) == 0:
+        return np.full(len(time), NO_CONTROL)
     is_open = _is_drift_open(equations, solved, parameters, corrected)
     codes = np.where(is_open, DRIFT, HELD)
     if equations.ties is not None:
-        return codes if len(control) else np.full(len(time), NO_CONTROL)
+        return codes
     for first, last in pairwise(equations.stated.history.edges):
         rows = (time > first) & (time <= last) & (stated.since > 0)
         inside = control[(control > first) & (control <= last)]

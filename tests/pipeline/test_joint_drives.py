@@ -205,6 +205,16 @@ def test_pieces_hold_what_lies_in_their_area(drives):
             assert piece.control.sum() == len(piece.drive.control)
 
 
+def test_an_area_where_nothing_was_seen_corrects_nothing(drives):
+    "Without planes and control a drive through two areas stays as it is, and that is said"
+    drive = drives[1]
+    contents = replace(drive.contents, features=drive.contents.features[[]])
+    areas, bare = cut(drives), replace(drive, contents=contents)
+    ((corrected, state),) = drives_by_areas([bare], areas, 1, ORIGIN)
+    assert state.state == "uncorrected" and np.abs(added(corrected)).max() < 1e-9
+    assert {stretch.why for stretch in corrected.held[1].weak} == {"its pass has no control point"}
+
+
 def test_nothing_corrects_a_drive_elsewhere(drives):
     "Without control and overlap a drive stays as it is, and that is said; the other is by itself"
     first, second = drives
@@ -212,6 +222,7 @@ def test_nothing_corrects_a_drive_elsewhere(drives):
     corrected, state = apart["second"]
     assert state.state == "uncorrected" and not state.tied_with
     assert np.abs(added(corrected)).max() < 1e-9
+    assert {stretch.why for stretch in corrected.held[1].weak} == {"its pass has no control point"}
     alone = results([first])["first"][0]
     assert np.array_equal(added(apart["first"][0]), added(alone))
     assert apart["first"][1].state == "controlled"
