@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mlscorr.blind.mix import RANDOM
+from mlscorr.effects.catalogue import RANDOM
 from mlscorr.gap.infer.settings import SETTINGS
 
 

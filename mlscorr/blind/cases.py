@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.blind.grading import grading_mechanisms
-from mlscorr.blind.mix import RANDOM, SYSTEMATIC, Case
+from mlscorr.blind.mix import Case
 from mlscorr.blind.settings import SETTINGS
-from mlscorr.effects import EFFECTS
+from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
@@ -20,7 +20,6 @@ from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
 from mlscorr.io.survey_file import read_survey
 from mlscorr.simulate.mechanisms import load_mechanisms
 
-KINDS = {kind.name: kind for kind in EFFECTS}
 TRUTH = ("truth.json", "truth.npz")
 
 
@@ -117,7 +116,7 @@ def _effects(ruler, known, case, rng):
         name = names.pop(0) if names else str(rng.choice(pool))
         if name in (sized.effect.name for sized, _ in drawn):
             continue
-        sized = draw_effect(ruler, KINDS[name], case.mdb, rng)
+        sized = draw_effect(ruler, effect_class(name), case.mdb, rng)
         if sized is None:
             continue
         like = likeness(ruler, sized.shift, known)

@@ -6,10 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.blind.settings import SETTINGS
-from mlscorr.effects import EFFECTS
-
-SYSTEMATIC = tuple(kind.name for kind in EFFECTS if not kind.is_scatter())
-RANDOM = tuple(kind.name for kind in EFFECTS if kind.random)
+from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
 
 
 @dataclass(frozen=True)

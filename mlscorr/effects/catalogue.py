@@ -11,32 +11,20 @@ from mlscorr.effects import control, encoder, mounting, ranging, timing, vehicle
 from mlscorr.effects.effect import Effect
 from mlscorr.effects.stages import STAGES, Reference
 
-EFFECTS = (  # by stage; within one, in the order in which they act
+EFFECTS = (  # a stage in a line or two, in the order in which they act
     ranging.BeamDivergence,
-    timing.TimeOffset,
-    timing.ClockDrift,
-    timing.TimeJitter,
-    ranging.RangeScale,
-    ranging.RangeBias,
-    ranging.RangeWalk,
-    ranging.IncidenceBias,
-    ranging.RangeNoise,
-    encoder.AngleScale,
-    encoder.AngleEccentricity,
-    encoder.AngleNoise,
+    *(timing.TimeOffset, timing.ClockDrift, timing.TimeJitter),
+    *(ranging.RangeScale, ranging.RangeBias, ranging.RangeWalk),
+    *(ranging.IncidenceBias, ranging.RangeNoise),
+    *(encoder.AngleScale, encoder.AngleEccentricity, encoder.AngleNoise),
     ranging.Dropout,
-    vehicle.HeadingDrift,
-    vehicle.PositionStep,
-    vehicle.PositionBump,
-    vehicle.PositionNoise,
-    mounting.Boresight,
-    mounting.LeverArm,
-    control.MapRotation,
-    control.MapScale,
-    control.HorizontalDatum,
-    control.VerticalDatum,
-    control.TargetOutlier,
+    *(vehicle.HeadingDrift, vehicle.PositionStep, vehicle.PositionBump, vehicle.PositionNoise),
+    *(mounting.Boresight, mounting.LeverArm),
+    *(control.MapRotation, control.MapScale),
+    *(control.HorizontalDatum, control.VerticalDatum, control.TargetOutlier),
 )
+SYSTEMATIC = tuple(kind.name for kind in EFFECTS if not kind.is_scatter())
+RANDOM = tuple(kind.name for kind in EFFECTS if kind.random)
 _registered: dict[str, type[Effect]] = {}  # a user's own, which act after these
 
 

@@ -24,22 +24,17 @@ from mlscorr.io.las_output import Blocks
 from mlscorr.io.octree_cube import GRID_BITS, ROOT, Cube, Key
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.spool import Spool, check_space
+from mlscorr.survey.columns import Columns
 
 PART_BITS = 6  # 64 cubes along an edge, into which points are parted at a time: counts of 2 MB
 
 
-@dataclass(frozen=True)
-class _Part:
+@dataclass(frozen=True, repr=False)
+class _Part(Columns):
     """Some points: their records (n,), and where they lie in the cube (n, 3)."""
 
     records: np.ndarray
     places: np.ndarray
-
-    def __getitem__(self, rows):
-        return _Part(self.records[rows], self.places[rows])
-
-    def __len__(self):
-        return len(self.records)
 
 
 @dataclass

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from mlscorr.io.folders import exchange, move_into, remove, take_along
 from mlscorr.io.inputs import check_unchanged
-from mlscorr.io.publishing import publish, scratch_folder, write_text
+from mlscorr.io.publishing import check_contents, publish, scratch_folder, write_text
 from mlscorr.io.storage import as_path, is_remote
 from mlscorr.survey import InputFile
 
@@ -57,19 +57,11 @@ def check_output(out: str | Path, inputs: Iterable[str | Path], overwrite: bool 
             )
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out} is a file; the results need a folder. Choose another name.")
-    for path in (Path(path) for path in inputs if not is_remote(path)):
-        # a link to an input counts where it stands and where it leads
-        if out.resolve() in (path.resolve().parent, path.parent.resolve()):
-            raise ValueError(
-                f"The output folder {out} holds the input {path.name}, which must stay as it is. "
-                "Choose another folder."
-            )
-    if not overwrite and (present := _entries(out)):
-        raise ValueError(
-            f"The output folder {out} holds {len(present)} entries already (first: {present[0]}). "
-            "Choose another folder, or allow with --overwrite that files of the same name are "
-            "replaced."
-        )
+    files = [Path(path) for path in inputs if not is_remote(path)]
+    # a link to an input counts where it stands and where it leads
+    places = [(path.resolve().parent, path.parent.resolve()) for path in files]
+    held = [path.name for path, two in zip(files, places, strict=True) if out.resolve() in two]
+    check_contents(out, held, [] if overwrite else _entries(out))
     _place(out)
 
 

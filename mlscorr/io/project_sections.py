@@ -8,13 +8,9 @@ from pydantic import Field, model_validator
 
 from mlscorr.io.survey_sections import (
     CalibratedMountingSection,
-    ControlSection,
-    MatchingSection,
+    CommonSections,
     PointSource,
-    PosSection,
     Scanners,
-    ScannerSection,
-    TiesSection,
     Trajectories,
 )
 from mlscorr.io.toml_file import TomlSection
@@ -57,18 +53,10 @@ class DriveSection(TomlSection):
         return self
 
 
-class ProjectFile(TomlSection):
+class ProjectFile(CommonSections):
     """What stands in project.toml, in its own units (deg)."""
 
-    name: str | None = None
-    crs: str | None = None
     cloud: TilesSection = TilesSection()
-    control: ControlSection | None = None
-    mounting: CalibratedMountingSection | None = None
-    scanner: Scanners = ScannerSection()
-    pos: PosSection = PosSection()
-    matching: MatchingSection = MatchingSection()
-    ties: TiesSection = TiesSection()
     drive: Annotated[list[DriveSection], Field(min_length=1)]
 
     @model_validator(mode="after")

@@ -9,7 +9,7 @@ import shutil
 import socket
 import tempfile
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic, sleep
@@ -131,13 +131,32 @@ def check_store_output(out: Path, inputs: Iterable[Path], overwrite: bool) -> No
             f"{out} is of a web server, which takes no results: name a store or a disk."
         )
     present = names_in(out)
-    for path in inputs:
-        if is_remote(path) and path.parent == out:
-            raise ValueError(
-                f"The output folder {out} holds the input {path.name}, which must stay as it is. "
-                "Choose another folder."
-            )
-    if present and not overwrite:
+    held = [path.name for path in inputs if is_remote(path) and path.parent == out]
+    check_contents(out, held, [] if overwrite else present)
+
+
+def check_contents(out: Path, held: Sequence[str], present: Sequence[str]) -> None:
+    """Refuse an output folder for what it holds.
+
+    Parameters
+    ----------
+    out : Path
+    held : sequence of str
+        Names of the inputs in it.
+    present : sequence of str
+        Names that may not be replaced.
+
+    Raises
+    ------
+    ValueError
+        Where there are any.
+    """
+    if held:
+        raise ValueError(
+            f"The output folder {out} holds the input {held[0]}, which must stay as it is. "
+            "Choose another folder."
+        )
+    if present:
         raise ValueError(
             f"The output folder {out} holds {len(present)} entries already (first: {present[0]}). "
             "Choose another folder, or allow with --overwrite that files of the same name are "

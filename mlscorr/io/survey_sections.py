@@ -233,19 +233,24 @@ class SceneSection(TomlSection):
     reference: str | None = None
 
 
-class PlannedSurveyFile(TomlSection):
-    """What stands in the survey.toml of a survey that isn't driven yet: it may have no cloud."""
+class CommonSections(TomlSection):
+    """What stands in the survey.toml of a drive, and in the project.toml of several."""
 
     name: str | None = None
     crs: str | None = None
-    cloud: CloudSection | None = None
-    trajectory: Trajectories
     mounting: CalibratedMountingSection | None = None
     control: ControlSection | None = None
     scanner: Scanners = ScannerSection()
     pos: PosSection = PosSection()
     matching: MatchingSection = MatchingSection()
     ties: TiesSection = TiesSection()
+
+
+class PlannedSurveyFile(CommonSections):
+    """What stands in the survey.toml of a survey that isn't driven yet: it may have no cloud."""
+
+    cloud: CloudSection | None = None
+    trajectory: Trajectories
     scene: SceneSection = SceneSection()
 
     @model_validator(mode="after")

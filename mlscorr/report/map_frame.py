@@ -1,11 +1,30 @@
-"""What all maps share: the track of a drive, equal scales, whole metres as tick labels."""
+"""What all maps share: panels, the track of a drive, equal scales, whole metres as tick labels."""
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from mlscorr.report.style import break_at_gaps, thin
+from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import break_at_gaps, new_figure, thin
 from mlscorr.survey import Trajectory
+
+
+def map_panels(count: int, share: float) -> tuple[Figure, np.ndarray]:
+    """A figure and its panels (count,): side by side, or one above the other for a long street.
+
+    Parameters
+    ----------
+    count : int
+        Maps of the same place: one or two.
+    share : float
+        Of its height in its width.
+    """
+    columns = 2 if share > 0.7 and count > 1 else 1
+    lines, beside = count // columns, 1.8  # inch: labels and colours
+    width = SETTINGS.figure_width / columns - beside
+    figure = new_figure(0.8 + lines * (0.35 + width * share))
+    return figure, figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
 
 
 def track(trajectory: Trajectory) -> np.ndarray:

@@ -7,10 +7,10 @@ from matplotlib.lines import Line2D
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
-from mlscorr.report.map_frame import frame, track
+from mlscorr.report.map_frame import frame, map_panels, track
 from mlscorr.report.render.quantities import colour_table
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.style import MARKS, TRACK, legend_above, new_figure, styled
+from mlscorr.report.style import MARKS, TRACK, legend_above, styled
 
 STATES = ("Before the correction", "After the correction")
 
@@ -29,13 +29,8 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
     places = residuals.ties.place.mean(axis=1)[:, :2]
     misfits = [1000 * np.abs(v) for v in (residuals.ties.misclosure, residuals.after)]  # mm
     low, high = _bounds(np.vstack([way[np.isfinite(way).all(axis=1)], places]))
-    share = (high - low)[1] / (high - low)[0]
-    columns = 2 if share > 0.7 else 1
-    lines, beside = 2 // columns, 1.8  # inch: labels and colours
-    height = 0.8 + lines * (0.35 + (SETTINGS.figure_width / columns - beside) * share)
-    figure = new_figure(height)
+    figure, panels = map_panels(2, (high - low)[1] / (high - low)[0])
     figure.set_dpi(SETTINGS.dots_per_inch)
-    panels = figure.subplots(lines, columns, sharex=True, sharey=True).ravel()
     largest = max(np.max(misfit[used], initial=10.0) for misfit in misfits)
     scale = {"norm": LogNorm(1.0, largest), "cmap": ListedColormap(colour_table("sigma") / 255)}
     for panel, misfit, title in zip(panels, misfits, STATES, strict=True):

@@ -14,6 +14,8 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Vector = tuple[float, float, float]
+Kinds = Annotated[tuple[Literal["circle", "square"], ...], Field(min_length=1)]
+Supports = Annotated[tuple[Literal["post", "wall", "road"], ...], Field(min_length=1)]
 Spans = tuple[tuple[NotNegative, Positive], ...]  # (start, duration), from the drive's start
 
 
@@ -46,16 +48,9 @@ class TargetScenario(_Part):
 
     control: Annotated[int, Field(ge=1)] = 16
     check: Annotated[int, Field(ge=0)] = 8
-    kinds: Annotated[tuple[Literal["circle", "square"], ...], Field(min_length=1)] = (
-        "circle",
-        "square",
-    )
+    kinds: Kinds = ("circle", "square")
     size: Positive = 0.6  # disc diameter or plate edge, as in Mao et al. 2015's class of target
-    supports: Annotated[tuple[Literal["post", "wall", "road"], ...], Field(min_length=1)] = (
-        "post",
-        "wall",
-        "road",
-    )
+    supports: Supports = ("post", "wall", "road")
     hidden: Share = 0.1  # of the targets, partly hidden by a narrow post in front
     survey_sigma: tuple[NotNegative, NotNegative] = (0.003, 0.003)  # across, up: total station
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.blind.mix import RANDOM, SYSTEMATIC, mix
+from mlscorr.blind.mix import mix
 from mlscorr.blind.settings import SETTINGS
+from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
 
 
 @pytest.mark.parametrize("seed", [1, 2])

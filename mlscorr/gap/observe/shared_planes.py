@@ -29,7 +29,8 @@ def shared_rows(
     """
     limit = SETTINGS.patches // 2 if limit is None else limit
     first, second = (patches[rows] for rows in _pairs(patches))
-    normal, apart, residual = _compare(first, second)
+    normal, between, residual = compare_planes(first, second)
+    apart = np.linalg.norm(between, axis=1)
     kept = np.flatnonzero(np.abs(residual) <= gate(survey, first.gps_time))
     kept = kept[consistent(first.gps_time[kept], normal[kept], residual[kept])]
     if len(kept) == 0:
@@ -48,7 +49,7 @@ def shared_rows(
         (first.centre + second.centre) / 2,
         normal,
         residual,
-        _noise(first, second, apart),
+        plane_noise(first, second, apart**2),
         np.minimum(first.points, second.points),
         SamplePulses.concatenate(pulses),
         first.pass_number,
@@ -56,12 +57,23 @@ def shared_rows(
     )
 
 
-def _compare(first, second):
-    """Mean normal (n, 3), distance of the middles (n,) and that along the normal (n,). Units: m."""
+def compare_planes(first: Patches, second: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean normal (n, 3), way between the middles (n, 3), and its part along the normal (n,).
+
+    Parameters
+    ----------
+    first, second : Patches
+        Of n planes each, looked at twice.
+
+    Returns
+    -------
+    three arrays
+        Units of the way and its part: m.
+    """
     normal = first.normal + second.normal
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     between = first.centre - second.centre
-    return normal, np.linalg.norm(between, axis=1), np.einsum("ni,ni->n", normal, between)
+    return normal, between, np.einsum("ni,ni->n", normal, between)
 
 
 def _pairs(patches):
@@ -89,10 +101,17 @@ def _pairs(patches):
     return early, late
 
 
-def _noise(first, second, apart):
+def plane_noise(first: Patches, second: Patches, square: np.ndarray) -> np.ndarray:
     """Variance (n,) of the difference: of both means, of the normal over the way between them,
     and of the surface, which is no plane.
+
+    Parameters
+    ----------
+    first, second : Patches
+        Of n planes each.
+    square : (n,) array
+        Of the distance between their middles. Units: m^2.
     """
     mean = [patches.variance / patches.points for patches in (first, second)]
     tilt = [m / patches.spread**2 for m, patches in zip(mean, (first, second), strict=True)]
-    return mean[0] + mean[1] + apart**2 * (tilt[0] + tilt[1]) / 4 + SETTINGS.surface_sigma**2
+    return mean[0] + mean[1] + square * (tilt[0] + tilt[1]) / 4 + SETTINGS.surface_sigma**2

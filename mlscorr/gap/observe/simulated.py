@@ -19,6 +19,7 @@ from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.observe.selection import consistent, gate, spread
 from mlscorr.gap.observe.settings import SETTINGS
+from mlscorr.gap.observe.shared_planes import compare_planes, plane_noise
 from mlscorr.gap.observe.surfaces import OnReference
 from mlscorr.survey import PointCloud, Survey, TargetObservations
 from mlscorr.targets import Candidates
@@ -224,15 +225,10 @@ def _nearest(patches, simulated):
 def _by_place(survey, patches, simulated, other):
     """As _by_beams, by patches of the same places."""
     pair = simulated[np.maximum(other, 0)]
-    normal = patches.normal + pair.normal
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    between = patches.centre - pair.centre
-    residual = np.where(other >= 0, np.einsum("ni,ni->n", normal, between), np.nan)
-    mean = [each.variance / each.points for each in (patches, pair)]
-    tilt = [m / each.spread**2 for m, each in zip(mean, (patches, pair), strict=True)]
-    noise = mean[0] + mean[1] + (between**2).sum(axis=1) * (tilt[0] + tilt[1]) / 4
-    residual = _credible(survey, patches, normal, residual)
-    return normal, residual, noise + SETTINGS.surface_sigma**2
+    normal, between, residual = compare_planes(patches, pair)
+    noise = plane_noise(patches, pair, (between**2).sum(axis=1))
+    residual = np.where(other >= 0, residual, np.nan)
+    return normal, _credible(survey, patches, normal, residual), noise
 
 
 def _against_channels(rows, survey, simulated, other):

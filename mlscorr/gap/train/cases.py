@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 
-from mlscorr.effects import EFFECTS, effect_class
+from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Background, Rows
 from mlscorr.gap.signatures.changes import Bench
@@ -32,8 +32,6 @@ SIZES = {  # MDB, between which sizes are drawn evenly by their logs
 ATTEMPTS = 12  # effects or mechanisms, where the geometry shows none
 LIKENESS = 0.8  # squared correlation with an effect above which a mechanism is that effect
 DRIFTS = 0.3  # share of cases of position noise in which drift is larger than stated
-SYSTEMATIC = tuple(kind.name for kind in EFFECTS if not kind.is_scatter())
-RANDOM = tuple(kind.name for kind in EFFECTS if kind.random)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ from matplotlib.lines import Line2D
 from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.settings import SETTINGS
-from mlscorr.report.map_frame import frame
-from mlscorr.report.settings import SETTINGS as REPORT_SETTINGS
-from mlscorr.report.style import GREY, MARKS, TRACK, label, legend_above, new_figure, styled
+from mlscorr.report.map_frame import frame, map_panels
+from mlscorr.report.style import GREY, MARKS, TRACK, label, legend_above, styled
 from mlscorr.report.target_map import NEXT, NEXT_WORDS, mark_places
 
 ROLES = {"control": "Control point", "check": "Check point"}
@@ -29,14 +28,8 @@ def site_map(document: dict) -> Figure:
     states = ("before", "after") if rows else (None,)
     low, high = _bounds(site, rows)
     share = np.clip((high - low)[1] / (high - low)[0], 0.25, 1.6)
-    columns = 2 if share > 0.7 and rows else 1
-    lines = len(states) // columns
-    beside = 1.8  # inch: labels and colours
-    figure = new_figure(
-        0.8 + lines * (0.35 + (REPORT_SETTINGS.figure_width / columns - beside) * share)
-    )
+    figure, panels = map_panels(len(states), share)
     figure.set_dpi(180)
-    panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for panel, state in zip(panels, states, strict=True):
         colours = _draw(panel, site, rows, state)
         frame(panel, low, high, 4)

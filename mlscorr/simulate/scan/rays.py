@@ -14,10 +14,11 @@ from numba import njit
 
 from mlscorr.simulate.scan.threads import Workspace, in_slices
 from mlscorr.survey import Mounting, Trajectory
+from mlscorr.survey.columns import Columns
 
 
-@dataclass(frozen=True)
-class Turn:
+@dataclass(frozen=True, repr=False)
+class Turn(Columns):
     """The pulses that one turn of a scanner fires.
 
     Parameters
@@ -35,9 +36,6 @@ class Turn:
     elevation: np.ndarray
     rate: float
 
-    def __len__(self):
-        return len(self.turned)
-
     @cached_property
     def beams(self) -> np.ndarray:
         """Unit directions, and the directions in which they sweep (m, 2, 3), in its frame."""
@@ -47,8 +45,8 @@ class Turn:
         return np.stack([beam, np.column_stack([-y, x, zero])], axis=1)
 
 
-@dataclass(frozen=True)
-class Rays:
+@dataclass(frozen=True, repr=False)
+class Rays(Columns):
     """Pulses as they are fired.
 
     Parameters
@@ -66,9 +64,6 @@ class Rays:
     elevation: np.ndarray
     ray: np.ndarray
     single: np.ndarray
-
-    def __len__(self):
-        return len(self.gps_time)
 
 
 @dataclass(frozen=True)

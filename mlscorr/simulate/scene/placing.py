@@ -13,6 +13,7 @@ from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.shapes import UP, Mesh, box, join, post
 from mlscorr.simulate.scene.things import target
 from mlscorr.simulate.settings import SETTINGS
+from mlscorr.survey.columns import Columns
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ class TargetSpot:
         return np.cross(self.u, self.v)
 
 
-@dataclass(frozen=True)
-class Targets:
+@dataclass(frozen=True, repr=False)
+class Targets(Columns):
     """What the surveyor would find without noise: n targets in local coordinates.
 
     kind (tuple of n), centre (n, 3) in m, normal (n, 3) out of the visible side, the road or wall
@@ -49,9 +50,6 @@ class Targets:
     normal: np.ndarray
     support: tuple[str, ...]
     hidden: np.ndarray
-
-    def __len__(self):
-        return len(self.kind)
 
 
 @dataclass(frozen=True)

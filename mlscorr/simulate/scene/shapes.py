@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from mlscorr.survey.columns import Columns
+
 UP = np.array([0.0, 0.0, 1.0])
 
 
-@dataclass(frozen=True)
-class Mesh:
+@dataclass(frozen=True, repr=False)
+class Mesh(Columns):
     """Triangles (n, 3, 3) in m about a local origin, with the reflectance (n,) of each."""
 
     triangles: np.ndarray
     reflectance: np.ndarray
-
-    def __len__(self):
-        return len(self.triangles)
 
     @cached_property
     def caster(self) -> Any:
@@ -46,10 +45,7 @@ def join(meshes: Sequence[Mesh]) -> Mesh:
     ----------
     meshes : sequence of Mesh
     """
-    return Mesh(
-        np.concatenate([m.triangles for m in meshes]),
-        np.concatenate([m.reflectance for m in meshes]),
-    )
+    return Mesh.concatenate(meshes)
 
 
 def four_corners(

@@ -4,8 +4,8 @@ import gap_study
 import numpy as np
 import pytest
 
-from mlscorr.blind.mix import RANDOM, SYSTEMATIC
 from mlscorr.effects import EFFECTS
+from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
