@@ -21,12 +21,9 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
             checked = check_project(survey)
         else:
             checked = mlscorr.check(survey)
-    for title, amounts in (
-        ("Read", checked.read),
-        ("Written", checked.written),
-        ("Needed", checked.needed),
-    ):
-        _list(title, [_amount(amount) for amount in amounts])
+    amounts = {"Read": checked.read, "Written": checked.written, "Needed": checked.needed}
+    for title, those in amounts.items():
+        _list(title, [_amount(amount) for amount in those])
     _list("Worked out", checked.notes)
     _list("Not checked", checked.unchecked)
     for sentence in checked.warnings:

@@ -93,8 +93,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
         faults.add("data", sentence)
     layouts = [read_layout(path) for path in survey.cloud_paths]
     passes, outside = _placed_times(survey)
-    for sentence in (*outside, *_crs_hints(survey, layouts), *_uncovered(survey, layouts)):
-        faults.warn(sentence)
+    faults.warn(*outside, *_crs_hints(survey, layouts), *_uncovered(survey, layouts))
     for layout in layouts:
         sentence, is_explained = far_cloud(
             layout.cloud.name, cloud_box(layout)[:, :2], survey.trajectory
@@ -104,8 +103,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
         elif sentence:  # by a header, which may be wrong
             faults.warn(sentence)
     sample = faults.of("data", needs.sample_clouds, survey)
-    for sentence in sample.warnings if sample else ():
-        faults.warn(sentence)
+    faults.warn(*(sample.warnings if sample else ()))
     probe, notes, unchecked = _looked(survey, faults, needs_control)
     return CheckedSurvey(
         faults=tuple(faults.faults),
@@ -201,8 +199,7 @@ def _looked(
     elif probe.doubt:
         faults.warn(probe.doubt)
     datum = datum_warnings(matched, survey.trajectory, survey.pos)
-    for sentence in (*problems.warnings, *datum):
-        faults.warn(sentence)
+    faults.warn(*problems.warnings, *datum)
     notes = [
         f"{len(set(matched.name))} of {len(probe.points)} targets that were looked at are found."
     ]

@@ -80,8 +80,7 @@ class Faults:
                 is_named = isinstance(error, FileNotFoundError) and error.errno is None
                 self.add("survey.toml" if is_named else "system", str(error))
             finally:
-                for warning in caught:
-                    self.warn(str(warning.message))
+                self.warn(*(str(warning.message) for warning in caught))
         return None
 
     def add(self, where: Place, sentence: str) -> None:
@@ -95,15 +94,16 @@ class Faults:
         if not any(sentence in fault.sentence for fault in self.faults):
             self.faults.append(Fault(where, sentence))
 
-    def warn(self, sentence: str) -> None:
-        """Keep a warning.
+    def warn(self, *sentences: str) -> None:
+        """Keep warnings.
 
         Parameters
         ----------
-        sentence : str
+        *sentences : str
         """
-        if sentence not in self.warnings:
-            self.warnings.append(sentence)
+        for sentence in sentences:
+            if sentence not in self.warnings:
+                self.warnings.append(sentence)
 
 
 def find_faults(path: str | Path, faults: Faults) -> None:

@@ -6,19 +6,7 @@ from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from functools import partial
 
-from mlscorr.baselines import (
-    RAW,
-    Undetermined,
-    fit_affine,
-    fit_gaussian_process,
-    fit_horizontal_and_height,
-    fit_linear,
-    fit_literal,
-    fit_pchip,
-    fit_polynomial,
-    fit_rigid,
-    fit_shift,
-)
+from mlscorr import baselines
 from mlscorr.estimate import estimate_correction
 from mlscorr.pipeline.settings import SETTINGS
 
@@ -42,9 +30,9 @@ class Method:
     fit: Callable = field(repr=False)
 
 
-def _of_pairs(fit):
-    """A fit that needs no more than pairs of places."""
-    return lambda _survey, matched, _: (fit(matched), {})
+def _one_move(name, about, fit):
+    """A Method whose fit needs no more than pairs of places."""
+    return Method(name, "one move", about, lambda _survey, matched, _: (fit(matched), {}))
 
 
 def load_open3d() -> str | None:
@@ -59,7 +47,7 @@ def load_open3d() -> str | None:
 def _icp(_survey, matched, candidates):
     problem = load_open3d()
     if problem is not None:
-        raise Undetermined(problem)
+        raise baselines.Undetermined(problem)
     from mlscorr.baselines.registration import fit_icp
 
     registration = fit_icp(matched, candidates.cloud, candidates.pass_number)
@@ -67,22 +55,23 @@ def _icp(_survey, matched, candidates):
     return registration, {name: getattr(registration, name) for name in names}
 
 
-def _over_time(fit):
-    """A fit that needs the trajectory and the control points."""
-    return lambda survey, matched, _: (fit(survey.trajectory, matched), {})
+def _over_time(name, about, fit):
+    """A Method whose fit needs the trajectory and the control points."""
+
+    def of_survey(survey, matched, _):
+        return fit(survey.trajectory, matched), {}
+
+    return Method(name, "over time", about, of_survey)
 
 
 def _polynomial(order):
-    def fit(survey, matched, _):
-        return fit_polynomial(survey.trajectory, matched, order), {}
-
     about = f"Polynomials of time of order {order}, one for each axis, by least squares."
-    return Method(f"ls-{order}", "over time", about, fit)
+    return _over_time(f"ls-{order}", about, partial(baselines.fit_polynomial, order=order))
 
 
 def _literal(order):
     def fit(survey, matched, _):
-        return fit_literal(survey.trajectory, matched, survey.pos, order)
+        return baselines.fit_literal(survey.trajectory, matched, survey.pos, order)
 
     about = (
         f"Collocation as the paper prints it: order {order}, variances that the POS states, a "
@@ -103,35 +92,30 @@ def _lsc(survey, matched, _):
 
 
 METHODS = (
-    Method("raw", "none", "The cloud as it was recorded.", _of_pairs(lambda *_: RAW)),
-    Method("shift", "one move", "One shift of the whole cloud.", _of_pairs(fit_shift)),
-    Method(
+    Method("raw", "none", "The cloud as it was recorded.", lambda *_: (baselines.RAW, {})),
+    _one_move("shift", "One shift of the whole cloud.", baselines.fit_shift),
+    _one_move(
         "transformation",
-        "one move",
         "Plan and height solved apart: shift, turn and scale in plan, an inclined plane in height.",
-        _of_pairs(fit_horizontal_and_height),
+        baselines.fit_horizontal_and_height,
     ),
-    Method("rigid", "one move", "One shift and one turn in space.", _of_pairs(fit_rigid)),
-    Method(
-        "affine", "one move", "Shift, turn, scale and shear: 12 parameters.", _of_pairs(fit_affine)
-    ),
+    _one_move("rigid", "One shift and one turn in space.", baselines.fit_rigid),
+    _one_move("affine", "Shift, turn, scale and shear: 12 parameters.", baselines.fit_affine),
     Method(
         "icp", "one move", "Iterative closest points: targets laid on their surveyed faces.", _icp
     ),
     *(_polynomial(order) for order in SETTINGS.orders),
-    Method("linear", "over time", "Straight lines between control points.", _over_time(fit_linear)),
-    Method("pchip", "over time", "Monotone cubics between control points.", _over_time(fit_pchip)),
-    Method(
+    _over_time("linear", "Straight lines between control points.", baselines.fit_linear),
+    _over_time("pchip", "Monotone cubics between control points.", baselines.fit_pchip),
+    _over_time(
         "linear-steps",
-        "over time",
         "Straight lines between control points, apart on both sides of each step of the path.",
-        _over_time(partial(fit_linear, cut=True)),
+        partial(baselines.fit_linear, cut=True),
     ),
-    Method(
+    _over_time(
         "gp",
-        "over time",
         "A Gaussian process of scikit-learn: Matern 3/2 and white noise, by likelihood.",
-        _over_time(fit_gaussian_process),
+        baselines.fit_gaussian_process,
     ),
     *(_literal(order) for order in SETTINGS.orders),
     Method(

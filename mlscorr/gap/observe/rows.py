@@ -12,7 +12,6 @@ from mlscorr.pos import stated_sigma
 from mlscorr.survey import ControlPoints, Survey
 from mlscorr.survey.columns import Columns
 
-CHANNELS = ("target", "surface", "shared", "roughness", "return_rate")
 METRIC = ("target", "surface", "shared")  # in m along a direction; the others have no unit
 
 
@@ -59,7 +58,7 @@ class Rows:
     Parameters
     ----------
     channel : (m,) str array
-        One of CHANNELS.
+        target, surface, shared, roughness or return_rate.
     item : (m,) int array
         Which observed thing: target and pass, patch, pair of patches.
     survey_item : (m,) int array

@@ -63,8 +63,9 @@ def _targets(survey, targets):
     which, time, number = _sweeps(survey, targets.position)
     n, item = len(which), np.arange(len(which))
     place = targets.position[which]
-    normal = np.where(np.isfinite(targets.normal[which]), targets.normal[which], _facing(
-        survey, place, time))  # fmt: skip
+    sight = scanner_origin(survey, time) - place
+    facing = sight / np.linalg.norm(sight, axis=1, keepdims=True)
+    normal = np.where(np.isfinite(targets.normal[which]), targets.normal[which], facing)
     pulses = sample_pulses(
         survey, item, np.ones(n), place, time, np.full(n, SETTINGS.brightness), normal
     )
@@ -131,11 +132,6 @@ def _sweeps(survey, place):
         share = np.where(a != b, a / np.where(a != b, a - b, 1.0), 0.0)
         times.append((k, time[i] + share * (time[i + 1] - time[i]), np.full(len(k), number)))
     return tuple(np.concatenate(parts) for parts in zip(*times, strict=True))
-
-
-def _facing(survey, place, time):
-    sight = scanner_origin(survey, time) - place
-    return sight / np.linalg.norm(sight, axis=1, keepdims=True)
 
 
 def event_sizes(
