@@ -198,7 +198,7 @@ class _Work:
         findings = self.run.results(every)
         lost = {_path(task) for task in every if task.name not in findings}
         every = [task for task in every if _path(task) not in lost]
-        planned[:] = [_without(drive, lost) for drive in planned]
+        planned[:] = [drive.without(lost) for drive in planned]
         planned[:] = [drive for drive in planned if drive.survey.clouds]
         files = [task.key for task in every]
         lists = [d.survey.control for d in planned], [d.survey.check for d in planned]
@@ -277,19 +277,6 @@ class _Work:
 def _path(task):
     """Path of the cloud that a task reads."""
     return task.arguments[0].file.path
-
-
-def _without(drive, lost):
-    """A drive without the files, by their paths, that could not be read."""
-    survey = drive.survey
-    clouds = [file for file in survey.clouds if file.path not in lost]
-    if len(clouds) == len(survey.clouds):
-        return drive
-    mounted = [
-        replace(m, clouds=tuple(file for file in m.clouds if file in clouds))
-        for m in survey.scanners
-    ]
-    return replace(drive, survey=replace(survey, clouds=tuple(clouds), scanners=tuple(mounted)))
 
 
 def _is_there(store, key):

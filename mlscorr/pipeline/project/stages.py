@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -86,6 +86,24 @@ class PlannedDrive:
     survey: Survey
     boxes: dict[Path, np.ndarray]
     identities: dict[Path, FileIdentity]
+
+    def without(self, lost: Collection[Path]) -> PlannedDrive:
+        """The drive without the files, by their paths, that could not be read.
+
+        Parameters
+        ----------
+        lost : collection of Path
+        """
+        survey = self.survey
+        clouds = [file for file in survey.clouds if file.path not in lost]
+        if len(clouds) == len(survey.clouds):
+            return self
+        mounted = [
+            replace(m, clouds=tuple(file for file in m.clouds if file in clouds))
+            for m in survey.scanners
+        ]
+        survey = replace(survey, clouds=tuple(clouds), scanners=tuple(mounted))
+        return replace(self, survey=survey)
 
 
 def planned_drive(project: ProjectParts, drive: DriveParts, tiles: Sequence[Tile]) -> PlannedDrive:
