@@ -1,6 +1,6 @@
 """The command that tells what is wrong with a survey before it is corrected."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import typer
 
@@ -36,9 +36,8 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
     say(f"No fault, {_count(checked.warnings, 'warning')}. Next: mlscorr correct {survey} -o OUT")
 
 
-def _list(title: str, lines: Iterable[str]) -> None:
+def _list(title: str, lines: Sequence[str]) -> None:
     """Say some lines below a title, where there are any."""
-    lines = list(lines)
     if lines:
         say("\n".join([title, *(f"  {line}" for line in lines)]))
 

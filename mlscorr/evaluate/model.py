@@ -1,5 +1,7 @@
 """The model section of report.json."""
 
+from dataclasses import asdict
+
 import numpy as np
 
 from mlscorr.estimate import COMPONENTS, Estimate
@@ -28,10 +30,7 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
         "estimated_by": f"restricted maximum likelihood of {_observations(estimate)}",
         "log_likelihood": estimate.log_likelihood,
         "sigma0": estimate.sigma0,
-        "outliers": [
-            {"name": o.name, "statistic": o.statistic, "critical": o.critical}
-            for o in estimate.outliers
-        ],
+        "outliers": [asdict(outlier) for outlier in estimate.outliers],
         "alternatives": [
             {**_covariance(parameters), "probability": probability}
             for parameters, probability in estimate.families

@@ -43,9 +43,7 @@ CONTROL_NAMES = PLACE_NAMES | {
     "size": "diameter größe groesse durchmesser kantenlänge taille diamètre tamaño diámetro "
     "尺寸 大小 直径 边长",
     "role": "rolle rôle rol 角色",
-    "normal_e": "",
-    "normal_n": "",
-    "normal_h": "",
+    **dict.fromkeys(("normal_e", "normal_n", "normal_h"), ""),
 }
 TRAJECTORY_NAMES = PLACE_NAMES | {
     "gps_time": "time t sow tow gpssow gpstow secondsofweek gpsseconds zeit gpszeit temps tiempo "

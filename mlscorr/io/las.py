@@ -149,23 +149,6 @@ def _decoding(layout, first, end):
     )
 
 
-def times_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
-    """gps_time of a few points.
-
-    Parameters
-    ----------
-    layout : LasLayout
-    places : (n,) array of int
-        Numbers of the points.
-
-    Returns
-    -------
-    (n,) array
-        Units: s.
-    """
-    return records_at(layout, places)["gps_time"]
-
-
 def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     """Records of a few points, of which only gps_time and point_source_id are sure to be decoded.
 

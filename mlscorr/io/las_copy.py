@@ -12,7 +12,7 @@ import numpy as np
 from mlscorr.correction.point_sigma import PointSigma
 from mlscorr.io.copc_writer import CopcWriter
 from mlscorr.io.extra_bytes import add_sigma_fields, with_sigmas
-from mlscorr.io.las import read_records, times_at
+from mlscorr.io.las import read_records, records_at
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.las_output import LasOutput, PlainWriter
@@ -213,6 +213,6 @@ def _check_target(source, target):
 def _check_copy(layout, part):
     """That the file just written can be opened and holds the points, up to the last."""
     copy = read_layout(part)
-    times_at(copy, [copy.points - 1])
+    records_at(copy, [copy.points - 1])
     if copy.points != layout.points:
         raise OSError(f"{part} was written with {copy.points} of {layout.points} points.")

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mlscorr.io.las import read_chunks, spread_times, times_at
+from mlscorr.io.las import read_chunks, records_at, spread_times
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.settings import SETTINGS
@@ -65,5 +65,5 @@ def _place(layout: LasLayout, places, times, time, side):
     bounds = [int(places[k - 1]), int(places[k]) + 1]
     while bounds[1] - bounds[0] > SETTINGS.close_places:
         middle = sum(bounds) // 2
-        bounds[int(times_at(layout, [middle])[0] >= time)] = middle
+        bounds[int(records_at(layout, [middle])["gps_time"][0] >= time)] = middle
     return bounds[side]

@@ -70,7 +70,8 @@ def _set_clouds(source, document, sessions, scanners, clouds):
     """New files of each scanner; those of sessions keep their names, not their folders."""
     for section in sessions:
         if "files" in section:
-            section["files"] = _names(source, section["files"])
+            paths = [matching(source, "trajectory.files", pattern) for pattern in section["files"]]
+            section["files"] = sorted({written_name(path) for some in paths for path in some})
     document["cloud"]["files"] = list(dict.fromkeys(name for names in clouds for name in names))
     for section, names in zip(scanners, clouds, strict=bool(scanners)):
         if "files" in section:
@@ -89,12 +90,6 @@ def _set_trajectory(document, name):
 def _listed(section):
     """Sections of a list of tables; none of a table."""
     return section if isinstance(section, list) else []
-
-
-def _names(source, patterns):
-    """Names of the files that patterns of a survey.toml name."""
-    paths = [matching(source, "trajectory.files", pattern) for pattern in patterns]
-    return sorted({written_name(path) for some in paths for path in some})
 
 
 def _set_mounting(section, mounting):

@@ -212,13 +212,12 @@ def check_distinct(path: Path, clouds: list[Path]) -> None:
     ------
     ValueError
     """
-    for kind, values in (
-        ("names the file", [str(resolved(cloud)) for cloud in clouds]),
-        (
-            "has files whose results would have the same name:",
-            [written_name(cloud).casefold() for cloud in clouds],
-        ),
-    ):
+    written = [written_name(cloud).casefold() for cloud in clouds]
+    kinds = {
+        "names the file": [str(resolved(cloud)) for cloud in clouds],
+        "has files whose results would have the same name:": written,
+    }
+    for kind, values in kinds.items():
         value, count = Counter(values).most_common(1)[0]
         if count > 1:
             raise ValueError(f"cloud.files of {path} {kind} {value} ({count} times).")

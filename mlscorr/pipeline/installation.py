@@ -11,24 +11,10 @@ from pathlib import Path
 
 from mlscorr.survey.summary import Summary
 
-PACKAGES = (
-    "numpy",
-    "scipy",
-    "laspy",
-    "lazrs",
-    "pye57",
-    "open3d",
-    "threadpoolctl",
-    "numba",
-    "pyproj",
-    "tomlkit",
-    "openpyxl",
-    "typer",
-    "rich",
-    "pydantic",
-    "matplotlib",
-    "pillow",
-    "jinja2",
+PACKAGES = (  # of numbers and points, of maps and texts, of commands and pages
+    *("numpy", "scipy", "laspy", "lazrs", "pye57", "open3d", "threadpoolctl", "numba"),
+    *("pyproj", "tomlkit", "openpyxl"),
+    *("typer", "rich", "pydantic", "matplotlib", "pillow", "jinja2"),
 )
 # shared library -> Debian package: what importing Open3D and drawing without a screen need
 LIBRARIES = {

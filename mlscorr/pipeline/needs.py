@@ -93,13 +93,9 @@ def amounts_read(survey: Survey, sampled: int) -> tuple[Amount, ...]:
     trajectory = survey.trajectory
     driven = float(np.sum(np.diff(trajectory.passes, axis=1)))
     way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+    points = sum(map(recorded_points, survey.clouds))
     return (
-        Amount(
-            "points",
-            sum(map(recorded_points, survey.clouds)),
-            "",
-            f"headers of {len(survey.cloud_paths)} cloud files",
-        ),
+        Amount("points", points, "", f"headers of {len(survey.cloud_paths)} cloud files"),
         Amount("scanners", len(survey.by_scanner), "", "survey.toml"),
         Amount("passes", sampled, "", f"{IO.sampled_points} times of each file"),
         Amount("trajectory", driven, "s", f"{len(trajectory)} epochs, {way.sum() / 1e3:.2f} km"),

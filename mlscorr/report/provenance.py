@@ -7,15 +7,12 @@ from mlscorr.report.correction_report import CorrectionReport, FileRow
 from mlscorr.report.tables import number, thousands
 from mlscorr.survey import Survey
 
-FRAMES = (
-    ("Map", "easting, northing, height in m, as the files have them"),
-    ("Body", "X right, Y forward, Z up, at the trajectory's navigation centre"),
-    (
-        "Attitude",
-        "heading clockwise from grid north, pitch nose up, roll right side down; "
-        "R = Rz(−heading) Rx(pitch) Ry(roll)",
-    ),
-)
+FRAMES = {
+    "Frame: map": "easting, northing, height in m, as the files have them",
+    "Frame: body": "X right, Y forward, Z up, at the trajectory's navigation centre",
+    "Frame: attitude": "heading clockwise from grid north, pitch nose up, roll right side down; "
+    "R = Rz(−heading) Rx(pitch) Ry(roll)",
+}
 
 TIMES = {"week": "GPS seconds of week", "standard": "adjusted standard GPS time"}
 
@@ -24,16 +21,14 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
     """Pairs (what, value) on systems, frames, and what was believed of the instruments."""
     trajectory, time = survey.trajectory, survey.trajectory.gps_time
     crs = survey.crs or "not stated in survey.toml; coordinates are taken as E, N, H in m"
-    pairs = [("Coordinate reference system", crs)]
-    pairs += [(f"Frame: {name[:1].lower()}{name[1:]}", text) for name, text in FRAMES]
+    pairs = [("Coordinate reference system", crs), *FRAMES.items()]
     pairs.append(("Time of the trajectory", f"gps_time {time[0]:.3f} to {time[-1]:.3f} s"))
     pairs += dict.fromkeys((f"Time of {cloud.path.name}", _time(cloud)) for cloud in survey.clouds)
     rate = 1 / np.median(np.diff(time))
     pairs.append(("Epochs of the trajectory", f"{thousands(len(time))} at {rate:.4g} Hz"))
+    sigma = "its own at each epoch"
     if trajectory.position_sigma is None:
         sigma = f"{survey.pos.position_sigma:g} m at all times, as survey.toml or the default says"
-    else:
-        sigma = "its own at each epoch"
     pairs.append(("Stated sigma of the trajectory's position", sigma))
     for name, part in survey.by_scanner.items():
         text = "not given (not needed: it cancels where only the trajectory is corrected)"
@@ -88,32 +83,18 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     def points(n):
         return thousands(n) + (f" ({100 * n / total:.2f} %)" if n and total else "")
 
-    return [
-        ("Trajectory", span(time[0], time[-1])),
-        (
-            "Control span (first to last control epoch)",
-            span(*covered.control_span) if report.control.n else "no control point takes part",
-        ),
-        ("Longest time without control", f"{number(covered.longest_gap_s)} s"),
-        (
-            "Points outside the trajectory (left as they were)",
-            points(covered.points_outside_trajectory),
-        ),
-        (
-            "Points before the first or past the last control point",
-            points(covered.points_outside_control),
-        ),
-        (
-            "Points whose correction is extrapolated: no control point holds them",
-            points(covered.points_extrapolated),
-        ),
-        (
-            "Time and way whose correction is extrapolated",
-            f"{number(report.seconds_extrapolated, 1)} s, "
-            f"{number(report.metres_extrapolated, 0)} m",
-        ),
-        (
-            "Gaps of the trajectory (nothing is interpolated across them)",
-            len(correction.recorded.gaps),
-        ),
-    ]
+    control = span(*covered.control_span) if report.control.n else "no control point takes part"
+    seconds, metres = number(report.seconds_extrapolated, 1), number(report.metres_extrapolated, 0)
+    outside, beyond = covered.points_outside_trajectory, covered.points_outside_control
+    unheld, gaps = covered.points_extrapolated, correction.recorded.gaps
+    values = {
+        "Trajectory": span(time[0], time[-1]),
+        "Control span (first to last control epoch)": control,
+        "Longest time without control": f"{number(covered.longest_gap_s)} s",
+        "Points outside the trajectory (left as they were)": points(outside),
+        "Points before the first or past the last control point": points(beyond),
+        "Points whose correction is extrapolated: no control point holds them": points(unheld),
+        "Time and way whose correction is extrapolated": f"{seconds} s, {metres} m",
+        "Gaps of the trajectory (nothing is interpolated across them)": len(gaps),
+    }
+    return list(values.items())

@@ -178,9 +178,7 @@ def _legend(rows, arrows, times, short):
     handles += style.mark_handles(WORDS, {row.group for row in rows})
     if times:
         hidden = f" ({short} of {arrows} too short to show)" if short else ""
-        for text, color in (
-            ("Residual before", style.BEFORE),
-            (f"Residual after{hidden}", style.AFTER),
-        ):
+        colours = {"Residual before": style.BEFORE, f"Residual after{hidden}": style.AFTER}
+        for text, color in colours.items():
             handles.append(Line2D([], [], color=color, linewidth=2.5, label=text))
     return handles

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.las import read_chunks, read_records, times_at
+from mlscorr.io.las import read_chunks, read_records, records_at
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_windows import read_windows
 from mlscorr.io.preparation import glance
@@ -110,7 +110,7 @@ def test_any_point_of_unlike_chunks_is_found(pair):
     layout = read_layout(pair[1])
     raw = np.concatenate([r["gps_time"].copy() for r in read_records(layout, 2_999)])
     places = np.unique(np.random.default_rng(0).integers(0, POINTS, 60))
-    assert np.array_equal(times_at(layout, places), raw[places])
+    assert np.array_equal(records_at(layout, places)["gps_time"], raw[places])
     late = next(read_records(layout, 500, first=17_123))["gps_time"]
     assert np.array_equal(late, raw[17_123:17_623])
 

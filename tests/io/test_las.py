@@ -18,10 +18,10 @@ from mlscorr.frames import attitude_from_angles
 from mlscorr.io.las import (
     read_chunks,
     read_layout,
+    records_at,
     sample_gps_times,
     sha256,
     spread_times,
-    times_at,
 )
 from mlscorr.survey import CloudFile, Trajectory
 from tests.beds.copies import write_corrected
@@ -216,7 +216,7 @@ def test_samples_are_spread_over_the_file(suffix, tmp_path):
     assert np.array_equal(times, whole[places]) and len(places) == 65
     assert np.abs(places - np.linspace(0, points - 1, 65)).max() < points / 64
     backwards = places[::-1]
-    assert np.array_equal(times_at(read_layout(path), backwards), whole[backwards])
+    assert np.array_equal(records_at(read_layout(path), backwards)["gps_time"], whole[backwards])
     data = bytearray(path.read_bytes())
     data[6] |= 1
     path.write_bytes(data)

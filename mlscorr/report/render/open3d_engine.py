@@ -42,7 +42,6 @@ def draw_pair(
     RuntimeError
         With what happened, when the child fails.
     """
-    camera = canvases[0].camera
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         np.savez(
@@ -53,11 +52,7 @@ def draw_pair(
             after_rgb=colours[1][canvases[1].drawn],
             point_size=point_size,
             reference=str(reference or ""),
-            focus=camera.focus,
-            axes=camera.axes,
-            size=camera.size,
-            scale=camera.scale,
-            distance=camera.distance,
+            **vars(canvases[0].camera),
         )
         _run(folder, timeout)
         return tuple(np.load(folder / f"{side}.npy")[..., :3] for side in ("before", "after"))
