@@ -94,11 +94,11 @@ def _estimate(drive, parts, home, main):
     survey = drive.survey
     correction = _averaged(survey.trajectory, parts)
     used, left_out = _control(drive, parts, home)
-    names = set(np.array(drive.control.name, dtype=object)[~used])
-    screening = main.estimate.screening
     of_parts = [part.estimate.screening for part in parts]
-    outliers = {out.name: out for part in of_parts for out in part.outliers if out.name in names}
-    tests = {test.name: test for part in of_parts for test in part.tests if test.name not in names}
+    at, names = _epochs(drive, drive.control.gps_time), np.array(drive.control.name, dtype=object)
+    at_home = list(zip(of_parts, [set(names[is_home[at]]) for is_home in home], strict=True))
+    outliers = {out.name: out for part, own in at_home for out in part.outliers if out.name in own}
+    tests = {test.name: test for part, own in at_home for test in part.tests if test.name in own}
     order, filled = main.estimate.order, filled_sigmas(survey.trajectory)[0]
     equations = position_equations(filled, drive.control[used], survey.pos, order, position_prior)
     return replace(
@@ -106,7 +106,7 @@ def _estimate(drive, parts, home, main):
         correction=correction,
         equations=equations,
         screening=replace(
-            screening,
+            main.estimate.screening,
             outliers=tuple(outliers.values()),
             tests=tuple(tests.values()),
             warnings=_distinct([part.warnings for part in of_parts]),
