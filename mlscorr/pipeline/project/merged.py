@@ -81,12 +81,8 @@ def merged_drive(
     notes = _distinct([part.corrected.survey.notes for part in parts])
     misfits = misfit_section(estimate.ties) or {"n": 0, "used": 0, "reason": estimate.untied}
     whole = replace(drive, survey=replace(drive.survey, notes=notes))
-    corrected = CorrectedDrive(
-        **drive_fields(whole, estimate),
-        places=_places(drive, parts, home),
-        section=misfits,
-    )
-    return corrected, state
+    places = _places(drive, parts, home)
+    return CorrectedDrive(**drive_fields(whole, estimate), places=places, section=misfits), state
 
 
 def _estimate(drive, parts, home, main):
