@@ -19,7 +19,7 @@ from numba import njit
 
 from mlscorr.collocation.pattern import Pattern
 
-STRIP = 12  # columns of a panel factored by loops before BLAS takes them to the next ones
+STRIP = 16  # columns of a panel factored by loops, a power of two; BLAS takes them to others
 # Products of smaller values are subnormal numbers, for which a processor takes 100 times as long
 NOTHING = float(np.sqrt(np.finfo(float).tiny))
 
@@ -102,10 +102,12 @@ def _factorise_panel(panel):
     """L_jj and B in the place of A_jj and A_j; the column without a positive pivot, or -1."""
     height, width = panel.shape
     for begin in range(0, width, STRIP):
-        end = min(begin + STRIP, width)
-        if begin > 0:
-            done = panel[begin:, :begin].copy()
+        if begin > 0:  # the largest power of two in it: as many columns before tell as many after
+            span = begin & -begin
+            end = min(begin + span, width)
+            done = panel[begin:, begin - span : begin].copy()
             panel[begin:, begin:end] -= np.dot(done, done[: end - begin].T)
+        end = min(begin + STRIP, width)
         for i in range(begin, height):
             for a in range(begin, min(end, i + 1)):
                 total = panel[i, a]
@@ -224,6 +226,24 @@ def _substitute_back(lower, x):
 
 
 @njit(cache=True, nogil=True)
+def _inverted(lower):
+    """L^-1, L the first rows of lower: strips on the diagonal, then twice as many together."""
+    width = lower.shape[1]
+    inverse = np.eye(width)
+    for begin in range(0, width, STRIP):
+        end = min(begin + STRIP, width)
+        _substitute(lower[begin:end, begin:end], inverse[begin:end, begin:end])
+    span = STRIP
+    while span < width:
+        for middle in range(span, width, 2 * span):
+            before, after = slice(middle - span, middle), slice(middle, min(middle + span, width))
+            known = np.dot(lower[after, before].copy(), inverse[before, before].copy())
+            inverse[after, before] = -np.dot(inverse[after, after].copy(), known)
+        span *= 2
+    return inverse
+
+
+@njit(cache=True, nogil=True)
 def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
     """Blocks of the inverse where the factor has some, in its place.
 
@@ -237,8 +257,7 @@ def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
     for front in range(pattern.start.size - 2, -1, -1):
         panel = _panel(pattern, values, front)
         width = panel.shape[1]
-        root = np.eye(width)
-        _substitute(panel, root)
+        root = _inverted(panel)
         scaled = np.dot(panel[width:], root)  # U
         _drop_nothing(scaled)
         panel[:width] = np.dot(root.T, root)

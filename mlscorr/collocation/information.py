@@ -25,12 +25,7 @@ from mlscorr.collocation.interpolation import CHUNK, interpolate_knots, predicto
 from mlscorr.collocation.knots import Knots, add_prior, prior_roots
 from mlscorr.collocation.model import LARGEST_ERROR
 from mlscorr.collocation.pattern import Pattern, diagonal
-from mlscorr.collocation.row_loops import (
-    add_information,
-    observe_states,
-    row_covariances,
-    send_to_states,
-)
+from mlscorr.collocation.row_loops import add_information, observe, row_covariances
 from mlscorr.collocation.sparse_rows import Sides, SparseRows, check_same
 from mlscorr.collocation.states import Layout
 from mlscorr.collocation.steps import sufficient_steps
@@ -155,10 +150,10 @@ class InformationSolver:
             part = Sides(*(values[asked] for values in sides))
             places = asked[:, None] * self._heights[k] + np.arange(self._heights[k]) + ends[k]
             unit = np.ascontiguousarray(part.white @ (places[:, :, None] == rows))
-            send_to_states(*table, part, unit, x)
+            observe(*table, part, x, unit, True)
             parts.append((part, unit))
         solve_in_place(self.pattern, self._factor, x)
-        left = ((unit, unit - observe_states(*table, part, x)) for part, unit in parts)
+        left = ((unit, self._left(part, unit, x)) for part, unit in parts)
         return sum(np.einsum("nri,nrj->ij", *both) for both in left)
 
     @cached_property
@@ -272,14 +267,19 @@ class InformationSolver:
         """L^-1 H^T R^-1 c (states, c) of columns W c."""
         x = np.zeros((self.pattern.states, white[0].shape[2]))
         for sides, part in zip(self.sides, white, strict=True):
-            send_to_states(self.layout, self.pattern, self._cells, sides, part, x)
+            observe(self.layout, self.pattern, self._cells, sides, x, part, True)
         solve_in_place(self.pattern, self._factor, x)
         return x
 
     def _residuals(self, white, x):
         """W (c - H x)."""
         for sides, part in zip(self.sides, white, strict=True):
-            yield part - observe_states(self.layout, self.pattern, self._cells, sides, x)
+            yield self._left(sides, part, x)
+
+    def _left(self, sides, white, x):
+        left = white.copy()
+        observe(self.layout, self.pattern, self._cells, sides, -x, left, False)
+        return left
 
     def _prior_steps(self, x):
         """Steps of the states from knot to knot, whitened by their prior, and shared errors."""

@@ -5,7 +5,8 @@ Nodes are eliminated in an order of minimum degree, and all that depends on the 
 worked out once.
 
 Sources: George and Liu 1989, SIAM Review 31, 1-19 (minimum degree); Davis 2006, Direct Methods for
-Sparse Linear Systems, chapter 4 (fill).
+Sparse Linear Systems, chapter 4 (fill, postorder); Ashcraft and Grimes 1989, ACM Trans. Math.
+Software 15, 291-309 (fronts that hold some zeros).
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import depth_first_order
 from scipy.sparse.linalg import spilu
 
 
@@ -22,8 +24,8 @@ class Pattern(NamedTuple):
     """Where the blocks of a matrix, of its factor and of its inverse stand.
 
     Nodes and states are in the order of elimination. Nodes in a row below which the factor has the
-    same blocks are a front, whose columns are a panel in ``values``: the block on the diagonal,
-    of which the lower triangle counts, then those below it, each row after the other.
+    same blocks, or nearly, are a front, whose columns are a panel in ``values``: the block on the
+    diagonal, of which the lower triangle counts, then those below it, each row after the other.
 
     Parameters
     ----------
@@ -65,16 +67,14 @@ class Pattern(NamedTuple):
         """
         count = len(sizes)
         place = _elimination_order(count, edges)
-        low, high = np.sort(place[edges].reshape(-1, 2), axis=1).T
-        graph = coo_array((np.ones(len(low)), (low, high)), shape=(count, count)).tocsr()
-        row, column = _fill_in(graph.indptr.astype(np.int64), graph.indices.astype(np.int64))
-        ends = _ends_front(row, column)
+        place = _postorder(*_filled(place, edges))[place]
+        row, column = _filled(place, edges)
+        ordered = np.asarray(sizes, dtype=np.int64)[np.argsort(place)]
+        first = np.append(0, np.cumsum(ordered))
+        ends = _ends_front(row, column, first)
         node = np.append(0, np.flatnonzero(ends) + 1)
         below = np.diff(column)
         row, column = row[np.repeat(ends, below)], np.append(0, np.cumsum(below[ends]))
-        ordered = np.empty(count, dtype=np.int64)
-        ordered[place] = sizes
-        first = np.append(0, np.cumsum(ordered))
         widths = np.diff(first[node])
         above = np.append(0, np.cumsum(ordered[row]))
         height = above[:-1] + np.repeat(widths - above[column[:-1]], np.diff(column))
@@ -109,13 +109,54 @@ def _elimination_order(count, edges):
     return factor.perm_c.astype(np.int64)
 
 
-def _ends_front(row, column):
-    """Which nodes (k,) have other blocks below them than the next one has with its own."""
+def _filled(place, edges):
+    """Nodes below the diagonal of each column of the factor, and where each column begins."""
+    low, high = np.sort(place[edges].reshape(-1, 2), axis=1).T
+    graph = coo_array((np.ones(len(low)), (low, high)), shape=(len(place), len(place))).tocsr()
+    return _fill_in(graph.indptr.astype(np.int64), graph.indices.astype(np.int64))
+
+
+def _postorder(row, column):
+    """Place (k,) of each node in the order in which it follows those that wait for it alone.
+
+    A node's parent is the first one below it. Of several children that with the longest column
+    stands next to its parent. The factor is the same, but children and parents can be fronts.
+    """
     below = np.diff(column)
-    ends = np.ones(len(below), dtype=bool)
-    inner = np.flatnonzero(below[:-1] == below[1:] + 1)
-    ends[inner] = row[column[inner]] != inner + 1
+    count, parent = len(below), np.full(len(below), len(below))  # the root of all
+    parent[below > 0] = row[column[:-1][below > 0]]
+    children = np.lexsort([-below, parent])
+    begin = np.searchsorted(parent[children], np.arange(count + 2))
+    tree = csr_array((np.ones(count), children, begin), shape=(count + 1, count + 1))
+    visited = depth_first_order(tree, count, return_predecessors=False)  # parents first
+    return np.argsort(visited[:0:-1])
+
+
+@njit(cache=True, nogil=True)
+def _ends_front(row, column, first):
+    """Which nodes (k,) end a front: the next isn't their parent, or they cost less apart.
+
+    What counts are multiplications, and values moved: those of a front's product are written and
+    read, and so are those of the matrix from which it is subtracted.
+    """
+    ends = np.ones(column.size - 1, np.bool_)
+    begin, joint_work = 0, 0.0
+    for j in range(column.size - 1):
+        below = 0
+        for i in row[column[j] : column[j + 1]]:
+            below += first[i + 1] - first[i]
+        separate_work = joint_work + _work(first[j + 1] - first[j], below)
+        work = _work(first[j + 1] - first[begin], below)
+        if j > begin and row[column[j - 1]] == j and work <= separate_work:
+            ends[j - 1], joint_work = False, work
+        else:
+            begin, joint_work = j, separate_work - joint_work
     return ends
+
+
+@njit(cache=True, nogil=True)
+def _work(width, below):
+    return width**3 / 3 + width * below * (width + below) + 4 * below**2
 
 
 @njit(cache=True, nogil=True)
@@ -136,20 +177,10 @@ def _fill_in(pointer, index):
             larger = np.empty(2 * row.size + count, dtype=np.int64)
             larger[:end] = row[:end]
             row = larger
-        for k in range(pointer[j], pointer[j + 1]):
-            i = index[k]
-            if i > j and mark[i] != j:
-                mark[i] = j
-                row[end] = i
-                end += 1
+        end = _enter(index[pointer[j] : pointer[j + 1]], j, mark, row, end)
         c = child[j]
         while c >= 0:
-            for k in range(column[c], column[c + 1]):
-                i = row[k]
-                if i > j and mark[i] != j:
-                    mark[i] = j
-                    row[end] = i
-                    end += 1
+            end = _enter(row[column[c] : column[c + 1]], j, mark, row, end)
             c = sibling[c]
         column[j + 1] = end
         row[begin:end].sort()
@@ -157,6 +188,16 @@ def _fill_in(pointer, index):
             parent = row[begin]
             sibling[j], child[parent] = child[parent], j
     return row[:end].copy(), column
+
+
+@njit(cache=True, nogil=True)
+def _enter(nodes, j, mark, row, end):
+    """Write those of some nodes behind the end that column j lacks; its new end."""
+    for i in nodes:
+        if i > j and mark[i] != j:
+            mark[i], row[end] = j, i
+            end += 1
+    return end
 
 
 @njit(cache=True, nogil=True)

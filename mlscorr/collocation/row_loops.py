@@ -130,56 +130,36 @@ def add_information(
 
 
 @njit(cache=True, nogil=True)
-def observe_states(
-    layout: Layout, pattern: Pattern, cells: np.ndarray, sides: Sides, x: np.ndarray
-) -> np.ndarray:
-    """W H x: (n, r, c).
+def observe(
+    layout: Layout, pattern: Pattern, cells: np.ndarray, sides: Sides,
+    x: np.ndarray, y: np.ndarray, transposed: bool,
+) -> None:  # fmt: skip
+    """Y <- y + W H x, or x <- x + H^T W^T y, in place.
 
     Parameters
     ----------
     layout, pattern, cells, sides
         As of add_information.
     x : (n, c) array
-    """
-    out = _room(layout, sides)
-    _, nodes, begin, columns, _ = out
-    observed = np.zeros((*sides.sigma.shape, x.shape[1]))
-    for i in range(sides.unknown.size):
-        _expand(layout, pattern.first, cells, sides, i, out)
-        for a in range(out.number[0]):
-            known = x[pattern.first[nodes[a]] : pattern.first[nodes[a] + 1]]
-            weights = columns[:, begin[a] : begin[a + 1]]
-            for m in range(weights.shape[0]):
-                for p in range(weights.shape[1]):
-                    for c in range(x.shape[1]):
-                        observed[i, m, c] += weights[m, p] * known[p, c]
-    return observed
-
-
-@njit(cache=True, nogil=True)
-def send_to_states(
-    layout: Layout, pattern: Pattern, cells: np.ndarray, sides: Sides, y: np.ndarray, x: np.ndarray
-) -> None:
-    """X <- x + H^T W^T y, in place.
-
-    Parameters
-    ----------
-    layout, pattern, cells, sides
-        As of add_information.
+        Of the states.
     y : (n, r, c) array
-    x : (n, c) array
+        Of the rows.
+    transposed : bool
     """
     out = _room(layout, sides)
     _, nodes, begin, columns, _ = out
     for i in range(sides.unknown.size):
         _expand(layout, pattern.first, cells, sides, i, out)
         for a in range(out.number[0]):
-            target = x[pattern.first[nodes[a]] : pattern.first[nodes[a] + 1]]
+            states = x[pattern.first[nodes[a]] : pattern.first[nodes[a] + 1]]
             weights = columns[:, begin[a] : begin[a + 1]]
             for m in range(weights.shape[0]):
                 for p in range(weights.shape[1]):
                     for c in range(x.shape[1]):
-                        target[p, c] += weights[m, p] * y[i, m, c]
+                        if transposed:
+                            states[p, c] += weights[m, p] * y[i, m, c]
+                        else:
+                            y[i, m, c] += weights[m, p] * states[p, c]
 
 
 @njit(cache=True, nogil=True)

@@ -62,12 +62,14 @@ def thinned_ties(ties: Ties) -> Ties:
     A second of them is believed to SETTINGS.best_second only (``weigh_by_time``): more of them
     would cost time alone. What m visits saw has m - 1 differences that tell something new, not
     m (m - 1) / 2, so the earlier view has as many ties with all later visits together. Those stay
-    whose first place and later pass have the least of some random numbers.
+    whose first place and later pass have the least of some random numbers, in the order of time,
+    in which they are solved twice as fast.
 
     Parameters
     ----------
     ties : Ties
     """
+    ties = ties[np.argsort(ties.gps_time[:, 0], kind="stable")]
     moment = np.floor(ties.gps_time[:, 0] / SETTINGS.moment).astype(np.int64)
     bins = direction_class(ties.direction)
     earlier, later = ties.pass_number.T

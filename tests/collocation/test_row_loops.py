@@ -7,9 +7,8 @@ from mlscorr.collocation.graph import information_edges
 from mlscorr.collocation.pattern import Pattern
 from mlscorr.collocation.row_loops import (
     add_information,
-    observe_states,
+    observe,
     row_covariances,
-    send_to_states,
 )
 from tests.beds.linked_rows import Street
 from tests.collocation.test_block_cholesky import blocks
@@ -56,10 +55,11 @@ def test_states_are_observed_and_told_of_rows(bed):
     rng = np.random.default_rng(1)
     for part, h in zip(sides, observing, strict=True):
         x, y = rng.normal(size=(h.shape[2], 3)), rng.normal(size=(*h.shape[:2], 3))
-        seen = observe_states(*loops, part, x)
+        seen = np.zeros((*part.sigma.shape, x.shape[1]))
+        observe(*loops, part, x, seen, False)
         assert np.abs(seen - h @ x).max() < 1e-9 * np.abs(seen).max()
         sent = np.zeros_like(x)
-        send_to_states(*loops, part, y, sent)
+        observe(*loops, part, sent, y, True)
         assert np.abs(sent - np.einsum("nrs,nrc->sc", h, y)).max() < 1e-9 * np.abs(sent).max()
 
 
