@@ -4,6 +4,8 @@ So a source that is switched off leaves all others as they are, and so does a pu
 returns. Later echoes of a pulse, which a wide beam has, draw from streams of their own.
 """
 
+from concurrent.futures import wait
+
 import numpy as np
 from numba import njit
 from numpy.random import Generator
@@ -60,6 +62,10 @@ class ScannerNoise:
             source: pool().submit(DRAWS[source], streams[0][source], n, value)
             for source, value in self._size.items()
         }
+
+    def wait(self) -> None:
+        """Wait until all are drawn: streams of another block begin where these end."""
+        wait(self._first.values())
 
     def _of(self, source, more=0):
         """Numbers for the first echoes of all pulses, and for some later ones."""

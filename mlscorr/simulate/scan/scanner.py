@@ -195,6 +195,7 @@ def shoot(
         hits = surfaces.hits(rays, origin, divergence, scanner.max_range, room)
         # the next block's noise is drawn while this one is used
         noise = ahead
+        noise.wait()
         ahead = ScannerNoise(scanner, streams, sizes[i + 1]) if i + 1 < len(sizes) else None
         yield _measure(rays, hits, noise)
 
