@@ -225,16 +225,14 @@ def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
     ended = threading.Event()
 
     def sign():
-        return f"{owner}\n{secrets.token_hex(8)}".encode()
+        return f"{owner}\n{secrets.token_hex(8)}"
 
     def keep():
         while not ended.wait(beat):
             with suppress(OSError), asking(lock):  # the next beat may come through
-                lock.fs.pipe_file(lock.path, sign())
+                lock.fs.pipe_file(lock.path, sign().encode())
 
-    while not _is_new(lock, sign()):
-        _wait_for_end(lock, beat)
-        _remove(lock)
+    _take(lock, beat, sign)
     keeper = threading.Thread(target=keep, daemon=True)
     keeper.start()
     try:
@@ -243,6 +241,21 @@ def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
         ended.set()
         keeper.join()
         _remove(lock)
+
+
+def _take(lock, beat, sign):
+    """Make a lock, or take over that of a run which was killed.
+
+    Of two that take it over at once the first one's may be removed by the second: so it counts
+    once it has stayed for a beat.
+    """
+    is_own = _is_new(lock, own := sign())
+    while not is_own:
+        _wait_for_end(lock, beat)
+        _remove(lock)
+        if _is_new(lock, own):
+            sleep(beat)
+        is_own = _content(lock) == own
 
 
 def _remove(lock):
@@ -256,7 +269,7 @@ def _is_new(lock, content):
     try:
         with asking(lock):
             lock.fs.invalidate_cache()
-            lock.fs.pipe_file(lock.path, content, mode="create")
+            lock.fs.pipe_file(lock.path, content.encode(), mode="create")
     except FileExistsError:
         return False
     return True
