@@ -10,7 +10,9 @@ from mlscorr.collocation.states import carry
 
 
 @njit(cache=True, nogil=True)
-def whiten_columns(recursion: Recursion, columns: np.ndarray, out: np.ndarray) -> None:
+def whiten_columns(
+    recursion: Recursion, columns: np.ndarray, out: np.ndarray, inverse: bool = False
+) -> None:
     """Whiten columns by the filter of scalar observations, without keeping its states.
 
     Parameters
@@ -18,50 +20,26 @@ def whiten_columns(recursion: Recursion, columns: np.ndarray, out: np.ndarray) -
     recursion : Recursion
         Without the axis of observations: mixing (n, k), gains (n, d), whiteners (n,).
     columns, out : (n, c) array
+    inverse : bool
+        Give white columns the covariance V0 instead.
     """
     layout, transitions, mixing, gains, whiteners = recursion
     n, c = columns.shape
     x = np.zeros((gains.shape[1], c))
+    innovation = np.empty(c)
     for i in range(n):
         if i > 0:
             carry(layout, transitions[i], x, False)
-        for b in range(c):
-            out[i, b] = columns[i, b]
+        out[i] = 0.0
         for j in range(layout.first.size):
             for b in range(c):
-                out[i, b] -= mixing[i, j] * x[layout.first[j], b]
+                out[i, b] += mixing[i, j] * x[layout.first[j], b]
+        for b in range(c):
+            innovation[b] = columns[i, b] / whiteners[i] if inverse else columns[i, b] - out[i, b]
+            out[i, b] = out[i, b] + innovation[b] if inverse else innovation[b] * whiteners[i]
         for a in range(x.shape[0]):
             for b in range(c):
-                x[a, b] += gains[i, a] * out[i, b]
-        for b in range(c):
-            out[i, b] *= whiteners[i]
-
-
-@njit(cache=True, nogil=True)
-def colour_columns(recursion: Recursion, columns: np.ndarray, out: np.ndarray) -> None:
-    """Give white columns the covariance V0: the inverse of whiten_columns.
-
-    Parameters
-    ----------
-    recursion : Recursion
-        Without the axis of observations: mixing (n, k), gains (n, d), whiteners (n,).
-    columns, out : (n, c) array
-    """
-    layout, transitions, mixing, gains, whiteners = recursion
-    n, c = columns.shape
-    x = np.zeros((gains.shape[1], c))
-    for i in range(n):
-        if i > 0:
-            carry(layout, transitions[i], x, False)
-        for b in range(c):
-            out[i, b] = columns[i, b] / whiteners[i]
-        for a in range(x.shape[0]):
-            for b in range(c):
-                x[a, b] += gains[i, a] * columns[i, b] / whiteners[i]
-        for j in range(layout.first.size):
-            for b in range(c):  # x is the updated state: what the gain added is not predicted
-                gain = gains[i, layout.first[j]] * columns[i, b] / whiteners[i]
-                out[i, b] += mixing[i, j] * (x[layout.first[j], b] - gain)
+                x[a, b] += gains[i, a] * innovation[b]
 
 
 @njit(cache=True, nogil=True)

@@ -15,7 +15,7 @@ from scipy.linalg import solve_triangular
 
 from mlscorr.collocation.model import NOT_POSITIVE, Signal, signal_clocks
 from mlscorr.collocation.recursion import Recursion, filter_covariance
-from mlscorr.collocation.scalar import colour_columns, common_innovations, whiten_columns
+from mlscorr.collocation.scalar import common_innovations, whiten_columns
 from mlscorr.collocation.states import Layout
 
 CHUNK = 64  # columns filtered at once: their states stay in the first cache
@@ -173,7 +173,7 @@ class Whitener:
         if tails is not None:
             noise = rng.choice(tails / np.sqrt(np.mean(tails**2)), noise.shape)
         values = np.empty_like(noise)
-        colour_columns(self.recursion, noise, values)
+        whiten_columns(self.recursion, noise, values, True)
         return values + self.common @ rng.standard_normal((self.common.shape[1], number))
 
     def _filter(self, columns):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.collocation.recursion import Recursion, filter_columns
-from mlscorr.collocation.scalar import colour_columns, common_innovations, whiten_columns
+from mlscorr.collocation.scalar import common_innovations, whiten_columns
 from tests.beds.joint_states import Bed
 
 
@@ -33,7 +33,7 @@ def test_coloured_columns_are_a_root_of_the_covariance(seed):
     "L of unit columns has L L^T = V, and whitening takes it back"
     bed = Bed(seed, n=12, r=1)
     root, back = np.empty((12, 12)), np.empty((12, 12))
-    colour_columns(scalar_recursion(bed), np.eye(12), root)
+    whiten_columns(scalar_recursion(bed), np.eye(12), root, True)
     np.testing.assert_allclose(root @ root.T, bed.total, atol=1e-9)
     np.testing.assert_allclose(root, np.tril(root), atol=1e-12)
     whiten_columns(scalar_recursion(bed), root, back)
@@ -44,7 +44,9 @@ def test_drawn_values_have_the_stated_covariance():
     "20 000 coloured draws vary and covary as V says, to 4 standard errors"
     bed, number = Bed(7, n=6, r=1), 20_000
     drawn = np.empty((6, number))
-    colour_columns(scalar_recursion(bed), np.random.default_rng(1).normal(size=(6, number)), drawn)
+    whiten_columns(
+        scalar_recursion(bed), np.random.default_rng(1).normal(size=(6, number)), drawn, True
+    )
     sigma = np.sqrt(np.diag(bed.total))
     error = np.sqrt((np.outer(sigma, sigma) ** 2 + bed.total**2) / number)
     assert (np.abs(drawn @ drawn.T / number - bed.total) < 4 * error).all()
