@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
@@ -95,16 +95,6 @@ def converted(path: Path) -> Converted:
         When the disk refuses.
     """
     return _converted(path.absolute(), *file_state(path), looked_points())
-
-
-def conversion_notes(paths: Iterable[Path]) -> list[str]:
-    """Sentences on those of some clouds that are no LAS.
-
-    Parameters
-    ----------
-    paths : iterable of Path
-    """
-    return [converted(path).note for path in paths if is_foreign(path)]
 
 
 def read_in_part(path: Path) -> bool:

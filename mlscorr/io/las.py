@@ -43,29 +43,14 @@ def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
         When the file is missing, not LAS, cut off, or without gps_time.
     """
     layout = read_layout(path)
-    times = spread_times(layout)[1]
+    times = spread_records(layout)[1]["gps_time"]
     return layout.points, layout.is_standard, times[np.isfinite(times)]
 
 
-def spread_times(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers and gps_time of points spread over a file, first and last among them, in file order.
-
-    Parameters
-    ----------
-    layout : LasLayout
-
-    Returns
-    -------
-    places : (65 or fewer,) int array
-    times : array of the same length
-        Units: s.
-    """
-    places, records = spread_records(layout)
-    return places, records["gps_time"]
-
-
 def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of points spread as by spread_times, and their records as by records_at.
+    """Numbers of points spread over a file, first and last among them, and their records.
+
+    In the order of the file; records as of records_at.
 
     Parameters
     ----------

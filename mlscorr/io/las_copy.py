@@ -16,13 +16,12 @@ from mlscorr.io.las import read_records, records_at
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.las_output import LasOutput, PlainWriter
+from mlscorr.io.las_writer import INTEGER_LIMIT
 from mlscorr.io.opening import open_file
 from mlscorr.io.output import PART, output_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import is_remote
 from mlscorr.survey import CloudFile, PointCloud
-
-INTEGER_LIMIT = np.iinfo(np.int32).max  # of the coordinates in a file
 
 
 class SupportsApply(Protocol):

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mlscorr.io.las import read_chunks, records_at, spread_times
+from mlscorr.io.las import read_chunks, records_at, spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.settings import SETTINGS
@@ -41,7 +41,8 @@ def read_windows(
     if layout.points <= limit:
         yield from read_chunks(file)
         return
-    places, times = spread_times(layout)
+    places, records = spread_records(layout)
+    times = records["gps_time"]
     if not (np.diff(times) >= 0).all():
         raise ValueError(
             f"The points of {file.path.name} are not in order of time: where a time stands in it "

@@ -93,17 +93,6 @@ class _Reader(io.BufferedReader):
             raise interruption
 
 
-def text_source(path: str | Path, encoding: str) -> Any:
-    """What numpy reads a text file from: its path, or lines of one in a store.
-
-    Parameters
-    ----------
-    path : path
-    encoding : str
-    """
-    return open_file(path, encoding) if is_remote(path) else path
-
-
 def read_bytes(path: str | Path) -> bytes:
     """All of a file.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mlscorr.io.control import read_surveyed
-from mlscorr.io.conversion import conversion_notes
+from mlscorr.io.conversion import converted, is_foreign
 from mlscorr.io.inputs import input_file
 from mlscorr.io.las import read_chunks, spread_records
 from mlscorr.io.las_checks import read_layout
@@ -109,7 +109,7 @@ class SurveyParts:
         settings, recorded, path = self.settings, self.recorded, self.path
         trajectory = recorded.trajectory
         layouts = [*recorded.layouts, *filter(None, [self.layout])]
-        layouts += conversion_notes([file.path for file, _ in read])
+        layouts += [converted(file.path).note for file, _ in read if is_foreign(file.path)]
         cloud_files = tuple(file for file, _ in read)
         check_belongings(path, self.files.sessions, recorded.parts, cloud_files)
         scanners = mounted_scanners(path, settings, cloud_files)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from mlscorr.io.layouts import SEPARATORS, TableLayout, is_comment, not_text
-from mlscorr.io.opening import open_file, text_source
+from mlscorr.io.opening import open_file
 from mlscorr.io.sheets import read_sheets
+from mlscorr.io.storage import is_remote
 from mlscorr.io.text_files import ENCODING, shown
 
 DATE = re.compile(r"\d+[-/:.]\d+[-/:.]\d+")  # of a day or a time of day
@@ -114,7 +115,7 @@ def read_numbers(
         warnings.filterwarnings("ignore", message=".*input contained no data")
         try:
             table = np.loadtxt(
-                text_source(path, ENCODING) if layout.is_own else _plain_lines(layout),
+                _source(path) if layout.is_own else _plain_lines(layout),
                 delimiter="," if layout.is_own else "\t",
                 skiprows=layout.lines if layout.is_own else 0,
                 usecols=columns,
@@ -127,6 +128,11 @@ def read_numbers(
     if not len(table):
         raise ValueError(f"{path} has a header but no epochs.")
     return table * [layout.factors.get(name, 1.0) for name in layout.columns]
+
+
+def _source(path):
+    """What numpy reads a text file from: its path, or lines of one in a store."""
+    return open_file(path, ENCODING) if is_remote(path) else path
 
 
 def _plain_lines(layout):

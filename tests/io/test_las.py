@@ -21,7 +21,7 @@ from mlscorr.io.las import (
     records_at,
     sample_gps_times,
     sha256,
-    spread_times,
+    spread_records,
 )
 from mlscorr.survey import CloudFile, Trajectory
 from tests.beds.copies import write_corrected
@@ -212,7 +212,7 @@ def test_samples_are_spread_over_the_file(suffix, tmp_path):
     points, is_standard, times = sample_gps_times(path)
     whole = laspy.read(path).gps_time
     assert (points, is_standard) == (123_456, False)
-    places = spread_times(read_layout(path))[0]
+    places = spread_records(read_layout(path))[0]
     assert np.array_equal(times, whole[places]) and len(places) == 65
     assert np.abs(places - np.linspace(0, points - 1, 65)).max() < points / 64
     backwards = places[::-1]

@@ -6,7 +6,7 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.las import read_chunks, records_at, spread_times
+from mlscorr.io.las import read_chunks, records_at, spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_windows import read_windows
 from mlscorr.io.settings import SETTINGS
@@ -81,7 +81,7 @@ def test_a_file_of_more_than_2_to_the_32_points(tmp_path):
     assert np.allclose(
         records_at(layout, places)["gps_time"], 357_900.0 + np.array([0.0, 0.007, 0.999])
     )
-    assert spread_times(layout)[0][-1] == points - 1
+    assert spread_records(layout)[0][-1] == points - 1
     spans = np.array([[357_900.4, 357_900.5]])
     windows = list(read_windows(CloudFile(layout.path, points, 0.0, "week"), spans))
     read = PointCloud.concatenate(windows)
