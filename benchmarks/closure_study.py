@@ -12,6 +12,7 @@ import argparse
 from dataclasses import replace
 
 import numpy as np
+from feature_errors import errors
 from gap_mechanisms import STUDIED, sized
 from gap_study import Bed
 
@@ -22,7 +23,6 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import select
-from mlscorr.gap.train.errors import errors
 
 SIZES = (3.0, 5.0, 8.0)  # MDB
 CHECKED = 6  # targets that are check points

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from feature_errors import errors
 from gap_mechanisms import ACTUAL, NOISES, STUDIED, Outside, metric, noisy, sized
 
 from mlscorr.gap.infer.causes import cause_of
@@ -22,7 +23,6 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.separability import compare_signatures
 from mlscorr.gap.infer.verdict import decide, joint_score
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train.errors import errors
 from mlscorr.gap.train.features import Geometry, geometry
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.gap.observe.rows import Rows
-from mlscorr.gap.train.features import Geometry
 
 
 def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
@@ -37,30 +36,6 @@ def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
         walk = walk - 0.6 * fit
     walk = np.convolve(walk, np.ones(5) / 5, mode="same")
     return np.interp(t, grid, walk / np.sqrt(np.mean(walk**2)))
-
-
-def errors(g: Geometry, rng: Generator, kind: str = "sines") -> np.ndarray:
-    """Residuals (m,) of a survey in which no effect acts.
-
-    Parameters
-    ----------
-    g : Geometry
-    rng : Generator
-    kind : str
-        sines or walk.
-    """
-    rows, m = g.rows, len(g.rows)
-    scale = np.exp(0.2 * rng.standard_normal())
-    time = np.append(rows.gps_time, np.where(rows.two_times, rows.gps_time_2, rows.gps_time))
-    order = np.argsort(time)
-    pose = np.empty((2 * m, 6))
-    for i in range(6):
-        pose[order, i] = process(rng, time[order], kind)
-    sigma = np.append(np.full(3, g.survey.pos.position_sigma), g.survey.pos.attitude_sigma)
-    pose *= scale * sigma
-    residual = np.einsum("mi,mi->m", rows.partials, pose[:m])
-    residual += np.einsum("mi,mi->m", rows.partials_2, pose[m:])
-    return residual + scatter(rows, rng)
 
 
 def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:

@@ -1,15 +1,46 @@
-"""Figures of several operating points, side by side."""
+"""What is asked of a study of decisions, and its figures at several operating points."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from mlscorr.gap.infer.decision import OPERATING_POINTS
+from mlscorr.gap.train.fit import figures
+from mlscorr.gap.train.records import Record
 
 
-def print_figures(figures: dict[str, dict[str, tuple[float, int]]]) -> None:
+def study_arguments(about: str | None, first: int, worlds: int) -> argparse.ArgumentParser:
+    """Arguments of a study: where its records are kept, and of which worlds.
+
+    Parameters
+    ----------
+    about : str
+        What it does.
+    first, worlds : int
+        Defaults of the first world's seed, and of their number.
+    """
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("folder", type=Path, help="Where records are kept.")
+    parser.add_argument("--first", type=int, default=first, help="Seed of the first world.")
+    parser.add_argument("--worlds", type=int, default=worlds)
+    parser.add_argument("--cases", type=int, default=24, help="In each world.")
+    parser.add_argument("--replicas", type=int, default=50, help="Of clean surveys.")
+    return parser
+
+
+def print_figures(records: Sequence[Record], probabilities: Sequence[dict[str, float]]) -> None:
     """Print a row each rate, a column each operating point.
 
     Parameters
     ----------
-    figures : dict of dict of (value, cases)
-        By operating point and rate.
+    records : sequence of Record
+    probabilities : sequence of dict
+        Of each record.
     """
-    print(f"{'':46}{'cases':>6}" + "".join(f"{title:>11}" for title in figures))
-    for name, (_, number) in next(iter(figures.values())).items():
-        values = "".join(f"{each[name][0]:11.3f}" for each in figures.values())
+    columns = {
+        title: figures(records, probabilities, costs) for title, costs in OPERATING_POINTS.items()
+    }
+    print(f"{'':46}{'cases':>6}" + "".join(f"{title:>11}" for title in columns))
+    for name, (_, number) in next(iter(columns.values())).items():
+        values = "".join(f"{each[name][0]:11.3f}" for each in columns.values())
         print(f"{name:46}{number:6}{values}")

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from feature_errors import errors as clean_residuals
 
 from mlscorr.collocation.covariance import Covariance
 from mlscorr.gap.infer.causes import infer_causes
@@ -15,7 +16,7 @@ from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.windows import models_with_windows, weigh_windows
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train import errors, features
+from mlscorr.gap.train import features
 
 WINDOWS = ((413215.0, 25.0), (413360.0, 30.0))  # s: one in each pass
 
@@ -24,7 +25,7 @@ WINDOWS = ((413215.0, 25.0), (413360.0, 30.0))  # s: one in each pass
 def survey():
     "Two passes with 40 targets, and errors that no covariance of the estimator describes"
     g = features.geometry(5, targets=40, patches=0, rough=False)
-    return g, errors.errors(g, np.random.default_rng(6), "walk")
+    return g, clean_residuals(g, np.random.default_rng(6), "walk")
 
 
 def drifting(g, residual, bursts, rate=0.02):

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from feature_errors import errors
 
-from mlscorr.gap.train.errors import errors, process, scatter
+from mlscorr.gap.train.errors import process, scatter
 from mlscorr.gap.train.features import geometry
 
 

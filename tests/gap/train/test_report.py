@@ -1,12 +1,30 @@
-"""Tables of figures."""
+"""Tables of figures, and what a study is asked."""
+
+from pathlib import Path
+
+import pytest
 
 from mlscorr.gap.infer.decision import OPERATING_POINTS
-from mlscorr.gap.train.report import print_figures
+from mlscorr.gap.train.fit import figures, out_of_fold
+from mlscorr.gap.train.report import print_figures, study_arguments
+from tests.beds.joint_scores import records
 
 
 def test_a_table_has_a_column_each_operating_point(capsys):
-    "A rate of 0.25 of 8 cases stands under each, three digits"
-    print_figures({title: {"clean": (0.25, 8)} for title in OPERATING_POINTS})
-    head, row = capsys.readouterr().out.splitlines()
+    "Calibration errors stand in the row of that name as figures gives them, three digits"
+    known = records(48)
+    probabilities = out_of_fold(known)
+    print_figures(known, probabilities)
+    head, *rows = capsys.readouterr().out.splitlines()
     assert head.split() == ["cases", *OPERATING_POINTS]
-    assert row.split() == ["clean", "8", *["0.250"] * len(OPERATING_POINTS)]
+    numbers = next(row for row in rows if row.startswith("calibration error")).split()[2:]
+    assert int(numbers[0]) == 48
+    for number, costs in zip(numbers[1:], OPERATING_POINTS.values(), strict=True):
+        expected = figures(known, probabilities, costs)["calibration error"][0]
+        assert float(number) == pytest.approx(expected, abs=5e-4)
+
+
+def test_a_study_needs_a_folder_alone():
+    "All else has defaults, those of the worlds its own"
+    given = study_arguments("", 5000, 10).parse_args(["kept"])
+    assert (given.folder, given.first, given.worlds, given.cases) == (Path("kept"), 5000, 10, 24)

@@ -1,0 +1,31 @@
+"""Errors of made-up surveys of features in which no effect acts, for studies and tests."""
+
+import numpy as np
+from numpy.random import Generator
+
+from mlscorr.gap.train.errors import process, scatter
+from mlscorr.gap.train.features import Geometry
+
+
+def errors(g: Geometry, rng: Generator, kind: str = "sines") -> np.ndarray:
+    """Residuals (m,) of a survey in which no effect acts.
+
+    Parameters
+    ----------
+    g : Geometry
+    rng : Generator
+    kind : str
+        sines or walk.
+    """
+    rows, m = g.rows, len(g.rows)
+    scale = np.exp(0.2 * rng.standard_normal())
+    time = np.append(rows.gps_time, np.where(rows.two_times, rows.gps_time_2, rows.gps_time))
+    order = np.argsort(time)
+    pose = np.empty((2 * m, 6))
+    for i in range(6):
+        pose[order, i] = process(rng, time[order], kind)
+    sigma = np.append(np.full(3, g.survey.pos.position_sigma), g.survey.pos.attitude_sigma)
+    pose *= scale * sigma
+    residual = np.einsum("mi,mi->m", rows.partials, pose[:m])
+    residual += np.einsum("mi,mi->m", rows.partials_2, pose[m:])
+    return residual + scatter(rows, rng)
