@@ -1,6 +1,6 @@
 """A city at the level of small values: what planning, joining and solving of many drives costs.
 
-    python benchmarks/city_study.py [DRIVES ...] [--tiles TILES]
+    python benchmarks/city_study.py [DRIVES ...] [--tiles TILES] [--limit LIMIT] [--seed SEED]
 
 Vehicles wander a grid of streets, 200 s each, at 10 Hz. What each saw of walls, road and poles, and
 the control points of one drive in ten, is made up; no point of a cloud is. Each size runs in a
@@ -63,7 +63,7 @@ CONTROL_SHARE = 0.1  # of the drives
 class City:
     "Streets, drives that wander over them, and what these saw"
 
-    def __init__(self, drives, tiles, seed=0):
+    def __init__(self, drives, tiles, seed):
         self.rng = np.random.default_rng(seed)
         self.edge = max(int(np.sqrt(drives * DURATION * SPEED / BLOCK / 6)), 3)  # seen 3 times
         self.tiles, self.blocks, self.errors = tiles, {}, {}
@@ -177,10 +177,10 @@ class City:
         return Matched(observed, points)
 
 
-def run(number, tiles, limit):
+def run(number, tiles, limit, seed):
     "Print what a city of so many drives costs"
     begin = process_time()
-    city = City(number, tiles)
+    city = City(number, tiles, seed)
     made, memory_before = process_time() - begin, memory()
     places, left, within, states = [], [], [], []
     with threadpool_limits(1):
@@ -223,10 +223,11 @@ def main():
     parser.add_argument("drives", type=int, nargs="*", default=[1, 2])
     parser.add_argument("--tiles", type=int, default=4, help="Of each drive.")
     parser.add_argument("--limit", type=int, default=SETTINGS.area_features, help="Of an area.")
+    parser.add_argument("--seed", type=int, default=0, help="Of the city and its drives.")
     parser.add_argument("--run", action="store_true")
     given = parser.parse_args()
     if given.run:
-        run(given.drives[0], given.tiles, given.limit)
+        run(given.drives[0], given.tiles, given.limit, given.seed)
         return
     heads = (
         "drives",
@@ -244,7 +245,7 @@ def main():
     table = Table(*heads, title=f"{given.tiles} tiles a drive; what is left: 3D RMS of a drive")
     for number in given.drives:
         command = [sys.executable, __file__, str(number), "--tiles", str(given.tiles)]
-        command += ["--limit", str(given.limit), "--run"]
+        command += ["--limit", str(given.limit), "--seed", str(given.seed), "--run"]
         words = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
         table.add_row(*(f"{float(word):.4g}" for word in words))
     Console(width=120).print(table)
