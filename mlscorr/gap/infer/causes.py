@@ -9,12 +9,12 @@ from threadpoolctl import threadpool_limits
 from mlscorr.effects import Effect
 from mlscorr.effects.vehicle import PositionNoise
 from mlscorr.gap.infer.decision import Costs, JointScore, learned
+from mlscorr.gap.infer.detectable import detectable_size
 from mlscorr.gap.infer.error_models import STATED, ErrorModel, error_models
 from mlscorr.gap.infer.labels import LabelEvidence, weigh_labels
 from mlscorr.gap.infer.observations import model_likelihood
 from mlscorr.gap.infer.parameters import (
     CauseParameter,
-    detectable_size,
     effect_parameters,
     fit_amplitudes,
     most_probable_size,

@@ -95,7 +95,7 @@ def weigh_noise(
         elif signature.variance[rows.metric].any():
             metric = _own(observations, signature, evidence, residual, coarse)
             metric = np.array([np.interp(np.log(size), np.log(coarse), v) for v in metric.T]).T
-        by_channel = _channels(rows, signature, size, channels)
+        by_channel = channel_evidence(rows, signature, size, channels)
         results.append(NoiseEvidence(signature.name, number, size, metric, by_channel))
     if any(signature.is_common for signature in signatures):
         size = np.asarray(SETTINGS.drift_sizes)
@@ -167,19 +167,39 @@ def _own(observations, signature, evidence, residual, size):
     ]) - evidence.none[best]  # fmt: skip
 
 
-def _channels(rows, signature, size, values):
-    """Log evidence (x, k) of the rows without a metre, over none."""
-    here = np.isin(rows.channel, CHANNELS)
-    if not (signature.growth[here].any() or signature.jacobian[here].any()):
-        return np.zeros((len(size), values.shape[1]))
-    rough = rows.channel[here] == "roughness"
+def channel_means(rows: Rows, signature: Signature, size: np.ndarray) -> np.ndarray:
+    """What noise of x sizes makes of the q rows without a metre on average: (x, q).
+
+    Parameters
+    ----------
+    rows : Rows
+    signature : Signature
+        Of the noise.
+    size : (x,) array
+    """
+    here, x = np.isin(rows.channel, CHANNELS), np.asarray(size)[:, None]
     growth, shift = signature.growth[here], signature.jacobian[here, 0]
-    likelihood = np.array([
-        _channel_likelihood(
-            values, np.where(rough, np.log1p(growth * x**2), x * shift), rough, rows.noise[here]
-        )
-        for x in (0.0, *size)
-    ])  # fmt: skip
+    return np.where(rows.channel[here] == "roughness", np.log1p(growth * x**2), x * shift)
+
+
+def channel_evidence(
+    rows: Rows, signature: Signature, size: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """Log evidence (x, k) over none of the rows without a metre.
+
+    Parameters
+    ----------
+    rows, signature, size
+        As in ``channel_means``.
+    values : (q, k) array
+        Residuals of these rows.
+    """
+    means = channel_means(rows, signature, np.append(0.0, size))
+    if not means.any():
+        return np.zeros((len(size), values.shape[1]))
+    here = np.isin(rows.channel, CHANNELS)
+    rough, noise = rows.channel[here] == "roughness", rows.noise[here]
+    likelihood = np.array([_channel_likelihood(values, mean, rough, noise) for mean in means])
     return likelihood[1:] - likelihood[0]
 
 

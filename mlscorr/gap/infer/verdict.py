@@ -159,11 +159,20 @@ def _accepted(evidence, score, best):
 
 def _facts(rows, evidence, best):
     """What tells how evidence is to be taken."""
+    observations = evidence.observations
+    raised = observations.errors.raised >= 0
+    is_event = best is not None and bool(effect_class(best).moment())
+    moved = np.zeros(len(raised))
+    if is_event:
+        moved = (_best_columns(evidence, best)[observations.row] ** 2).sum(axis=1)
     return {
         "rough": float((rows.channel == "roughness").any()),
-        "raised": float(np.mean(evidence.observations.errors.raised >= 0)),
-        "event": float(best is not None and bool(effect_class(best).moment())),
+        "raised": float(raised.mean()),
+        "event": float(is_event),
+        "event in raised": float(moved[raised].sum() / max(moved.sum(), 1e-300)),
         "scale": float(np.log(evidence.likely_model("none").scale)),
+        "size": float(np.log(len(observations))),
+        "odd": len(evidence.tail) / len(observations),
     }
 
 

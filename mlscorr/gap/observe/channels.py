@@ -4,11 +4,14 @@ Log intensity is left out: a reference surface has no reflectance, and survey.to
 how strength falls with range, so that there is nothing to compare it with.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from mlscorr.gap.observe.covariates import scanner_origin
 from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.plane_fit import freedom
+from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.survey import Survey
 
@@ -94,11 +97,45 @@ def return_rate(patches: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Returns
     -------
     tuple of three (p,) arrays
-        Share minus 1, its variance, and which patches count: none where the median share is so
-        low that the cloud must have been thinned.
+        Share minus 1, its variance where all lose alike, and which patches count: none where the
+        median share is so low that the cloud must have been thinned.
     """
     fired = np.maximum(patches.fired, 1)
     share, counted = patches.returned / fired, patches.fired >= SETTINGS.fired
     counted &= np.median(share[counted]) >= SETTINGS.thinned if counted.any() else False
-    loss = np.maximum(1.0 - share, SETTINGS.least_loss)
-    return share - 1.0, loss * (1.0 - loss) / fired, counted
+    return share - 1.0, loss_variance(share, fired, counted), counted
+
+
+def loss_variance(share: np.ndarray, fired: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """Variance (p,) of the shares of pulses that return where all patches lose alike.
+
+    It is of what the patches lose together, not each of them: few pulses are lost by chance, and a
+    patch that has lost none would seem to know so.
+
+    Parameters
+    ----------
+    share : (p,) array
+        That returned.
+    fired : (p,) array
+        Pulses.
+    counted : (p,) bool array
+        Patches that say so; of these the tenth that loses most, crowns and edges, is left out.
+    """
+    share_lost = 1.0 - share[counted]
+    usual = share_lost <= np.quantile(share_lost, 0.9) if counted.any() else counted[:0]
+    loss = float(np.average(share_lost[usual], weights=fired[counted][usual])) if usual.any() else 0
+    loss = max(loss, SETTINGS.least_loss)
+    return loss * (1.0 - loss) / fired
+
+
+def with_loss_variance(rows: Rows) -> Rows:
+    """Rows whose return rates have the variance that their losses show.
+
+    Parameters
+    ----------
+    rows : Rows
+    """
+    rate = rows.channel == "return_rate"
+    noise = rows.noise.copy()
+    noise[rate] = loss_variance(1.0 + rows.residual[rate], rows.points[rate], rate[rate])
+    return replace(rows, noise=noise)

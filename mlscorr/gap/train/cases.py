@@ -11,6 +11,7 @@ from numpy.random import Generator
 
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
 from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.observe.channels import with_loss_variance
 from mlscorr.gap.observe.rows import Background, Rows
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.signatures import Signature
@@ -179,8 +180,10 @@ def _noisy(case, ruler, rng, size, _):
         else:
             change = Bench(rows, case.survey).change(drawn.effect, rng)
             own = np.sqrt(change.variance) * rng.standard_normal(len(rows))
-            shift, extra = own + np.log1p(change.growth) + change.shift, change.variance
+            lost = rng.binomial(rows.points, -np.clip(change.shift, -1.0, 0.0)) / rows.points
+            shift, extra = own + np.log1p(change.growth) - lost, change.variance
         rows = replace(rows, residual=rows.residual + shift, noise=rows.noise + extra)
+        rows = with_loss_variance(rows)
         return replace(case, names=(name,), mdb=size, rows=rows)
     return None
 

@@ -8,6 +8,9 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.observe.settings import SETTINGS
+
+ODD = 0.12  # share of patches at most: of trees and cars in streets by ray casting
 
 
 def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
@@ -57,4 +60,20 @@ def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:
     rough = rows.channel == "roughness"
     own[rough] = np.log(rng.chisquare(77, rough.sum()) / 77) + 1 / 77
     own[rough] += 0.1 * rng.standard_normal(rough.sum())
+    rate = rows.channel == "return_rate"
+    share = np.full(rate.sum(), rng.uniform(0.0, SETTINGS.least_loss))
+    own[rate] = -rng.binomial(rows.points[rate], share) / rows.points[rate]
     return rows.survey_design() @ survey + own
+
+
+def odd_patches(rows: Rows, rng: Generator) -> np.ndarray:
+    """What crowns and kerbs make of roughness and return rate (m,): of up to an eighth of patches.
+
+    Parameters
+    ----------
+    rows : Rows
+    rng : Generator
+    """
+    is_odd = (rng.random(rows.item.max() + 1) < rng.uniform(0.0, ODD))[rows.item]
+    rough = 6.0 * rng.random(len(rows)) * (rows.channel == "roughness")
+    return is_odd * (rough - 0.5 * rng.random(len(rows)) * (rows.channel == "return_rate"))

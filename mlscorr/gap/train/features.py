@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from mlscorr.frames import attitude_from_angles, to_scanner
 from mlscorr.gap.observe.assemble import assemble, sample_pulses
 from mlscorr.gap.observe.rows import Background, Rows, SamplePulses, background
+from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.survey import ControlPoints, Mounting, Pos, Scanner, Survey, Trajectory
 
 START, ORIGIN = 413200.0, np.array([523000.0, 3378000.0, 20.0])
@@ -109,7 +110,7 @@ def geometry(
     ----------
     seed, targets, patches, passes : int
     rough : bool
-        Whether roughness is observed.
+        Whether roughness and return rate are observed.
     shared : bool
         Whether patches are compared between two passes, instead of with a reference.
     duration : float
@@ -209,6 +210,14 @@ def _patch_parts(survey, place, normal, counts, which, time, pass_number, rough,
             assemble(
                 survey, "roughness", *common, np.zeros((len(p), 3)), np.zeros(len(p)),
                 np.full(len(p), 2 / 77), points, pulses, pass_number[p], believed=believed,
+            )
+        )  # fmt: skip
+        lost = SETTINGS.least_loss
+        parts.append(
+            assemble(
+                survey, "return_rate", *common, np.zeros((len(p), 3)), np.zeros(len(p)),
+                np.full(len(p), lost * (1 - lost) / 80), points, pulses, pass_number[p],
+                believed=np.ones(len(p)),
             )
         )  # fmt: skip
     return parts

@@ -9,9 +9,9 @@ import numpy as np
 
 from mlscorr.collocation import Whitener
 from mlscorr.effects import Effect
+from mlscorr.gap.infer.detectable import detectable_size
 from mlscorr.gap.infer.error_models import error_models
 from mlscorr.gap.infer.observations import Observations, model_likelihood
-from mlscorr.gap.infer.parameters import random_information
 from mlscorr.gap.infer.separability import explained_square
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Rows, background
@@ -127,10 +127,8 @@ def _systematic(ruler, sign, mdb, rng):
 
 def _random(ruler, sign, mdb):
     """Magnitude (1,) of an effect that shows as noise or lost returns."""
-    information, power = random_information(ruler.rows, ruler.observations, sign)
-    if information == 0:
-        return None
-    return np.array([(mdb * SETTINGS.detectable / np.sqrt(information)) ** (1 / power)])
+    size = detectable_size(ruler.rows, ruler.observations, sign, mdb)
+    return np.array([size]) if np.isfinite(size) else None
 
 
 def _credible(sign, way, mdb):

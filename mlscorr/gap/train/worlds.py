@@ -13,15 +13,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
+from mlscorr.gap.observe.channels import with_loss_variance
 from mlscorr.gap.observe.rows import Background, Rows, background
 from mlscorr.gap.signatures.signatures import Signature, signatures
-from mlscorr.gap.train.errors import process, scatter
+from mlscorr.gap.train.errors import odd_patches, process, scatter
 from mlscorr.gap.train.features import Geometry, geometry
 from mlscorr.simulate.pos import PosError, interpolate, pos_error
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Survey, Trajectory
 
 KINDS = ("sensors", "sensors", "sines", "walk")  # of errors, drawn evenly
+PATCHES = (60, 1000)  # drawn evenly by their logs: a short street to as many as are compared
 RECORDINGS = 6  # of a world's sensors: each costs a fifth of a diagnosis
 SCALE = 0.2  # of the log of the ratio of error to stated sigma: good software knows its noise
 RAISED = (0.3, 0.4)  # mean and spread of the same in outages, where it knows less (pos_study.py)
@@ -55,7 +57,7 @@ class World:
         rng = np.random.default_rng([seed, 0])
         shared, targets = bool(rng.random() < 0.4), int(rng.integers(14, 45))
         passes = 2 if shared or rng.random() < 0.6 else 1
-        patches = int(rng.integers(60, 220)) if shared or rng.random() < 0.7 else 0
+        patches = int(np.exp(rng.uniform(*np.log(PATCHES)))) if shared or rng.random() < 0.7 else 0
         made = geometry(
             seed, targets, patches, passes, rough=bool(patches and rng.random() < 0.8),
             shared=shared, duration=float(rng.uniform(45.0, 80.0)),
@@ -90,7 +92,8 @@ class World:
         pose[:, 3:] = attitude.apply(pose[:, [4, 3, 5]] * [1.0, 1.0, -1.0])  # about body axes
         residual = np.einsum("mi,mi->m", rows.partials, pose[:m])
         residual += np.einsum("mi,mi->m", rows.partials_2, pose[m:])
-        rows = replace(rows, residual=residual + scatter(rows, rng, self.heavy))
+        residual += scatter(rows, rng, self.heavy) + odd_patches(rows, rng)
+        rows = with_loss_variance(replace(rows, residual=residual))
         return rows, background(rows, survey), survey
 
     def _growth(self, rng, time, survey):
