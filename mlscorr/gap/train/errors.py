@@ -67,7 +67,7 @@ def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:
 
 
 def odd_patches(rows: Rows, rng: Generator) -> np.ndarray:
-    """What crowns and kerbs make of roughness and return rate (m,): of up to an eighth of patches.
+    """What crowns and kerbs make of roughness and return rate (m,), in an eighth of them at most.
 
     Parameters
     ----------

@@ -6,7 +6,6 @@ import pytest
 from mlscorr.gap.infer.error_models import STATED
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.parameters import (
-    detectable_size,
     fit_amplitudes,
     most_probable_size,
     window_parameters,
@@ -74,13 +73,3 @@ def test_windows_are_numbered_where_there_are_several():
     assert (start.name, start.unit, start.estimate) == ("start", "s", 10.0)
     assert (length.unit, factor.unit) == ("s", "ratio")
     assert [p.name.split()[-1] for p in window_parameters(windows)] == ["1"] * 3 + ["2"] * 3
-
-
-def test_noise_is_detectable_where_its_square_is_so_many_sigmas(with_surface):
-    "By the roughness of patches: of n patches of variance s^2, sqrt(4.13 s / (g sqrt(n)))"
-    g, signs = with_surface
-    kind = next(s for s in signs if s.name == "range_noise")
-    rough = g.rows.channel == "roughness"
-    sigma = 1 / np.sqrt((kind.growth[rough] ** 2 / g.rows.noise[rough]).sum())
-    size = detectable_size(g.rows, Observations.of(g.rows, g.background), kind)
-    assert size == pytest.approx(np.sqrt(SETTINGS.detectable * sigma))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.observe.channels import return_rate, roughness
+from mlscorr.gap.observe.channels import loss_variance, return_rate, roughness
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.io.las import read_chunks
@@ -77,3 +77,14 @@ def test_lost_returns_are_told_from_a_thinned_cloud(survey, pairing):
     assert np.median(share[told]) == 0.0
     quarter = find_patches(survey, chunks=thinned(lambda n: rng.random(n) < 0.25))
     assert not return_rate(quarter)[2].any()
+
+
+def test_lost_returns_have_the_variance_of_what_all_patches_lose():
+    "Patches of 80 pulses that lose 3 %, a twentieth of them half: binomial, within a tenth"
+    rng, fired = np.random.default_rng(7), np.full(1000, 80)
+    share = 1.0 - rng.binomial(fired, np.where(np.arange(1000) < 50, 0.5, 0.03)) / fired
+    variance = loss_variance(share, fired, np.ones(1000, dtype=bool))
+    assert variance == pytest.approx(0.03 * 0.97 / 80, rel=0.12)
+    assert np.ptp(variance) == 0.0
+    whole = loss_variance(np.ones(3), np.array([20, 40, 80]), np.zeros(3, dtype=bool))
+    assert whole * [20, 40, 80] == pytest.approx(0.002 * 0.998)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from feature_errors import errors
 
-from mlscorr.gap.train.errors import process, scatter
+from mlscorr.gap.train.errors import odd_patches, process, scatter
 from mlscorr.gap.train.features import geometry
 
 
@@ -39,3 +39,25 @@ def test_scatter_has_its_stated_variance_with_light_and_heavy_tails(small):
         rng = np.random.default_rng(1)
         drawn = [scatter(small.rows, rng, heavy)[target] for _ in range(200)]
         assert np.std(drawn) == pytest.approx(stated, rel=0.1)
+
+
+def test_odd_patches_are_rougher_or_lose_more_and_no_length_changes(small):
+    "Up to an eighth of the rows of both channels"
+    rows, shares = small.rows, []
+    for seed in range(20):
+        odd = odd_patches(rows, np.random.default_rng(seed))
+        assert not odd[rows.metric].any()
+        rough, rate = (rows.channel == name for name in ("roughness", "return_rate"))
+        assert odd[rough].min() >= 0.0
+        assert odd[rate].max() <= 0.0
+        shares.append(np.mean(odd[rough | rate] != 0))
+    assert 0.03 < np.mean(shares) < 0.09
+    assert max(shares) < 0.2
+
+
+def test_few_returns_are_lost_where_nothing_acts(small):
+    "A share of 0.2 % at most, over many draws"
+    rate = small.rows.channel == "return_rate"
+    lost = [-scatter(small.rows, np.random.default_rng(seed))[rate].mean() for seed in range(50)]
+    assert 0.0005 < np.mean(lost) < 0.0015
+    assert max(lost) < 0.004

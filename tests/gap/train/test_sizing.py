@@ -42,14 +42,19 @@ def test_the_parameters_are_those_of_the_effect(ruler, name):
     assert np.linalg.norm(way) == pytest.approx(size, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", [name for name in RANDOM if name != "dropout"])
+@pytest.mark.parametrize("name", RANDOM)
 def test_random_effects_grow_with_their_size(ruler, name):
-    "Four times the minimal detectable bias is twice the magnitude, as variances count"
-    one, four = (draw_effect(ruler, KINDS[name], m, np.random.default_rng(2)) for m in (2.0, 8.0))
-    assert four.effect.magnitude == pytest.approx(2 * one.effect.magnitude, rel=1e-6)
-    assert (
-        draw_effect(ruler, KINDS["dropout"], 3.0, np.random.default_rng(2)) is None
-    )  # no such rows
+    "Twice the minimal detectable bias is more noise: some of it, in no survey ten times as much"
+    draws = [draw_effect(ruler, KINDS[name], mdb, np.random.default_rng(2)) for mdb in (1.0, 2.0)]
+    once, twice = (draw.effect.magnitude for draw in draws)
+    assert 1.2 * once < twice < 10 * once
+
+
+def test_noise_that_no_row_shows_is_not_drawn(ruler):
+    "Lost returns where no return rate is known"
+    rows = ruler.rows.select(np.flatnonzero(ruler.rows.channel != "return_rate"))
+    silent = Ruler.of(rows, ruler.survey)
+    assert draw_effect(silent, KINDS["dropout"], 3.0, np.random.default_rng(2)) is None
 
 
 def test_an_effect_stays_credible(ruler):
