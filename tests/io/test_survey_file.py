@@ -195,7 +195,7 @@ def test_all_wrong_keys_come_in_one_error(folder):
         (b'name = "street\n', "not valid TOML: .*at line 1"),
         (TOML.replace("[cloud]", "[cloud").encode(), "not valid TOML: .*at line 5"),
         (b"name = 'a'\nname = 'b'\n", "not valid TOML"),
-        (b"name = '\xff\xfe'\n", "not a text file in UTF-8"),
+        (b"name = '\xff\xfe'\n", "not a text file in UTF-8; .*mlscorr init"),
         (b"", "cloud is missing. trajectory is missing"),
     ],
 )
