@@ -1,6 +1,6 @@
 """How often a diagnosis was right: answers against labels, with intervals and goals."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.stats import binomtest, bootstrap
@@ -8,6 +8,7 @@ from scipy.stats import binomtest, bootstrap
 from mlscorr.blind.answers import AnsweredCase
 from mlscorr.blind.settings import SETTINGS
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
+from mlscorr.gap.train.fit import calibration_error
 
 
 def score(cases: dict[str, tuple[dict, dict]]) -> dict:
@@ -95,22 +96,8 @@ def _figures(answered):
     probability = [case.verdict["probability"] for case in stated]
     right = [case.is_right for case in stated]
     name = "calibration error of the probability"
-    yield _figure(name, list(zip(probability, right, strict=True)), calibration_error, maximum=0.04)
-
-
-def calibration_error(stated: Iterable[tuple[float, bool]]) -> float:
-    """Mean distance of stated probabilities from how often they were right, over five bins.
-
-    Parameters
-    ----------
-    stated : iterable of (probability, whether right)
-    """
-    probability, right = np.array(list(stated), dtype=float).T
-    number = np.clip((probability * SETTINGS.bins).astype(int), 0, SETTINGS.bins - 1)
-    return sum(
-        abs(probability[number == b].mean() - right[number == b].mean()) * (number == b).mean()
-        for b in np.unique(number)
-    )
+    pairs = list(zip(probability, right, strict=True))
+    yield _figure(name, pairs, lambda values: calibration_error(*values.T), maximum=0.04)
 
 
 def _share(name, hits, minimum=None, maximum=None):

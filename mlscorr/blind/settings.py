@@ -30,8 +30,6 @@ class Settings:
     # squared correlation with an effect above which a mechanism is that effect
     unlikeness: float = 0.5
     # squared correlation below which another effect is wrongly named
-    bins: int = 5
-    # of the stated probability: 300 cases fill no more
 
 
 SETTINGS = Settings()

@@ -49,8 +49,8 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
         document = tomllib.loads(read_bytes(path).decode(ENCODING))
     except UnicodeDecodeError:
         raise ValueError(
-            f"{path} is not a text file in UTF-8; {kind} is a TOML file. `mlscorr init FOLDER` writes "
-            "that of a survey."
+            f"{path} is not a text file in UTF-8; {kind} is a TOML file. `mlscorr init FOLDER` "
+            "writes that of a survey."
         ) from None
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path} is not valid TOML: {error}.") from None

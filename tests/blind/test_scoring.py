@@ -2,7 +2,7 @@
 
 import pytest
 
-from mlscorr.blind.scoring import calibration_error, score
+from mlscorr.blind.scoring import score
 
 
 def label(kind, *names, mdb=3.0, likeness=None, without="range_bias", mechanism=None):
@@ -116,9 +116,3 @@ def test_a_diagnosis_that_gave_up_is_never_right():
     rows, told = scored((label("single", "range_bias"), {"error": "Nothing to compare."}))
     assert rows["right at 3 MDB and more"]["value"] == 0.0
     assert told["failed"] == {"0000": "Nothing to compare."}
-
-
-def test_calibration_compares_what_was_stated_with_what_was_right():
-    "Stated 0.9 and right in 9 of 10 is calibrated; right in 5 of 10 is off by 0.4"
-    assert calibration_error([(0.9, i < 9) for i in range(10)]) == pytest.approx(0.0, abs=1e-12)
-    assert calibration_error([(0.9, i < 5) for i in range(10)]) == pytest.approx(0.4)

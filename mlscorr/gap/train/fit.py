@@ -19,7 +19,7 @@ PENALTIES = (0.01, 0.03, 0.1, 0.3, 1.0)  # inverse ones of squared weights, chos
 SHARPNESS = np.linspace(0.2, 1.5, 27)  # factors on scores within a kind that are tried
 SHARES = (0.002, 0.01, 0.03, 0.06, 0.1, 0.2)  # shares of what no evidence tells that are tried
 FOLDS = 8  # of worlds
-BINS = 5  # of the stated probability, as in the blind check
+BINS = 5  # of the stated probability: 300 cases of a blind check fill no more
 
 
 def fit(records: Sequence[Record]) -> LearnedDecision:
@@ -172,12 +172,19 @@ def figures(
     }  # fmt: skip
     stated = np.array([p[label] for p, label in zip(probabilities, labels, strict=True)])
     hit = np.array([right(r, label) for r, label in pairs], dtype=float)
-    rates["calibration error"] = (_calibration_error(stated, hit), len(records))
+    rates["calibration error"] = (calibration_error(stated, hit), len(records))
     return rates
 
 
-def _calibration_error(stated, hit):
-    """Mean distance of stated from reached probability, over bins of the former."""
+def calibration_error(stated: np.ndarray, hit: np.ndarray) -> float:
+    """Mean distance of stated probabilities from how often they were right, over bins of them.
+
+    Parameters
+    ----------
+    stated : (n,) array
+    hit : (n,) array
+        One where it was right, else zero.
+    """
     bins = np.clip((stated * BINS).astype(int), 0, BINS - 1)
     return float(sum(abs(np.sum(stated[bins == b] - hit[bins == b])) for b in range(BINS))
                  / len(stated))  # fmt: skip

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.infer.decision import Costs, LearnedDecision
-from mlscorr.gap.train.fit import code_hash, document, figures, fit, hash_of, out_of_fold
+from mlscorr.gap.train.fit import (
+    calibration_error,
+    code_hash,
+    document,
+    figures,
+    fit,
+    hash_of,
+    out_of_fold,
+)
 from tests.beds.joint_scores import joint, records
 
 
@@ -51,3 +59,10 @@ def test_hashes_tell_what_made_them():
     "Another order is another hash; that of the code is the same each time"
     assert hash_of(["a", "b"]) != hash_of(["b", "a"])
     assert code_hash() == code_hash()
+
+
+def test_calibration_is_the_distance_of_stated_from_reached():
+    "Stated 0.9: nine of ten right is 0, five of ten 0.4"
+    stated, number = np.full(10, 0.9), np.arange(10)
+    assert calibration_error(stated, number < 9) == pytest.approx(0.0, abs=1e-12)
+    assert calibration_error(stated, number < 5) == pytest.approx(0.4)
