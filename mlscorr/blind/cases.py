@@ -10,12 +10,12 @@ import numpy as np
 
 from mlscorr.blind.grading import grading_mechanisms
 from mlscorr.blind.mix import Case
-from mlscorr.blind.settings import SETTINGS
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.train.cases import ATTEMPTS, LIKENESS
 from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
 from mlscorr.io.survey_file import read_survey
 from mlscorr.simulate.mechanisms import load_mechanisms
@@ -49,18 +49,18 @@ def make_case(
     ValueError
         When no survey can be made that shows what the case should have.
     """
-    for number in range(SETTINGS.tries):
+    for number in range(ATTEMPTS):
         try:
             label, survey = _drawn(folder.name, case, (*entropy, number), find_targets, mechanisms)
             if label is not None:
                 survey.write(folder)
                 break
         except ValueError:
-            if number == SETTINGS.tries - 1:
+            if number == ATTEMPTS - 1:
                 raise
     else:
         raise ValueError(
-            f"None of {SETTINGS.tries} surveys shows a {case.kind} case of {case.mdb:.1f} times "
+            f"None of {ATTEMPTS} surveys shows a {case.kind} case of {case.mdb:.1f} times "
             f"the minimal detectable bias ({', '.join(case.names)} first): choose another seed."
         )
     for name in TRUTH:
@@ -112,7 +112,7 @@ def _effects(ruler, known, case, rng):
     """Pairs of SizedEffect and its likeness; None when the geometry shows too few."""
     pool = RANDOM if case.kind == "noise" else SYSTEMATIC
     names, drawn = list(case.names), []
-    for _ in range(SETTINGS.tries):
+    for _ in range(ATTEMPTS):
         name = names.pop(0) if names else str(rng.choice(pool))
         if name in (sized.effect.name for sized, _ in drawn):
             continue
@@ -169,7 +169,7 @@ def _mechanism(ruler, known, case, path, rng):
     the geometry shows none that is unlike all effects.
     """
     outside, names = outside_mechanisms(path), list(case.names)
-    for _ in range(SETTINGS.tries):
+    for _ in range(ATTEMPTS):
         name = names.pop(0) if names else str(rng.choice(list(outside)))
         function, (unit, largest), lead = outside[name]
         chance, sign = int(rng.integers(2**32)), float(rng.choice([-1, 1]))
@@ -182,7 +182,7 @@ def _mechanism(ruler, known, case, path, rng):
         if unit_mdb == 0.0 or case.mdb / unit_mdb > largest:
             continue
         like = likeness(ruler, shift, known)
-        if max(like.values()) > SETTINGS.likeness:
+        if max(like.values()) > LIKENESS:
             continue
         size = sign * case.mdb / unit_mdb
         part = {

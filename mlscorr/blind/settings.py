@@ -24,10 +24,6 @@ class Settings:
     # MDB, of pairs, withheld ones and mechanisms: what a diagnosis should not miss
     noise_sizes: tuple[float, float] = (2.0, 8.0)
     # MDB of noise, whose information grows with the square of its size
-    tries: int = 12
-    # surveys, and effects in each, where one shows none of what it should have
-    likeness: float = 0.8
-    # squared correlation with an effect above which a mechanism is that effect
     unlikeness: float = 0.5
     # squared correlation below which another effect is wrongly named
 

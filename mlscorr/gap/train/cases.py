@@ -30,7 +30,7 @@ SIZES = {  # MDB, between which sizes are drawn evenly by their logs
     **{"single": (1.0, 8.0), "pair": (2.0, 6.0), "withheld": (2.0, 8.0), "outside": (2.0, 8.0)},
     "noise": (1.0, 8.0),
 }
-ATTEMPTS = 12  # effects or mechanisms, where the geometry shows none
+ATTEMPTS = 12  # surveys, effects or mechanisms, where the geometry shows none
 LIKENESS = 0.8  # squared correlation with an effect above which a mechanism is that effect
 DRIFTS = 0.3  # share of cases of position noise in which drift is larger than stated
 

@@ -14,7 +14,7 @@ from mlscorr.simulate.scan.echoes import Hits
 from mlscorr.simulate.scan.threads import in_slices, pool
 from mlscorr.simulate.settings import SETTINGS
 
-FULL_SCALE = 65535  # of intensity
+FULL_SCALE = np.iinfo(np.uint16).max  # of intensity, as LAS holds it
 
 
 def _normal(stream, n, sigma):
