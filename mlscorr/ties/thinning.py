@@ -35,7 +35,7 @@ def thin(features: TieFeatures, origin: np.ndarray) -> np.ndarray:
     moment = np.floor(features.gps_time / SETTINGS.moment).astype(np.int64)
     bins = 2 * direction_class(features.direction) + (features.kind == "pole")
     chances = [
-        _chance(np.floor((features.centre - origin) / edge).astype(np.int64))
+        integer_hash(np.floor((features.centre - origin) / edge).astype(np.int64))
         for edge in (SETTINGS.block, SETTINGS.cell)
     ]
     group = np.column_stack([features.pass_number, moment, bins])
@@ -52,7 +52,7 @@ def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
     """
     if len(features) <= number:
         return features
-    chance = _chance(np.floor(features.centre / SETTINGS.block).astype(np.int64))
+    chance = integer_hash(np.floor(features.centre / SETTINGS.block).astype(np.int64))
     return features[chance <= np.partition(chance, number)[number]]
 
 
@@ -75,7 +75,7 @@ def thinned_ties(ties: Ties) -> Ties:
     earlier, later = ties.pass_number.T
     group = np.column_stack([earlier, ties.scanner[:, 1], moment, np.minimum(bins, 26 - bins)])
     cell = np.floor(ties.place[:, 0] / SETTINGS.cell).astype(np.int64)
-    chance = _chance(np.column_stack([cell, later]))
+    chance = integer_hash(np.column_stack([cell, later]))
     return ties[_least(group, [ties.gps_time[:, 0], chance], SETTINGS.ties)]
 
 
@@ -88,10 +88,15 @@ def _least(group, order, number):
     return np.sort(rows[rank < number])
 
 
-def _chance(cells):
-    """A random 64-bit number (n,) that depends on integers (n, k) alone."""
-    mixed = np.zeros(len(cells), np.uint64)
-    for number in cells.T:
+def integer_hash(numbers: np.ndarray) -> np.ndarray:
+    """A 64-bit number (n,) of integers (n, k): random, but the same for the same ones.
+
+    Parameters
+    ----------
+    numbers : (n, k) int array
+    """
+    mixed = np.zeros(len(numbers), np.uint64)
+    for number in numbers.T:
         mixed ^= number.astype(np.uint64)
         mixed *= np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio (Fibonacci hashing)
         mixed ^= mixed >> np.uint64(32)

@@ -48,11 +48,11 @@ def detectable_size(
         In the effect's unit, to a few percent; nan where none within 4 000 times the usual one is.
     """
     shown = _channels if channel_means(rows, kind, kind.typical).any() else _metric
-    wanted = 0.5 * (mdb * SETTINGS.detectable) ** 2
+    bias_evidence = 0.5 * (mdb * SETTINGS.detectable) ** 2
 
     def excess(doublings):
         evidence = shown(rows, observations, kind, kind.typical[0] * 2.0**doublings)
-        return np.log(max(evidence / wanted, np.finfo(float).tiny))
+        return np.log(max(evidence / bias_evidence, np.finfo(float).tiny))
 
     at = excess(doublings := 0)
     way = -1 if at > 0 else 1

@@ -7,6 +7,7 @@ from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.targets import SETTINGS as TARGETS
+from mlscorr.ties.thinning import integer_hash
 
 
 def fit_patches(
@@ -66,22 +67,13 @@ def place_key(xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
     (n,) uint64 array
     """
     cell = np.floor(xyz / SETTINGS.cell).astype(np.int64)
-    return _mix(*cell.T, np.floor(gps_time / SETTINGS.moment).astype(np.int64))
-
-
-def _mix(*numbers):
-    """One 64-bit number (n,) of several integers (n,), different for all that occur together."""
-    mixed = np.zeros(len(numbers[0]), np.uint64)
-    for number in numbers:
-        mixed ^= number.astype(np.uint64)
-        mixed *= np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio (Fibonacci hashing)
-        mixed ^= mixed >> np.uint64(32)
-    return mixed
+    moment = np.floor(gps_time / SETTINGS.moment).astype(np.int64)
+    return integer_hash(np.column_stack([cell, moment]))
 
 
 def chance(*numbers: np.ndarray) -> np.ndarray:
     """A number from 0 to 1 (n,) that depends on integers (n,) alone."""
-    return (_mix(*numbers) >> np.uint64(11)) / float(1 << 53)
+    return (integer_hash(np.column_stack(numbers)) >> np.uint64(11)) / float(1 << 53)
 
 
 def _fit(survey, chunk, rows, count, block):

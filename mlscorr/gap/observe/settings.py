@@ -4,23 +4,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mlscorr.ties.settings import SETTINGS as TIES
+
 
 @dataclass(frozen=True)
 class Settings:
     """How patches are made, when two of them are one plane, and what is too far off.
 
-    Sizes are those of street scenes; ``python benchmarks/gap_study.py`` shows what they give.
+    Sizes are those of street scenes, some of them those of ties;
+    ``python benchmarks/gap_study.py`` shows what they give.
     """
 
     # patches
-    cell: float = 1.0  # m: some hundred points of a scanner in a street, flat for most of them
-    moment: float = 1.0  # s: the POS error is one value over it (a POS has a bandwidth of 1 Hz)
+    cell: float = TIES.cell  # m
+    moment: float = TIES.moment  # s
     block_cells: int = 4  # cells that are kept or left together, so that neighbours stay
-    plane_points: int = 24  # of a plane: a variance of 21 degrees of freedom is known to a third
+    plane_points: int = TIES.points  # of a plane
     samples: int = 12  # pulses that stand for a patch: their mean has a third of their scatter
     trims: tuple[float, ...] = (2.0, 2.5, 3.0, 3.5)  # sigmas; the last takes 0.05 % of the noise
     rule: float = 0.9  # share from which on a part stands for the whole: of points, of pauses
-    roughest: float = 0.05  # m about a plane: asphalt and masonry have centimetres, shrubs more
+    roughest: float = TIES.roughest  # m about a plane
     narrowest: float = 0.12  # m, one sigma across a patch: a normal to 1 deg from noise of 2 mm
     file_step: float = 1e-3  # m: the usual scale factor of LAS coordinates
     patches: int = 1000  # on surfaces, of up to three rows; 200 were enough in gap_study
@@ -34,10 +37,10 @@ class Settings:
     odd_distance: float = 0.03  # m: more than attitude errors make within a window
     odd_sigmas: float = 6.0  # of a window's own scatter
     bins: int = 8  # of each covariate, over which a choice is spread
-    pair_pause: float = 10.0  # s between two visits of one pass: the POS error is another one
+    pair_pause: float = TIES.pause  # s between two visits of one pass
     pair_distance: float = 0.7  # cells between the middles of two patches of one plane
     parallel: float = float(np.radians(8.0))  # rad: patches of few points know their normal so well
-    surface_sigma: float = 0.002  # m: walls and roads are no planes, nor facets of static scans
+    surface_sigma: float = TIES.surface_sigma  # m; facets of static scans are no planes either
     facet_share: float = 0.75  # of a patch's beams that must meet one plane of the reference
     overlap: float = 0.01  # of the patches on the reference; fewer are chance: it lies elsewhere
     same_time: float = 1e-6  # s: of one pulse in two files; a scanner of 1 MHz fires as often

@@ -10,7 +10,7 @@ from numpy.random import Generator
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.observe.settings import SETTINGS
 
-ODD = 0.12  # share of patches at most: of trees and cars in streets by ray casting
+ODD_SHARE = 0.12  # share of patches at most: of trees and cars in streets by ray casting
 
 
 def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
@@ -74,6 +74,6 @@ def odd_patches(rows: Rows, rng: Generator) -> np.ndarray:
     rows : Rows
     rng : Generator
     """
-    is_odd = (rng.random(rows.item.max() + 1) < rng.uniform(0.0, ODD))[rows.item]
+    is_odd = (rng.random(rows.item.max() + 1) < rng.uniform(0.0, ODD_SHARE))[rows.item]
     rough = 6.0 * rng.random(len(rows)) * (rows.channel == "roughness")
     return is_odd * (rough - 0.5 * rng.random(len(rows)) * (rows.channel == "return_rate"))

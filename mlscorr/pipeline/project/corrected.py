@@ -131,10 +131,11 @@ def _state(part, number, area):
     owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
     if estimate.used[owner == number].any():
         state = "controlled"
-    elif part.is_controlled:
+    elif estimate.used.any():
         state = "tied"
     else:
-        state = "relative" if part.is_tied else "uncorrected"
+        is_tied = estimate.ties is not None and estimate.ties.used.any()
+        state = "relative" if is_tied else "uncorrected"
     return DriveState(drive.survey.name, state, _ties(part, number, area))
 
 

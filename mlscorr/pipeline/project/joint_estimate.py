@@ -27,16 +27,6 @@ class JointEstimate:
     joint: JointDrives
     estimate: Estimate
 
-    @property
-    def is_controlled(self) -> bool:
-        """Whether a control point takes part."""
-        return bool(self.estimate.used.any())
-
-    @property
-    def is_tied(self) -> bool:
-        """Whether ties take part."""
-        return self.estimate.ties is not None and bool(self.estimate.ties.used.any())
-
 
 def estimate_group(
     group: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool
