@@ -72,7 +72,7 @@ def main():
     """Collect what lacks, and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--records", type=Path, default=Path("build/records"))
-    parser.add_argument("--worlds", type=int, default=80)
+    parser.add_argument("--worlds", type=int, default=69)
     parser.add_argument("--picture", type=Path, default=Path("decision_costs.png"))
     given = parser.parse_args()
     mechanisms = known_mechanisms(Path(__file__).parents[1] / "tests/withheld/mechanisms.py")
