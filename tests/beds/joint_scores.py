@@ -5,7 +5,8 @@ import numpy as np
 from mlscorr.gap.infer.decision import JointScore
 from mlscorr.gap.train.records import Record
 
-FACTS = {"rough": 1.0, "raised": 0.0, "event": 0.0, "scale": 0.0}
+FACTS = dict.fromkeys(("rough", "raised", "event", "event in raised", "scale", "size", "odd"), 0.0)
+FACTS |= {"rough": 1.0, "size": 6.0}
 EFFECTS = ("range_bias", "time_offset", "boresight")
 
 
