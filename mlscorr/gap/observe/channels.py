@@ -124,7 +124,7 @@ def loss_variance(share: np.ndarray, fired: np.ndarray, counted: np.ndarray) -> 
     share_lost = 1.0 - share[counted]
     usual = share_lost <= np.quantile(share_lost, 0.9) if counted.any() else counted[:0]
     loss = float(np.average(share_lost[usual], weights=fired[counted][usual])) if usual.any() else 0
-    loss = max(loss, SETTINGS.least_loss)
+    loss = min(max(loss, SETTINGS.least_loss), 1.0 - SETTINGS.least_loss)
     return loss * (1.0 - loss) / fired
 
 

@@ -11,6 +11,7 @@ from mlscorr.gap.infer.noise import channel_evidence, draw_channels
 from mlscorr.gap.infer.observations import Observations, model_likelihood
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.channels import with_loss_variance
+from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.changes import Bench
 
 
@@ -78,3 +79,13 @@ def test_what_does_not_show_has_no_size(with_surface):
     nothing = np.zeros(len(g.rows))
     kind = replace(kind_of(signs, "range_noise"), growth=nothing, variance=nothing)
     assert np.isnan(size_of(g, kind))
+
+
+def test_one_patch_can_not_say_that_all_returns_are_lost(with_surface):
+    "A single return rate, which may be odd: no share of lost returns shows as 20 MDB"
+    g, signs = with_surface
+    lone = np.append(np.flatnonzero(g.rows.metric), np.argmax(g.rows.channel == "return_rate"))
+    rows, whole = g.rows.select(lone), kind_of(signs, "dropout")
+    columns = {name: getattr(whole, name)[lone] for name in ("jacobian", "variance", "growth")}
+    observed = Observations.of(rows, background(rows, g.survey))
+    assert np.isnan(detectable_size(rows, observed, replace(whole, **columns), 20.0))

@@ -88,3 +88,9 @@ def test_lost_returns_have_the_variance_of_what_all_patches_lose():
     assert np.ptp(variance) == 0.0
     whole = loss_variance(np.ones(3), np.array([20, 40, 80]), np.zeros(3, dtype=bool))
     assert whole * [20, 40, 80] == pytest.approx(0.002 * 0.998)
+
+
+def test_where_all_is_lost_the_variance_stays_positive():
+    "Nothing returns from 3 patches of 80 pulses: that of a loss of 99.8 %"
+    variance = loss_variance(np.zeros(3), np.full(3, 80), np.ones(3, dtype=bool))
+    assert variance * 80 == pytest.approx(0.998 * 0.002)
