@@ -20,8 +20,8 @@ from mlscorr.gap.observe.channels import with_loss_variance
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.signatures.signatures import Signature
 
-DRAWS = 8  # of noisy residuals: their mean evidence to a tenth where it is that of 4 sigmas
-DOUBLINGS = 12  # of the usual size, up and down, between which a size is sought
+DRAWS = 8  # of noisy residuals: the evidence of 4 sigmas scatters by 4, the mean of 8 by a sixth
+DOUBLINGS = 12  # of the usual size, up and down: 1 um of range noise to 20 m
 
 
 # Hundreds of products of small matrices, as in weigh_labels.
@@ -45,7 +45,7 @@ def detectable_size(
     Returns
     -------
     size : float
-        In the effect's unit, to a few percent; nan where none within 4 000 times the usual one is.
+        In the effect's unit, within a fifth; nan where none within 4 000 times the usual one is.
     """
     shown = _channels if channel_means(rows, kind, kind.typical).any() else _metric
     bias_evidence = 0.5 * (mdb * SETTINGS.detectable) ** 2
