@@ -57,6 +57,8 @@ class Estimate(Summary):
         What is left of the ties that were given.
     untied : str
         Why there are none, where somebody looked for them.
+    held : Support, optional
+        What holds the correction, where it is known already.
     """
 
     correction: Correction
@@ -70,6 +72,7 @@ class Estimate(Summary):
     notes: tuple[str, ...]
     ties: TieResiduals | None = None
     untied: str = ""
+    held: Support | None = None
 
     @property
     def order(self) -> int:
@@ -114,6 +117,8 @@ class Estimate(Summary):
     @cached_property
     def support(self) -> Support:
         """Where control points hold the correction, and where it is extrapolated."""
+        if self.held is not None:
+            return self.held
         solved = self.equations.solve(self.parameters)
         return find_support(self.equations, solved, self.parameters, self.correction.corrected)
 
@@ -249,9 +254,11 @@ def _estimate(trajectory, names, predictions, screening, notes):
     solved = kept.solve(parameters)
     left_out = np.full((len(names), 3), np.nan)
     left_out[used] = leave_targets_out(kept, solved)
-    correction = Correction.by_pose_error(
-        trajectory, *predict_pose_error(kept, posterior, predictions)
-    )
+    pose_error = predict_pose_error(kept, posterior, predictions, solved)
+    correction = Correction.by_pose_error(trajectory, *pose_error)
+    held = None
+    if kept.ties is not None:  # later it would cost another solution of all rows
+        held = find_support(kept, solved, parameters, correction.corrected)
     return Estimate(
         correction=correction,
         equations=kept,
@@ -262,6 +269,7 @@ def _estimate(trajectory, names, predictions, screening, notes):
         sigma0=solved.sigma0,
         guards=find_guards(kept, parameters, correction.corrected),
         notes=notes,
+        held=held,
     )
 
 

@@ -69,7 +69,10 @@ class GridPredictions:
 
 
 def predict_pose_error(
-    equations: Equations, posterior: Posterior, predictions: GridPredictions | None = None
+    equations: Equations,
+    posterior: Posterior,
+    predictions: GridPredictions | None = None,
+    solved: Collocation | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """POS error (n, 6) at every epoch, trend plus signals (Eq. 15), with covariance (n, 6, 6).
 
@@ -84,9 +87,12 @@ def predict_pose_error(
     posterior : Posterior
     predictions : GridPredictions, optional
         By these equations, where some are known.
+    solved : Collocation, optional
+        Of these equations under the most probable parameters, where somebody holds it.
     """
-    trajectory = equations.trajectory
-    pose, covariance = predict_under(equations, posterior.modes[0][0])
+    trajectory, mode = equations.trajectory, posterior.modes[0][0]
+    solved = solved or equations.solve(mode)
+    pose, covariance = solved.predict(*pose_rows(equations, mode))
     sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), SETTINGS.smallest_sigma**2))
     predictions = predictions or GridPredictions(equations)
     rows, mean, square = predictions.rows, 0.0, 0.0

@@ -90,14 +90,16 @@ def single_test(equations: Equations, name: str, posterior: Posterior) -> Target
 def _tests(equations, names, posterior, targets, visit=None):
     """TargetTests of some targets, by a Collocation after the other: many would fill the memory."""
     left_out = {name: [] for name in names}
+    # sparse rows part with their factor for the inverse, which those of a single pass need
+    largest_first = sorted(names, key=lambda name: -len(equations.target_rows[name]))
     for chosen, weight in posterior.mixture:
         solved = equations.solve(chosen)
-        if visit is not None:
-            visit(chosen, solved)
-        for name, of_target in left_out.items():
+        for name in largest_first:
             rows = equations.target_rows[name]
             if solved.determined_without(rows):
-                of_target.append((weight, *solved.leave_out(rows)))
+                left_out[name].append((weight, *solved.leave_out(rows)))
+        if visit is not None:
+            visit(chosen, solved)
     return [_test(equations, name, parts, targets) for name, parts in left_out.items()]
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.collocation import collocate_dense
+from mlscorr.collocation import collocate_dense, collocate_rows
 from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
 from mlscorr.collocation.trend import polynomial_design
 from mlscorr.estimate import estimate_correction, with_ties
@@ -155,7 +155,7 @@ def test_few_rows_with_ties_are_weighed_as_they_are_solved():
     objective = Objective.of(few)
     for family in (*FAMILIES, INTEGRATED):
         parameters = objective.parameters(family, objective.initial)
-        weighed, solved = few.weigh(parameters), few.solve(parameters)
+        weighed, solved = few.weigh(parameters), collocate_rows(few.rows(parameters))
         assert weighed.log_likelihood == pytest.approx(solved.log_likelihood, abs=0.01)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,20 +24,7 @@ from mlscorr.survey import Trajectory
 
 @dataclass(frozen=True, repr=False)
 class DriveEstimate(Estimate):
-    """What several drives tell together of one of them, in its own times.
-
-    Parameters
-    ----------
-    held : Support
-        What holds the correction along the drive.
-    """
-
-    held: Support = field(default_factory=Support)
-
-    @property
-    def support(self) -> Support:
-        """What holds the correction along the drive."""
-        return self.held
+    """What several drives tell together of one of them, in its own times."""
 
     @property
     def alternatives(self) -> tuple[Alternative, ...]:
