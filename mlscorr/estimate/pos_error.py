@@ -51,14 +51,14 @@ class Estimate(Summary):
         Misclosures that remain at each used one when its target takes no part. Units: m.
     log_likelihood, sigma0 : float
     guards : Guards
+    support : Support
+        Where control points and ties hold the correction, and where it is extrapolated.
     notes : tuple of str
         Sentences on what was put in.
     ties : TieResiduals, optional
         What is left of the ties that were given.
     untied : str
         Why there are none, where somebody looked for them.
-    held : Support, optional
-        What holds the correction, where it is known already.
     """
 
     correction: Correction
@@ -69,10 +69,10 @@ class Estimate(Summary):
     log_likelihood: float
     sigma0: float
     guards: Guards
+    support: Support
     notes: tuple[str, ...]
     ties: TieResiduals | None = None
     untied: str = ""
-    held: Support | None = None
 
     @property
     def order(self) -> int:
@@ -113,14 +113,6 @@ class Estimate(Summary):
             *self.screening.warnings,
             *(() if self.ties is None else self.ties.warnings),
         )
-
-    @cached_property
-    def support(self) -> Support:
-        """Where control points hold the correction, and where it is extrapolated."""
-        if self.held is not None:
-            return self.held
-        solved = self.equations.solve(self.parameters)
-        return find_support(self.equations, solved, self.parameters, self.correction.corrected)
 
     @cached_property
     def alternatives(self) -> tuple[Alternative, ...]:
@@ -256,9 +248,6 @@ def _estimate(trajectory, names, predictions, screening, notes):
     left_out[used] = leave_targets_out(kept, solved)
     pose_error = predict_pose_error(kept, posterior, predictions, solved)
     correction = Correction.by_pose_error(trajectory, *pose_error)
-    held = None
-    if kept.ties is not None:  # later it would cost another solution of all rows
-        held = find_support(kept, solved, parameters, correction.corrected)
     return Estimate(
         correction=correction,
         equations=kept,
@@ -268,8 +257,8 @@ def _estimate(trajectory, names, predictions, screening, notes):
         log_likelihood=solved.log_likelihood,
         sigma0=solved.sigma0,
         guards=find_guards(kept, parameters, correction.corrected),
+        support=find_support(kept, solved, parameters, correction.corrected),
         notes=notes,
-        held=held,
     )
 
 

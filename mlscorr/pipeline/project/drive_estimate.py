@@ -81,11 +81,10 @@ def drive_estimates(
     notes : sequence of str
         Sentences on each drive's ties with others.
     """
-    support = estimate.support
-    return [_part(joint, estimate, number, support, note) for number, note in enumerate(notes)]
+    return [_part(joint, estimate, number, note) for number, note in enumerate(notes)]
 
 
-def _part(joint, estimate, number, support, note):
+def _part(joint, estimate, number, note):
     """The DriveEstimate of a drive."""
     trajectory, shift = joint.drives[number].survey.trajectory, joint.shifts[number]
     owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
@@ -108,10 +107,10 @@ def _part(joint, estimate, number, support, note):
         log_likelihood=estimate.log_likelihood,
         sigma0=estimate.sigma0,
         guards=guards,
+        support=_held(estimate.support, trajectory, shift, chainage),
         notes=estimate.notes,
         ties=_ties(joint, estimate.ties, number),
         untied=note or estimate.untied,
-        held=_held(support, trajectory, shift, chainage),
     )
 
 

@@ -112,7 +112,7 @@ def _estimate(drive, parts, home, main):
         guards=guards_of(survey.trajectory.passes, equations.observed, main.estimate.guards),
         notes=_distinct([part.estimate.notes for part in parts]),
         ties=_ties(parts, correction),
-        held=_support(parts, home, correction.corrected),
+        support=_support(parts, home, correction.corrected),
     )
 
 
