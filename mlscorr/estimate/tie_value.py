@@ -8,9 +8,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation import leave_each_out
-from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.pos_error import Estimate
-from mlscorr.estimate.prediction import predict_under
+from mlscorr.estimate.prediction import pose_rows
 from mlscorr.estimate.settings import SETTINGS
 
 
@@ -44,36 +43,38 @@ def tie_value(estimate: Estimate) -> TieValue:
     equations, residuals = estimate.equations, estimate.ties
     if equations.ties is None or residuals is None:
         return TieValue({"control": 1.0}, None)
-    control, ties = leave_each_out(equations.solve(estimate.parameters))
+    solved = equations.solve(estimate.parameters)
+    control, ties = leave_each_out(solved)
     absorbed = (1.0 - ties.redundancy).ravel()
     kind = residuals.ties.kind[residuals.used]
     parts = {name: float(absorbed[kind == name].sum()) for name in ("plane", "pole")}
     parts = {"control": float((1.0 - control.redundancy[: len(equations.names)]).sum()), **parts}
     total = sum(parts.values())
-    return TieValue({name: part / total for name, part in parts.items()}, _sufficient(estimate))
+    share = {name: part / total for name, part in parts.items()}
+    return TieValue(share, _sufficient(equations, estimate.parameters, solved))
 
 
-def _sufficient(estimate):
+def _sufficient(equations, parameters, solved):
     """The least number of evenly chosen control points that reach the sigma of all, about."""
-    names = list(estimate.equations.target_rows)
+    names = list(equations.target_rows)
     if len(names) < 2:
         return len(names) or None
-    limit = SETTINGS.sufficient_ratio * _median_sigma(estimate, estimate.equations)
+    limit = SETTINGS.sufficient_ratio * _median_sigma(equations, parameters, solved)
     low, high = 1, len(names)
     while low < high:
         number = (low + high) // 2
         chosen = {names[i] for i in np.linspace(0, len(names) - 1, number).round().astype(int)}
-        part = estimate.equations.without([name for name in names if name not in chosen])
-        if _median_sigma(estimate, part.affordable()) <= limit:
+        part = equations.without([name for name in names if name not in chosen]).affordable()
+        if _median_sigma(part, parameters, part.solve(parameters)) <= limit:
             high = number
         else:
             low = number + 1
     return low
 
 
-def _median_sigma(estimate: Estimate, equations: Equations) -> float:
+def _median_sigma(equations, parameters, solved):
     """Median 3D sigma of the corrected position along the drive. Units: m."""
     last = len(equations.trajectory) - 1
     rows = np.unique(np.linspace(0, last, SETTINGS.prediction_epochs).round().astype(int))
-    covariance = predict_under(equations, estimate.parameters, rows)[1]
+    covariance = solved.predict(*pose_rows(equations, parameters, rows))[1]
     return float(np.median(np.sqrt(np.einsum("qii->q", covariance[:, :3, :3]))))
