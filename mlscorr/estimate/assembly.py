@@ -10,9 +10,8 @@ import numpy as np
 from mlscorr.collocation import Noise
 from mlscorr.estimate.equations import NO_TREND, Equations
 from mlscorr.frames import mounting_partials, pose_partials
-from mlscorr.pos import SETTINGS as POS_SETTINGS
 from mlscorr.pos import Steps, stated_sigma
-from mlscorr.survey import Matched, Mounting, Pos, Trajectory
+from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos, Trajectory
 
 
 def position_equations(
@@ -62,7 +61,7 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
         Without fall-backs.
     steps : Steps
     """
-    steps = steps[np.linalg.norm(steps.size, axis=1) < POS_SETTINGS.largest_gate]
+    steps = steps[np.linalg.norm(steps.size, axis=1) < SEARCH_RADIUS]
     if len(steps) == 0:
         return equations
     number, groups = len(steps), len(equations.noise.shared)

@@ -11,7 +11,6 @@ class Settings:
 
     held_percentile: float = 5.0  # of sigma(t): GNSS at its best, free of single epochs
     steady_ratio: float = 2.0  # of largest to held sigma; below it sigma(t) tells of no drift
-    largest_gate: float = 10.0  # m; a lone GNSS receiver errs by 8 m (GPS SPS 2020, 95 %)
     outage: float = 60.0  # s; for which data sheets of GNSS/INS state how far the position drifts
     smallest_step: float = 0.1  # m; two fixed RTK solutions of 2 cm per axis differ by less
     step_ratio: float = 10.0  # to the median of all seconds' largest steps: updates, jerks

@@ -10,9 +10,8 @@ from mlscorr.estimate import estimate_correction
 from mlscorr.estimate.assembly import mounting_equations, position_equations, with_fallbacks
 from mlscorr.estimate.prior import mounting_prior, position_prior
 from mlscorr.frames import georeference, to_scanner
-from mlscorr.pos import SETTINGS as POS_SETTINGS
 from mlscorr.pos import Steps
-from mlscorr.survey import Matched, Mounting, Pos
+from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, NOISE, START, SURVEYED, Case, smooth_case
 
 MOUNTING = Mounting(np.array([0.1, -0.6, 0.4]), Rotation.from_euler("xyz", [90, 0, 35], True))
@@ -98,7 +97,7 @@ def test_no_step_no_row():
     equations = smooth_case(6, n=5).equations()
     assert with_fallbacks(equations, steps_at()) is equations
     assert with_fallbacks(equations, steps_at(50.0, size=2000.0)) is equations
-    gate = POS_SETTINGS.largest_gate
+    gate = SEARCH_RADIUS
     assert with_fallbacks(equations, steps_at(50.0, size=0.99 * gate)).fallbacks == 1
 
 

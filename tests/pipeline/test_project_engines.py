@@ -91,6 +91,18 @@ def test_tasks_that_fail_end_no_run(tmp_path, workers):
     squares(tmp_path, workers)
 
 
+def test_parts_that_are_needed_together_fail_by_name(tmp_path):
+    "Of five two fail: both are named with the reason of the last, and the others are kept"
+    ends, numbers = [], (3, -1, 2, -2, 4)
+    with engine() as chosen:
+        run = Run(TaskStore(tmp_path), chosen, ends.append)
+        named = r"2 of 5 .* \(square--1, square--2\): -2 has no square here. --resume"
+        with pytest.raises(ValueError, match=named):
+            run.all_results([task(n) for n in numbers])
+        assert run.all_results([task(n) for n in numbers if n > 0]) == [9, 4, 16]
+    assert [outcome.seconds for outcome in ends[len(numbers) :]] == [0.0, 0.0, 0.0]
+
+
 def test_a_lost_worker_is_counted_and_its_task_done_again(tmp_path):
     "A task that ends its worker once has a result; one that ends it each time is given up"
     ends = []

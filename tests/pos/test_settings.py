@@ -3,6 +3,7 @@
 import numpy as np
 
 from mlscorr.pos.settings import SETTINGS
+from mlscorr.survey import SEARCH_RADIUS
 
 
 def test_gnss_is_an_array_of_three_axes():
@@ -15,7 +16,7 @@ def test_gnss_is_an_array_of_three_axes():
 def test_a_step_is_larger_than_two_fixes_differ():
     "0.1 m: beyond three sigmas of the difference of two fixed solutions, below a fall-back's gate"
     between = np.sqrt(2.0) * np.linalg.norm(SETTINGS.gnss[:2])
-    assert 2 * between < SETTINGS.smallest_step < SETTINGS.largest_gate
+    assert 2 * between < SETTINGS.smallest_step < SEARCH_RADIUS
 
 
 def test_times_are_in_their_order():

@@ -3,9 +3,8 @@
 import numpy as np
 
 from mlscorr.gap.observe.settings import SETTINGS
-from mlscorr.pos import SETTINGS as POS
 from mlscorr.pos import stated_sigma
-from mlscorr.survey import Survey
+from mlscorr.survey import SEARCH_RADIUS, Survey
 
 
 def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
@@ -24,7 +23,7 @@ def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
     """
     sigma = stated_sigma(survey.trajectory, survey.pos, gps_time)
     size = SETTINGS.gate_sigmas * np.linalg.norm(sigma.drift + sigma.jitter, axis=1)
-    return np.clip(size, SETTINGS.least_gate, POS.largest_gate)
+    return np.clip(size, SETTINGS.least_gate, SEARCH_RADIUS)
 
 
 def consistent(gps_time: np.ndarray, direction: np.ndarray, residual: np.ndarray) -> np.ndarray:

@@ -231,10 +231,7 @@ class _Work:
         """The results of each AreaInput."""
         tasks = area_tasks(self.run.store, key, areas)
         self.progress.begin("areas", tasks)
-        results = self.run.results(tasks)
-        if len(results) < len(tasks):
-            raise ValueError(self.run.faults[-1].fault)
-        return list(results.values())
+        return self.run.all_results(tasks)
 
     def _clouds(self, planned, keys):
         """WrittenClouds of each drive by its name."""

@@ -17,6 +17,7 @@ LOSS = (
     "its worker was lost {} times while nothing else was at work: the system may have ended it for "
     "want of memory. Give workers more, or take fewer of them."
 )
+FAILED = "{} of {} parts needed together failed ({}): {.fault} --resume works on these alone."
 
 
 @dataclass
@@ -62,6 +63,24 @@ class Run:
             else:
                 results[task.name] = self.store.get(task.kind, task.key)[0]
         return {task.name: results[task.name] for task in tasks if task.name in results}
+
+    def all_results(self, tasks: Sequence[Task]) -> list[Any]:
+        """Results of tasks of which none can be spared, in their order.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            Of distinct names.
+
+        Raises
+        ------
+        ValueError
+            Where some fail; says which.
+        """
+        results = self.results(tasks)
+        if left := [task.name for task in tasks if task.name not in results]:
+            raise ValueError(FAILED.format(len(left), len(tasks), ", ".join(left), self.faults[-1]))
+        return list(results.values())
 
     def _present(self, task):
         """The result of a task with its warnings, None where it is lacking or damaged."""
