@@ -42,7 +42,7 @@ class Settings:
     tie_majority: float = 0.5  # of the ties; with fewer nobody knows which of them are right
     tie_epoch: float = 0.1  # s: in half of it a drift of 3 cm/s makes 1.5 mm
     # Sigma of what knots leave, over what rows between them leave open: results move by less than
-    # a tenth of their sigma, in two thirds of the time that 0.1 takes
+    # a tenth of their sigma, in three quarters of the time that 0.1 takes
     knot_tolerance: float = 0.5
     tie_sample: int = 100  # ties that choose parameters: a scale to a tenth
     dense_rows: int = 500  # with ties: for more of them knots are faster than their covariances

@@ -90,7 +90,8 @@ def single_test(equations: Equations, name: str, posterior: Posterior) -> Target
 def _tests(equations, names, posterior, targets, visit=None):
     """TargetTests of some targets, by a Collocation after the other: many would fill the memory."""
     left_out = {name: [] for name in names}
-    # sparse rows part with their factor for the inverse, which those of a single pass need
+    # targets of several passes first: sparse rows part with the factor that these need for the
+    # inverse, which those of one pass need, and the visitor
     largest_first = sorted(names, key=lambda name: -len(equations.target_rows[name]))
     for chosen, weight in posterior.mixture:
         solved = equations.solve(chosen)
