@@ -83,7 +83,8 @@ def case(bed, rng, kind, effects=(), m=3.0, withheld=None, outside=None, noise=N
     rows = replace(rows, residual=residual)
     signs = tuple(s for s in bed.signs if s.name != withheld)
     evidence = weigh_labels(rows, g.background, g.survey, signs, rng, replicas)
-    probability = learned().probabilities(joint_score(rows, signs, evidence))
+    joint, evidence = joint_score(rows, g.survey, signs, evidence)
+    probability = learned().probabilities(joint)
     answer = decide(evidence, probability)
     truth = "+".join(effects) or outside or noise or "none"
     off = None

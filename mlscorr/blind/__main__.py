@@ -6,11 +6,9 @@ Worlds are others than those it was learned on, and mechanisms those of the half
 is weighed in each world is kept in FOLDER.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
-from mlscorr.blind.grading import grading_mechanisms
+from mlscorr.blind.cases import outside_mechanisms
 from mlscorr.gap.infer.decision import learned
 from mlscorr.gap.train.records import collect
 from mlscorr.gap.train.report import print_figures, study_arguments
@@ -20,7 +18,7 @@ def main() -> None:
     """Collect, and print figures."""
     given = study_arguments(__doc__, 5000, 10).parse_args()
     seeds = range(given.first, given.first + given.worlds)
-    mechanisms: dict[str, Callable] = {each.name: each for each in grading_mechanisms()}
+    mechanisms = outside_mechanisms()
     records = collect(given.folder, seeds, given.cases, mechanisms, given.replicas)
     probabilities = [learned().probabilities(each.joint) for each in records]
     print_figures(records, probabilities)

@@ -3,22 +3,20 @@
 import json
 import tempfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from mlscorr.blind.grading import grading_mechanisms
 from mlscorr.blind.mix import Case
-from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
-from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
+from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train.cases import ATTEMPTS, LIKENESS
-from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
+from mlscorr.gap.train.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
+from mlscorr.gap.train.sizing import Ruler
 from mlscorr.io.survey_file import read_survey
-from mlscorr.simulate.mechanisms import load_mechanisms
+from mlscorr.simulate.mechanisms import Described, described, load_mechanisms
 
 TRUTH = ("truth.json", "truth.npz")
 
@@ -84,9 +82,21 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
     ruler = _ruler(survey, find_targets)
     known = signatures(ruler.rows, ruler.survey)[0]
     if case.kind == "outside":
-        part, move = _mechanism(ruler, known, case, mechanisms, rng)
-        return (None, None) if part is None else (label | part, DisplacedSurvey.of(survey, move))
-    drawn = _effects(ruler, known, case, rng)
+        outside = outside_mechanisms(mechanisms)
+        names = names_to_try(list(outside), rng, case.names)
+        moved = draw_mechanism(ruler, known, names, outside, case.mdb, rng)
+        if moved is None:
+            return None, None
+        mechanism, _, like = moved
+        _, (unit, _), lead = outside[mechanism.name]
+        label |= {
+            "mdb": [case.mdb], "likeness": {mechanism.name: like},
+            "mechanism": {"name": mechanism.name, "size": mechanism.size, "unit": unit,
+                          "lead": list(lead)},
+        }  # fmt: skip
+        return label, DisplacedSurvey.of(survey, mechanism)
+    names = names_to_try(RANDOM if case.kind == "noise" else SYSTEMATIC, rng, case.names)
+    drawn = draw_effects(ruler, known, names, len(case.names), case.mdb, rng)
     if drawn is None:
         return None, None
     label |= _of_effects(drawn)
@@ -108,25 +118,6 @@ def _ruler(survey, find_targets):
         return Ruler.of(build_rows(read, matched, finding.candidates, patches).rows, read)
 
 
-def _effects(ruler, known, case, rng):
-    """Pairs of SizedEffect and its likeness; None when the geometry shows too few."""
-    pool = RANDOM if case.kind == "noise" else SYSTEMATIC
-    names, drawn = list(case.names), []
-    for _ in range(ATTEMPTS):
-        name = names.pop(0) if names else str(rng.choice(pool))
-        if name in (sized.effect.name for sized, _ in drawn):
-            continue
-        sized = draw_effect(ruler, effect_class(name), case.mdb, rng)
-        if sized is None:
-            continue
-        like = likeness(ruler, sized.shift, known)
-        if all(like.get(other.effect.name, 0.0) < INFERENCE.same for other, _ in drawn):
-            drawn.append((sized, like))
-        if len(drawn) == len(case.names):
-            return drawn
-    return None
-
-
 def _of_effects(drawn):
     """The part of a label that tells of effects."""
     effects = [(sized, like, sized.effect.name) for sized, like in drawn]
@@ -140,7 +131,7 @@ def _of_effects(drawn):
     }
 
 
-def outside_mechanisms(path: Path | None = None) -> dict[str, tuple[Callable, tuple, tuple]]:
+def outside_mechanisms(path: Path | None = None) -> Described:
     """Functions, units and leads of mechanisms by name: those that grade, or those of a file.
 
     Parameters
@@ -155,42 +146,4 @@ def outside_mechanisms(path: Path | None = None) -> dict[str, tuple[Callable, tu
     FileNotFoundError
         When the file is.
     """
-    if path is None:
-        return {each.name: (each, each.unit, each.lead) for each in grading_mechanisms()}
-    module = load_mechanisms(path)
-    return {
-        name: (function, module.UNITS[name], module.LEADS[name])
-        for name, function in module.MECHANISMS.items()
-    }
-
-
-def _mechanism(ruler, known, case, path, rng):
-    """The part of a label that tells of a mechanism, and how it moves points; None, None when
-    the geometry shows none that is unlike all effects.
-    """
-    outside, names = outside_mechanisms(path), list(case.names)
-    for _ in range(ATTEMPTS):
-        name = names.pop(0) if names else str(rng.choice(list(outside)))
-        function, (unit, largest), lead = outside[name]
-        chance, sign = int(rng.integers(2**32)), float(rng.choice([-1, 1]))
-
-        def move(points, size=1.0, function=function, chance=chance):
-            return function(points, size, np.random.default_rng(chance))
-
-        shift = shift_by(ruler, move)
-        unit_mdb = ruler.size(shift)
-        if unit_mdb == 0.0 or case.mdb / unit_mdb > largest:
-            continue
-        like = likeness(ruler, shift, known)
-        if max(like.values()) > LIKENESS:
-            continue
-        size = sign * case.mdb / unit_mdb
-        part = {
-            "mdb": [case.mdb],
-            "likeness": {name: like},
-            "mechanism": {
-                "name": name, "size": size, "unit": unit, "lead": list(lead),
-            },
-        }  # fmt: skip
-        return part, partial(move, size=size)
-    return None, None
+    return described(grading_mechanisms()) if path is None else load_mechanisms(path)

@@ -47,7 +47,6 @@ class Settings:
     wall_flatness: float = 0.05  # m, the largest standard deviation of its points from a plane
     facades: int = 20  # of ties, where passes lie the farthest apart: some of them are well covered
     plane_points: int = 15  # that tell how a wall or a target is turned
-    visit_pause: float = 10.0  # s between two visits of one place
 
 
 SETTINGS = Settings()

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
 from mlscorr.simulate.displacement import RecordedPoints
 from mlscorr.simulate.scene import UP
+
+Described = dict[str, tuple[Callable, tuple[str, float], tuple[str, str]]]
 
 MOMENT = 0.3  # s to each side, over which speed, turns and acceleration are taken
 EPOCH = 0.1  # s between the times at which the motion is worked out
@@ -114,8 +116,18 @@ def training_mechanisms() -> tuple[Mechanism, ...]:
     return tuple(each for each in mechanisms() if each.is_for_training)
 
 
-def load_mechanisms(path: Path) -> ModuleType:
-    """Module with MECHANISMS (functions), LEADS (words) and UNITS (unit, largest) by name.
+def described(known: Iterable[Mechanism]) -> Described:
+    """Function, unit with largest size, and lead of each mechanism, by name.
+
+    Parameters
+    ----------
+    known : iterable of Mechanism
+    """
+    return {each.name: (each, each.unit, each.lead) for each in known}
+
+
+def load_mechanisms(path: Path) -> Described:
+    """The same of a file that has MECHANISMS (functions), UNITS (unit, largest) and LEADS by name.
 
     Parameters
     ----------
@@ -142,7 +154,10 @@ def load_mechanisms(path: Path) -> ModuleType:
                 f"{path} has no {name} with the names of its MECHANISMS: a file of mechanisms "
                 "needs MECHANISMS (functions), LEADS (words) and UNITS (unit and largest size)."
             )
-    return module
+    return {
+        name: (function, module.UNITS[name], module.LEADS[name])
+        for name, function in module.MECHANISMS.items()
+    }
 
 
 def _shaped(name, u, a, b):

@@ -29,7 +29,7 @@ def named(rows, g, signs, replicas=0):
     "Verdict on rows"
     rng = np.random.default_rng(0)
     evidence = weigh_labels(rows, g.background, g.survey, signs, rng, replicas)
-    joint = joint_score(rows, signs, evidence)
+    joint, evidence = joint_score(rows, g.survey, signs, evidence)
     return decide(evidence, learned().probabilities(joint))
 
 

@@ -12,7 +12,7 @@ def test_a_file_without_its_units_is_refused(tmp_path):
     with pytest.raises(ValueError, match="has no UNITS with the names of its MECHANISMS"):
         load_mechanisms(path)
     path.write_text("MECHANISMS = {'lift': None}\nLEADS = {'lift': ()}\nUNITS = {'lift': ()}\n")
-    assert list(load_mechanisms(path).MECHANISMS) == ["lift"]
+    assert list(load_mechanisms(path)) == ["lift"]
 
 
 def test_a_missing_file_is_named(tmp_path):

@@ -14,8 +14,8 @@ from mlscorr.simulate.mechanisms import load_mechanisms
 from mlscorr.survey import Mounting, Trajectory
 
 FILE = Path(__file__).with_name("mechanisms.py")
-MECHANISMS, LEADS, UNITS = (
-    getattr(load_mechanisms(FILE), name) for name in ("MECHANISMS", "LEADS", "UNITS")
+MECHANISMS, UNITS, LEADS = (
+    {name: parts[number] for name, parts in load_mechanisms(FILE).items()} for number in range(3)
 )
 START, PLACE = 413200.0, np.array([523000.0, 3378000.0, 20.0])
 SPEED, TURNING, SLOWING = 8.0, np.radians(10.0), 1.0  # m/s, rad/s to the left, m/s^2

@@ -17,7 +17,7 @@ from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.gap.close.systematic import Squares, SystematicGap, share_gone
 from mlscorr.gap.infer.columns import ColumnTable, column_table
 from mlscorr.gap.infer.error_models import ErrorModel
-from mlscorr.gap.infer.evidence import nuisance_columns
+from mlscorr.gap.infer.evidence import steady_columns
 from mlscorr.gap.infer.measure import (
     UNITS,
     Predicted,
@@ -157,7 +157,7 @@ class _Ruler:
         observations = Observations.of(rows, background(rows, case.survey))
         unknown = unknown_blocks(rows, case.survey)
         table = column_table(rows, case.signatures, unknown, observations.sigma)
-        steady, _ = nuisance_columns(observations, table)
+        steady = steady_columns(observations, table)
         observations, _ = without_tails(observations, rows, steady)
         model = case.evidence.likely_model(case.cause.effect)
         scale = model.scale if noise.scale == 1.0 else noise.scale

@@ -155,7 +155,7 @@ def infer_causes(
         When no row has a residual in m, or a sigma is zero.
     """
     evidence = weigh_labels(rows, background, survey, signatures, rng, replicas)
-    joint = joint_score(rows, signatures, evidence)
+    joint, evidence = joint_score(rows, survey, signatures, evidence)
     probability = learned().probabilities(joint)
     verdict = decide(evidence, probability, absence, costs)
     probability = probability if absence is None else with_absence(probability, absence)
@@ -228,7 +228,8 @@ def cause_of(
     names, parameters, parts = label.split("+"), (), ()
     steady = [name for name in names if name not in evidence.noisy]
     if steady:
-        members = [best_member(signatures, evidence, name) for name in steady]
+        label_of_effects = "+".join(steady)
+        members = [best_member(signatures, evidence, name, label_of_effects) for name in steady]
         parameters, estimates, shift = effect_parameters(rows, evidence, members, steady)
         parts = tuple(zip(members, estimates, strict=True))
     cause = Cause(label, probability, parameters, parts, shift)

@@ -68,8 +68,9 @@ def refine_events(
         ]  # fmt: skip
         score = evidence.by_model[:, numbers].max(axis=1)
         models = tuple(evidence.models[s] for s in np.argsort(-score)[:3])  # others add little
-        share = sum(bank.blocks[i].weight for i in numbers)
-        refined[label] = _Search(rows, survey, observations, models).best(signatures[member], share)
+        share, none = sum(bank.blocks[i].weight for i in numbers), float(evidence.total[0])
+        search = _Search(rows, survey, observations, models, none)
+        refined[label] = search.best(signatures[member], share)
     return refined
 
 
@@ -79,12 +80,14 @@ class _Search:
     survey: Survey
     observations: Observations
     models: tuple[ErrorModel, ...]
+    none: float  # log evidence of none by all models: by these, which suit the event, it is less
 
     def score(self, event):
         """Log evidence over none of a signature, and its table."""
         table = column_table(self.rows, (event,), (), self.observations.sigma)
         residual = self.observations.columns(self.rows.residual[:, None])
-        gain = weigh_blocks(self.observations, self.models, residual, table).gain
+        evidence = weigh_blocks(self.observations, self.models, residual, table)
+        gain = evidence.gain + evidence.total - self.none
         return float(np.logaddexp.reduce(table.weighed(gain)[:, 0])), table
 
     def changed(self, event, key, step):

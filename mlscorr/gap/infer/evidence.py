@@ -12,7 +12,7 @@ members, as events do with their times and widths, is the mean over them: the pr
 looked often.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from mlscorr.gap.infer.columns import ColumnTable, block_groups
 from mlscorr.gap.infer.error_models import ErrorModel
-from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.observations import Observations, relevant_models
 from mlscorr.gap.infer.settings import SETTINGS
 
 
@@ -139,24 +139,41 @@ def block_gain(
     return gain - np.log(len(amplitudes))
 
 
-def nuisance_columns(
-    observations: Observations, table: ColumnTable
-) -> tuple[np.ndarray, np.ndarray]:
-    """Columns of all effects that are no events, and of what changes slowly with time.
+def steady_columns(observations: Observations, table: ColumnTable) -> np.ndarray:
+    """Columns (n, q) of all effects that are no events.
 
     Parameters
     ----------
     observations : Observations
     table : ColumnTable
-
-    Returns
-    -------
-    steady, slow : (n, q) array
     """
     use = [block.columns for block in table.blocks if block.label in table.steady]
     use = np.unique(np.concatenate([np.zeros(0, dtype=int), *use]))
+    return observations.columns(table.columns[:, use])
+
+
+def suited_models(
+    observations: Observations,
+    table: ColumnTable,
+    models: Iterable[ErrorModel],
+    residual: np.ndarray,
+) -> tuple[ErrorModel, ...]:
+    """Those models that explain residuals when nothing acts, or all effects that are no events and
+    what changes slowly with time.
+
+    Parameters
+    ----------
+    observations : Observations
+    table : ColumnTable
+    models : iterable of ErrorModel
+    residual : (n, 1) array
+        Units: m.
+    """
+    steady = steady_columns(observations, table)
     time, place = observations.errors.gps_time, observations.errors.place
     time = time - time[0]
     wave = np.arange(12) * np.pi * time[:, None] / max(time[-1], 1e-9)
     slow = (np.cos(wave)[:, :, None] * place[:, None]).reshape(len(observations), -1)
-    return observations.columns(table.columns[:, use]), slow
+    return relevant_models(
+        observations, models, residual, [steady[:, :0], np.hstack([steady, slow])]
+    )

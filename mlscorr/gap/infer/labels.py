@@ -9,9 +9,15 @@ from threadpoolctl import threadpool_limits
 from mlscorr.gap.infer.columns import ColumnTable, column_table
 from mlscorr.gap.infer.error_models import ErrorModel, error_models
 from mlscorr.gap.infer.events import RefinedEvent, refine_events
-from mlscorr.gap.infer.evidence import BlockEvidence, nuisance_columns, weigh_blocks, without_known
+from mlscorr.gap.infer.evidence import (
+    BlockEvidence,
+    steady_columns,
+    suited_models,
+    weigh_blocks,
+    without_known,
+)
 from mlscorr.gap.infer.noise import NoiseEvidence, draw_channels, weigh_noise
-from mlscorr.gap.infer.observations import Observations, model_likelihood, relevant_models
+from mlscorr.gap.infer.observations import Observations, model_likelihood
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.tails import without_tails
 from mlscorr.gap.infer.unknown import UnknownBlock, unknown_blocks
@@ -34,7 +40,7 @@ class LabelEvidence:
         Of the residuals (first column) and of replicas without any effect.
     noise : tuple of NoiseEvidence
     refined : dict of RefinedEvent
-        Events that stand out, by label.
+        Events that stand out, by label: their own, or that of the pair in which they do.
     score : dict
         Log of prior times evidence over that of none, (k,) for each label; none is there too.
     p_value : float
@@ -61,6 +67,12 @@ class LabelEvidence:
     def best(self, label: str) -> int:
         """Number of the block of a label that explains the residuals best."""
         return self.table.best(label, self.blocks.gain[:, 0])
+
+    def event(self, name: str, label: str) -> RefinedEvent | None:
+        """The event of a name that is, or is part of, a label; None if it doesn't stand out."""
+        beside = self.refined.get(label)
+        is_of_pair = beside is not None and beside.signature.name == name
+        return beside if is_of_pair else self.refined.get(name)
 
     def lead(self) -> tuple[str, np.ndarray]:
         """What the best of the unknown blocks says in words, and its column numbers."""
@@ -106,11 +118,10 @@ def weigh_labels(
     unknown = unknown_blocks(rows, survey)
     table = column_table(rows, signatures, unknown, observations.sigma)
     table = without_known(observations, table)
-    steady, slow = nuisance_columns(observations, table)
+    steady = steady_columns(observations, table)
     observations, tail = without_tails(observations, rows, steady)
     residual = observations.columns(rows.residual[:, None])
-    nuisances = [steady[:, :0], np.hstack([steady, slow])]
-    models = relevant_models(observations, error_models(), residual, nuisances)
+    models = suited_models(observations, table, error_models(), residual)
     residual = np.hstack([residual, _replicas(observations, models, residual, rng, replicas)])
     blocks = weigh_blocks(observations, models, residual, table)
     channels = draw_channels(rows, rng, replicas)

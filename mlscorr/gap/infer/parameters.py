@@ -116,7 +116,7 @@ def effect_parameters(
             CauseParameter(prefix + name, unit, *map(float, sizes))
             for name, unit, *sizes in numbers
         ]
-        event = evidence.refined.get(member.name)
+        event = evidence.event(member.name, "+".join(labels))
         sigmas = {} if event is None else event.sigma
         parameters += [
             CauseParameter(key, "s", member.fixed[key], sigmas.get(key, np.nan))

@@ -13,15 +13,16 @@ from mlscorr.effects.vehicle import PositionNoise
 from mlscorr.gap.infer.columns import ColumnTable
 from mlscorr.gap.infer.decision import Costs, JointScore, cheapest, learned
 from mlscorr.gap.infer.error_models import error_models
-from mlscorr.gap.infer.evidence import weigh_blocks
+from mlscorr.gap.infer.events import refine_events
+from mlscorr.gap.infer.evidence import suited_models, weigh_blocks
 from mlscorr.gap.infer.labels import LabelEvidence, block_scores, noise_scores
 from mlscorr.gap.infer.noise import draw_channels, noisy_pos_models, weigh_noise
-from mlscorr.gap.infer.observations import relevant_models
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.windows import models_with_windows
 from mlscorr.gap.observe.absence import Absence
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.survey import Survey
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,11 @@ def decide(
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def joint_score(rows: Rows, signatures: Sequence[Signature], evidence: LabelEvidence) -> JointScore:
-    """Scores of all labels, two of them together included.
+def joint_score(
+    rows: Rows, survey: Survey, signatures: Sequence[Signature], evidence: LabelEvidence
+) -> tuple[JointScore, LabelEvidence]:
+    """Scores of all labels, two of them together included; and the evidence with the events that
+    were refined beside another cause.
 
     Each of the best causes is taken as accepted, its size as free; then noise classes, effects and
     unknown are compared again on what it leaves. What only unknown explains there is unknown: a
@@ -121,22 +125,25 @@ def joint_score(rows: Rows, signatures: Sequence[Signature], evidence: LabelEvid
     Parameters
     ----------
     rows : Rows
+    survey : Survey
     signatures : sequence of Signature
     evidence : LabelEvidence
         Of these.
     """
     score = {name: float(values[0]) for name, values in evidence.score.items()}
     single, best = dict(score), _best_effect(evidence)
-    given = {}
+    given, refined = {}, {}
     for first in _accepted(evidence, score, best):
-        regained, beside = _given(rows, signatures, evidence, first)
+        regained, beside, events = _given(rows, survey, signatures, evidence, first)
+        refined |= {_joined(evidence, first, name): event for name, event in events.items()}
         base = score[first] = score[first] + regained
         given[first] = {name: gain for name, gain in beside.items() if name != first}
         for name, gain in given[first].items():
             label = "unknown" if name == "unknown" else _joined(evidence, first, name)
             score[label] = np.logaddexp(score.get(label, -np.inf), base + gain)
     facts = _facts(rows, evidence, best)
-    return JointScore(score, single, given.get(best, {}), facts, evidence.noisy)
+    joint = JointScore(score, single, given.get(best, {}), facts, evidence.noisy)
+    return joint, replace(evidence, refined=refined | evidence.refined)
 
 
 def _best_effect(evidence):
@@ -181,17 +188,23 @@ def _joined(evidence, *names):
     return "+".join(sorted(names, key=order.index))
 
 
-def best_member(signatures: Sequence[Signature], evidence: LabelEvidence, name: str) -> Signature:
-    """The signature of one label that explains the residuals best; an event's is refined.
+def best_member(
+    signatures: Sequence[Signature], evidence: LabelEvidence, name: str, label: str
+) -> Signature:
+    """The signature of an effect that explains the residuals best; an event's is refined.
 
     Parameters
     ----------
     signatures : sequence of Signature
     evidence : LabelEvidence
     name : str
+        Of the effect.
+    label : str
+        That it is part of.
     """
-    if name in evidence.refined:
-        return evidence.refined[name].signature
+    event = evidence.event(name, label)
+    if event is not None:
+        return event.signature
     return signatures[evidence.table.blocks[evidence.best(name)].member]
 
 
@@ -204,31 +217,35 @@ def _best_columns(evidence, name):
     return table.columns[:, max(blocks, key=lambda block: len(block.columns)).columns]
 
 
-def _given(rows, signatures, evidence, first):
-    """What one label gains by models that suit it, and the scores of others given it.
+def _given(rows, survey, signatures, evidence, first):
+    """What one label gains by models that suit it, the scores of others given it, and the events
+    that stand out beside it.
 
-    These are logs of prior times evidence over that of the one alone.
+    Scores are logs of prior times evidence over that of the one alone.
     """
     observations, table = evidence.observations, evidence.table
     residual, regained = observations.columns(rows.residual[:, None]), 0.0
-    nothing, prior = [np.zeros((len(residual), 0))], dict(SETTINGS.prior_beside)
-    is_noise = first == PositionNoise.name
+    prior, is_noise = dict(SETTINGS.prior_beside), first == PositionNoise.name
     if is_noise:
         models = noisy_pos_models() + models_with_windows(evidence.noise)
-        models = relevant_models(observations, models, residual, nothing)
+        models = suited_models(observations, table, models, residual)
     else:
         observations = observations.with_shared(
             observations.columns(_best_columns(evidence, first))
         )
-        models = relevant_models(observations, error_models(), residual, nothing)
+        models = suited_models(observations, table, error_models(), residual)
         regained = _regained(evidence, first, models, residual)
     blocks = weigh_blocks(observations, models, residual, table)
-    scores = block_scores(table, blocks, prior["effect"] / max(1, len(table.labels) - 1), prior)
+    of_effect = prior["effect"] / max(1, len(table.labels) - 1)
+    scores = block_scores(table, blocks, of_effect, prior)
+    events = refine_events(rows, survey, observations, table, blocks, signatures)
+    for name, event in events.items():
+        scores[name] = np.logaddexp(scores[name], np.log(of_effect) + event.gain)
     if not is_noise:
         channels = draw_channels(rows, None, 0)
         noise = weigh_noise(observations, rows, signatures, blocks, residual, channels)
         scores |= noise_scores(noise, prior)
-    return regained, {name: float(values[0]) for name, values in scores.items()}
+    return regained, {name: float(values[0]) for name, values in scores.items()}, events
 
 
 def _regained(evidence, name, models, residual):

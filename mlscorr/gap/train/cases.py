@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,15 +9,20 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
-from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.channels import with_loss_variance
 from mlscorr.gap.observe.rows import Background, Rows
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.train.draws import draw_effects, draw_mechanism, names_to_try
 from mlscorr.gap.train.errors import process
-from mlscorr.gap.train.sizing import Ruler, draw_effect, likeness, shift_by
+from mlscorr.gap.train.sizing import Ruler, draw_effect
 from mlscorr.gap.train.worlds import World
-from mlscorr.simulate.mechanisms import load_mechanisms, training_mechanisms
+from mlscorr.simulate.mechanisms import (
+    Described,
+    described,
+    load_mechanisms,
+    training_mechanisms,
+)
 from mlscorr.simulate.pos import interpolate
 from mlscorr.survey import Survey
 
@@ -30,8 +34,6 @@ SIZES = {  # MDB, between which sizes are drawn evenly by their logs
     **{"single": (1.0, 8.0), "pair": (2.0, 6.0), "withheld": (2.0, 8.0), "outside": (2.0, 8.0)},
     "noise": (1.0, 8.0),
 }
-ATTEMPTS = 12  # surveys, effects or mechanisms, where the geometry shows none
-LIKENESS = 0.8  # squared correlation with an effect above which a mechanism is that effect
 DRIFTS = 0.3  # share of cases of position noise in which drift is larger than stated
 
 
@@ -72,7 +74,7 @@ class TrainingCase:
         return "+".join(self.names) or "none"
 
 
-def known_mechanisms(path: Path | None = None) -> dict[str, Callable]:
+def known_mechanisms(path: Path | None = None) -> Described:
     """Mechanisms on which a decision may be learned: half of the grammar, and those of a file.
 
     Parameters
@@ -80,14 +82,14 @@ def known_mechanisms(path: Path | None = None) -> dict[str, Callable]:
     path : Path, optional
         File with MECHANISMS, LEADS and UNITS.
     """
-    known: dict[str, Callable] = {each.name: each for each in training_mechanisms()}
-    return known if path is None else known | load_mechanisms(path).MECHANISMS
+    known = described(training_mechanisms())
+    return known if path is None else known | load_mechanisms(path)
 
 
 def draw_case(
     world: World,
     rng: Generator,
-    mechanisms: dict[str, Callable],
+    mechanisms: Described,
     kind: str | None = None,
     mdb: float | None = None,
 ) -> TrainingCase:
@@ -97,8 +99,8 @@ def draw_case(
     ----------
     world : World
     rng : Generator
-    mechanisms : dict of functions
-        Of RecordedPoints, size and generator, by name.
+    mechanisms : dict
+        Function, unit with largest size, and lead, by name.
     kind : str, optional
         One of SHARES; drawn by default.
     mdb : float, optional
@@ -120,25 +122,16 @@ def draw_case(
 
 def _changed(case, ruler, rng, size, _):
     """The case with one effect or two at finite size; without it in the library if withheld."""
-    number, names, shift = 2 if case.kind == "pair" else 1, [], 0.0
-    like: dict = {}
-    for _ in range(ATTEMPTS):
-        name = str(rng.choice(SYSTEMATIC))
-        drawn = None if name in names else draw_effect(ruler, effect_class(name), size, rng)
-        if drawn is None or drawn.mdb < 0.99 * size:
-            continue
-        known = likeness(ruler, drawn.shift, case.signatures)
-        if any(known.get(other, 0.0) > SETTINGS.same for other in names):
-            continue
-        shift = shift + Bench(case.rows, case.survey).change(drawn.effect).shift
-        names, like = [*names, name], known
-        if len(names) == number:
-            break
-    else:
+    number = 2 if case.kind == "pair" else 1
+    names = names_to_try(SYSTEMATIC, rng)
+    drawn = draw_effects(ruler, case.signatures, names, number, size, rng)
+    if drawn is None:
         return None
+    bench, names = Bench(case.rows, case.survey), tuple(sized.effect.name for sized, _ in drawn)
+    shift = sum(bench.change(sized.effect).shift for sized, _ in drawn)
     without = names[0] if case.kind == "withheld" else None
     return replace(
-        case, names=tuple(names), mdb=size, likeness=like,
+        case, names=names, mdb=min(sized.mdb for sized, _ in drawn), likeness=drawn[-1][1],
         rows=replace(case.rows, residual=case.rows.residual + shift),
         signatures=tuple(sign for sign in case.signatures if sign.name != without),
     )  # fmt: skip
@@ -146,33 +139,24 @@ def _changed(case, ruler, rng, size, _):
 
 def _moved(case, ruler, rng, size, mechanisms):
     """The case with a mechanism that no library knows, unlike all effects."""
-    for _ in range(ATTEMPTS):
-        name, chance = str(rng.choice(list(mechanisms))), int(rng.integers(2**32))
-
-        def move(points, name=name, chance=chance):
-            return mechanisms[name](points, 1.0, np.random.default_rng(chance))
-
-        shift = shift_by(ruler, move)
-        unit = ruler.size(shift)
-        if unit < 1e-9:
-            continue
-        like = likeness(ruler, shift, case.signatures)
-        if max(like.values(), default=0.0) < LIKENESS:
-            shift *= float(rng.choice([-1, 1])) * size / unit
-            rows = replace(case.rows, residual=case.rows.residual + shift)
-            return replace(case, names=(name,), mdb=size, rows=rows, likeness=like)
-    return None
+    names = names_to_try(list(mechanisms), rng)
+    drawn = draw_mechanism(ruler, case.signatures, names, mechanisms, size, rng)
+    if drawn is None:
+        return None
+    moved, shift, like = drawn
+    rows = replace(case.rows, residual=case.rows.residual + shift)
+    return replace(case, names=(moved.name,), mdb=size, rows=rows, likeness=like)
 
 
 def _noisy(case, ruler, rng, size, _):
     """The case with noise, which the scatter of points shows too."""
     shown = RANDOM if (case.rows.channel == "roughness").any() else ("position_noise",)
-    for _ in range(ATTEMPTS):
-        name = str(rng.choice(shown))  # without roughness the stated noise holds all of a row's own
+    # without roughness the stated noise holds all of a row's own
+    for name in names_to_try(shown, rng):
         if name == "position_noise" and rng.random() < DRIFTS:
             return _drifting(case, rng, size)
         drawn = draw_effect(ruler, effect_class(name), size, rng)
-        if drawn is None or drawn.mdb < 0.99 * size:
+        if drawn is None:
             continue
         rows = case.rows
         if effect_class(name).is_of_pose():
@@ -184,7 +168,7 @@ def _noisy(case, ruler, rng, size, _):
             shift, extra = own + np.log1p(change.growth) - lost, change.variance
         rows = replace(rows, residual=rows.residual + shift, noise=rows.noise + extra)
         rows = with_loss_variance(rows)
-        return replace(case, names=(name,), mdb=size, rows=rows)
+        return replace(case, names=(name,), mdb=drawn.mdb, rows=rows)
     return None
 
 

@@ -15,6 +15,7 @@ from mlscorr.gap.infer.labels import weigh_labels
 from mlscorr.gap.infer.verdict import joint_score
 from mlscorr.gap.train.cases import draw_case
 from mlscorr.gap.train.worlds import World
+from mlscorr.simulate.mechanisms import Described
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def collect(
     folder: Path,
     seeds: Iterable[int],
     cases: int,
-    mechanisms: dict[str, Callable],
+    mechanisms: Described,
     replicas: int = 0,
     progress: Callable[[str], None] = print,
 ) -> list[Record]:
@@ -68,8 +69,8 @@ def collect(
         One of each world.
     cases : int
         In each world.
-    mechanisms : dict of functions
-        That no library knows, by name.
+    mechanisms : dict
+        That no library knows: function, unit with largest size, and lead, by name.
     replicas : int
         For p-values of clean surveys; none by default.
     progress : function
@@ -111,7 +112,7 @@ def _records(seed, cases, mechanisms, replicas):
         evidence = weigh_labels(
             case.rows, case.background, case.survey, case.signatures, rng, drawn
         )
-        joint = joint_score(case.rows, case.signatures, evidence)
+        joint, _ = joint_score(case.rows, case.survey, case.signatures, evidence)
         joint = JointScore(**{**vars(joint), "noisy": sorted(joint.noisy)})
         p = evidence.p_value if drawn else None
         yield Record(seed, world.is_open, case.kind, case.truth, case.mdb, p, joint)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
+from mlscorr.frames import georeference
 from mlscorr.gap.observe.channels import with_loss_variance
 from mlscorr.gap.observe.rows import Background, Rows, background
 from mlscorr.gap.signatures.signatures import Signature, signatures
@@ -93,7 +94,10 @@ class World:
         residual = np.einsum("mi,mi->m", rows.partials, pose[:m])
         residual += np.einsum("mi,mi->m", rows.partials_2, pose[m:])
         residual += scatter(rows, rng, self.heavy) + odd_patches(rows, rng)
-        rows = with_loss_variance(replace(rows, residual=residual))
+        beams = rows.pulses.scanner_xyz, rows.pulses.gps_time
+        xyz = georeference(survey.trajectory, survey.mounting, *beams)  # as they are recorded
+        pulses = replace(rows.pulses, xyz=xyz)
+        rows = with_loss_variance(replace(rows, residual=residual, pulses=pulses))
         return rows, background(rows, survey), survey
 
     def _growth(self, rng, time, survey):

@@ -8,6 +8,7 @@ from mlscorr.estimate import TieResiduals
 from mlscorr.report.render.scout import Scouted
 from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import Ties
+from mlscorr.ties.settings import SETTINGS as TIES
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ def _tied(scouted, residuals):
     facades, half = worst_facades(residuals), SETTINGS.plan_cell / 2
     for places, times in zip(facades.place, facades.gps_time, strict=True):
         at_first = (np.abs(plan - places[0, :2]) < half).all(axis=1)
-        at_first &= np.abs(time - times[0]) < SETTINGS.visit_pause / 2
+        at_first &= np.abs(time - times[0]) < TIES.pause / 2
         if at_first.any():
             middle = np.median(scouted.after.xyz[at_first, :2], axis=0)
             yield np.flatnonzero((np.abs(scouted.after.xyz[:, :2] - middle) < half).all(axis=1))
@@ -151,7 +152,7 @@ def _wall(scouted, rows):
 def _visits(time):
     """Times between visits, and the rows of each visit with enough points for a wall."""
     order = np.argsort(time, kind="stable")
-    last = np.flatnonzero(np.diff(time[order]) >= SETTINGS.visit_pause)
+    last = np.flatnonzero(np.diff(time[order]) >= TIES.pause)
     splits = (time[order[last]] + time[order[last + 1]]) / 2
     visits = [rows for rows in np.split(order, last + 1) if len(rows) >= SETTINGS.plane_points]
     return tuple(splits.tolist()), visits

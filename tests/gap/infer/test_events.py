@@ -5,6 +5,10 @@ import pytest
 
 from mlscorr.effects import make_effect
 from mlscorr.gap.infer.causes import infer_causes
+from mlscorr.gap.infer.evidence import weigh_blocks
+from mlscorr.gap.infer.labels import weigh_labels
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.signatures.signatures import signatures
 from tests.beds.gap_inference import surveyed
 
 
@@ -20,3 +24,33 @@ def test_an_event_is_found_between_the_times_of_the_bank(with_surface):
     assert told["width"].estimate == pytest.approx(8.0, rel=0.3)
     for name, true in zip(("easting", "northing", "height"), effect.magnitude, strict=True):
         assert abs(told[name].estimate - true) < 4 * told[name].sigma
+
+
+def test_an_event_beside_an_effect_is_found_when_it_acts(with_surface):
+    "Within 3 s, where it can be known to 1.3 s; alone it would best explain what the other does"
+    g, signs = with_surface
+    event = make_effect("position_bump", magnitude=[0.15, 0.1, -0.15], time=31.7, width=8.0)
+    rows = surveyed(g, 32, event, make_effect("range_bias", magnitude=0.05))
+    best = infer_causes(rows, g.background, g.survey, signs, np.random.default_rng(1), 20).causes[0]
+    assert set(best.effect.split("+")) == {"position_bump", "range_bias"}
+    part = next(part for part, _ in best.parts if part.name == "position_bump")
+    assert part.fixed["time"] == pytest.approx(31.7, abs=3.0)
+    assert part.fixed["width"] == pytest.approx(8.0, rel=0.3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_refined_event_counts_over_none_as_all_models_have_it(study, seed):
+    "Its log evidence is within 1 of that by all models: those that suit it best may hide none"
+    g = study.geometry(5, targets=15, passes=1, patches=0)
+    signs = signatures(g.rows, g.survey)[0]
+    rows = surveyed(g, seed, make_effect("vertical_datum", magnitude=0.3))
+    evidence = weigh_labels(rows, g.background, g.survey, signs, np.random.default_rng(1), 0)
+    residual = evidence.observations.columns(rows.residual[:, None])
+    assert evidence.refined
+    for event in evidence.refined.values():
+        models = evidence.blocks.models
+        gain = weigh_blocks(evidence.observations, models, residual, event.table).gain
+        by_all = np.logaddexp.reduce(event.table.weighed(gain)[:, 0])
+        members = [s for s in signs if s.name == event.signature.name]
+        expected = by_all - np.log(len(members) * SETTINGS.cell)
+        assert event.gain == pytest.approx(expected, abs=1.0)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from mlscorr.effects import make_effect
+from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.train.worlds import World
 
 
@@ -39,3 +41,10 @@ def test_the_same_seed_gives_the_same_world(world):
     again = World.random(2)
     one, two = (each.errors(np.random.default_rng(5))[0].residual for each in (world, again))
     assert np.array_equal(one, two)
+
+
+def test_points_lie_where_the_recorded_pose_puts_them(world):
+    "A lever arm that is a micrometre off moves them by that, whatever the POS errs by"
+    rows, _, survey = world.errors(np.random.default_rng(3))
+    effect = make_effect("lever_arm", magnitude=[1e-6, 0.0, 0.0])
+    assert np.abs(Bench(rows, survey).change(effect).shift).max() < 2e-6
