@@ -66,6 +66,14 @@ FUNCTIONS = {  # name: words, directions
     "smooth acceleration": ("that depends on acceleration", ANY),
     "smooth roll": ("that depends on the roll of the vehicle", ANY),
     "smooth pitch": ("that depends on the pitch of the vehicle", ANY),
+    "fine range": ("that varies with the range", ANY),
+    "fine speed": ("that varies with speed", ANY),
+    "fine heading": ("that varies with the heading", ANY),
+    "fine turn rate": ("that varies with the turn rate", ANY),
+    "fine acceleration": ("that varies with acceleration", ANY),
+    "fine roll": ("that varies with the roll of the vehicle", ANY),
+    "fine pitch": ("that varies with the pitch of the vehicle", ANY),
+    "fine time": ("that varies with time", (*BEAMS, *TURNS, "clock")),
 }
 DRIFT_FUNCTIONS = ("time", "slow time", "location", "slow place", "pass", "elapsed")
 
@@ -150,7 +158,7 @@ def _of_time(c):
         "elapsed in the pass": c["elapsed"][:, None],
         "time": _splines(time, np.ptp(time) / SETTINGS.knots),
         "slow time": _splines(time, 5),
-    }
+    } | _smooth("time", time)
 
 
 def _of_place(c):
@@ -166,20 +174,18 @@ def _of_beam(c):
     return {
         "range": away[:, None] / away.mean(),
         "range squared": (away[:, None] / away.mean()) ** 2,
-        "smooth range": _splines(np.log(away), 5),
         "cyclic range": _waves(2 * np.pi * away / max(np.ptp(away), 1e-9), range(1, 7)),
         "incidence": _splines(c["incidence"], 5),
         "intensity": _centred(c["intensity"])[:, None],
         "smooth intensity": _splines(c["intensity"], 5),
-    }
+    } | _smooth("range", np.log(away))
 
 
 def _of_motion(c):
     speed, turn = c["speed"], c["turn_rate"]
-    return {
+    values = {
         "speed": speed[:, None] / max(speed.mean(), 1e-9),
         "speed squared": (speed[:, None] / max(speed.mean(), 1e-9)) ** 2,
-        "smooth speed": _splines(speed, 5),
         "turn rate": turn[:, None],
         "turning": np.abs(turn)[:, None],
         "lateral acceleration": (speed * turn)[:, None],
@@ -187,11 +193,11 @@ def _of_motion(c):
         "roll rate": c["roll_rate"][:, None],
         "pitch rate": c["pitch_rate"][:, None],
         "heading": _waves(c["heading"], (1, 2)),
-        "smooth turn rate": _splines(turn, 5),
-        "smooth acceleration": _splines(c["acceleration"], 5),
-        "smooth roll": _splines(c["roll"], 5),
-        "smooth pitch": _splines(c["pitch"], 5),
+        "fine heading": _waves(c["heading"], range(3, 7)),
     }
+    for name in ("speed", "turn rate", "acceleration", "roll", "pitch"):
+        values |= _smooth(name, c[name.replace(" ", "_")])
+    return values
 
 
 def _of_pass(c):
@@ -227,6 +233,12 @@ def _without_gaps(time):
 
 def _waves(angle, orders):
     return np.column_stack([f(n * angle) for n in orders for f in (np.sin, np.cos)])
+
+
+def _smooth(name, values):
+    """Functions of a covariate (k,): smooth, and as fine as half of what a block may hold."""
+    fine = SETTINGS.functions // 2
+    return {f"smooth {name}": _splines(values, 5), f"fine {name}": _splines(values, fine)}
 
 
 def _splines(values, number):

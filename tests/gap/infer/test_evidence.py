@@ -6,8 +6,8 @@ import pytest
 from mlscorr.effects import EFFECTS, make_effect
 from mlscorr.gap.infer.columns import column_table
 from mlscorr.gap.infer.error_models import STATED, ErrorModel, error_models
-from mlscorr.gap.infer.evidence import block_gain, weigh_blocks, without_known
-from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.evidence import block_gain, suited_models, weigh_blocks, without_known
+from mlscorr.gap.infer.observations import Observations, relevant_models
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.unknown import unknown_blocks
 from mlscorr.gap.observe.rows import background
@@ -65,3 +65,16 @@ def test_an_unknown_error_that_a_known_effect_makes_is_not_unknown(with_surface)
         members = {block.member for block in kept.blocks if block.label == "unknown"}
         leads.append({unknown[i].lead for i in members})
     assert leads[1] - leads[0] == {"range error in proportion to the range"}
+
+
+def test_models_suit_what_acts_and_what_does_not(with_surface):
+    "A mounting turned by 0.1 deg makes the POS look worse than it is; a calm one is kept for it"
+    g, signs = with_surface
+    rows = surveyed(g, 36, make_effect("boresight", magnitude=[0.1, 0.0, 0.1]))
+    observations = Observations.of(rows, g.background)
+    residual = observations.columns(rows.residual[:, None])
+    table = column_table(rows, signs, (), observations.sigma)
+    alone = relevant_models(observations, error_models(), residual, [residual[:, :0]])
+    suited = suited_models(observations, table, error_models(), residual)
+    assert min(model.scale for model in alone) >= 1.0
+    assert min(model.scale for model in suited) < 1.0
