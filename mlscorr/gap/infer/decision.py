@@ -126,7 +126,12 @@ def features(joint: JointScore) -> dict[str, float]:
         "cause to noise": cause - noise,
         "cause to unknown": cause - unknown,
     }
-    return {n: float(np.arcsinh(v / BEND)) for n, v in (evidence | joint.facts).items()}
+    bent = {n: float(np.arcsinh(v / BEND)) for n, v in (evidence | joint.facts).items()}
+    # an event is looked for at many times, and the more likely drift where sigma is raised
+    for fact in ("event", "event in raised"):
+        for name in ("effect", "cause to noise", "effect to unknown"):
+            bent[f"{name}: {fact}"] = bent[name] * joint.facts[fact]
+    return bent
 
 
 def _by_kind(score, noisy):

@@ -29,7 +29,7 @@ def test_an_event_is_found_between_the_times_of_the_bank(with_surface):
 def test_an_event_beside_an_effect_is_found_when_it_acts(with_surface):
     "Within 3 s, where it can be known to 1.3 s; alone it would best explain what the other does"
     g, signs = with_surface
-    event = make_effect("position_bump", magnitude=[0.15, 0.1, -0.15], time=31.7, width=8.0)
+    event = make_effect("position_bump", magnitude=[0.18, 0.12, -0.18], time=31.7, width=8.0)
     rows = surveyed(g, 32, event, make_effect("range_bias", magnitude=0.05))
     best = infer_causes(rows, g.background, g.survey, signs, np.random.default_rng(1), 20).causes[0]
     assert set(best.effect.split("+")) == {"position_bump", "range_bias"}
