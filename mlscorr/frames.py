@@ -81,6 +81,21 @@ def angle_sigma(attitude: Rotation, covariance: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(variance[:, BODY_AXES], 0.0))
 
 
+def from_polar(distance: np.ndarray, angle: np.ndarray, elevation: np.ndarray) -> np.ndarray:
+    """X (n, 3) = distance (cos e cos a, cos e sin a, sin e). Units: m.
+
+    Parameters
+    ----------
+    distance : (n,) array
+        Units: m.
+    angle, elevation : (n,) array
+        From X towards Y, and from their plane towards Z. Units: rad.
+    """
+    level = distance * np.cos(elevation)
+    axes = level * np.cos(angle), level * np.sin(angle), distance * np.sin(elevation)
+    return np.column_stack(axes)
+
+
 def scanner_position(
     trajectory: Trajectory, mounting: Mounting | None, gps_time: np.ndarray
 ) -> np.ndarray:

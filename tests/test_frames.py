@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from mlscorr.frames import (
     angles_from_attitude,
     attitude_from_angles,
+    from_polar,
     georeference,
     pose_partials,
     scanner_position,
@@ -48,6 +49,16 @@ def test_attitude_is_the_written_product_of_rotations():
         about = [("z", -heading), ("x", pitch), ("y", roll)]
         z, x, y = (Rotation.from_euler(axis, angle).as_matrix() for axis, angle in about)
         assert attitude_from_angles(roll, pitch, heading).as_matrix() == pytest.approx(z @ x @ y)
+
+
+def test_places_in_range_and_angles_lie_where_a_scanner_draws_them():
+    "Angles count from X towards Y and from there to Z, and the length is the range, to 1e-12 m"
+    rng = np.random.default_rng(3)
+    distance, angle, elevation = rng.uniform([1, -3, -1.5], [90, 3, 1.5], (100, 3)).T
+    xyz = from_polar(distance, angle, elevation)
+    assert np.linalg.norm(xyz, axis=1) == pytest.approx(distance, abs=1e-12)  # m
+    assert np.arctan2(xyz[:, 1], xyz[:, 0]) == pytest.approx(angle, abs=1e-12)  # rad
+    assert xyz[:, 2] == pytest.approx(distance * np.sin(elevation), abs=1e-12)  # m
 
 
 def test_angles_survive_the_round_trip():

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from mlscorr.frames import from_polar
 from mlscorr.io.cloud_sources import CloudSource, SourceBlock, check_precision, lacking_time
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_systems import DAY
@@ -224,10 +225,4 @@ def _source_block(scan, block, marks, start):
 
 def _cartesian(places, axes):
     """Places (n, 3) in x, y, z of those in range, azimuth, elevation."""
-    if axes == CARTESIAN:
-        return places
-    distance, azimuth, elevation = places.T
-    level = distance * np.cos(elevation)
-    return np.column_stack(
-        [level * np.cos(azimuth), level * np.sin(azimuth), distance * np.sin(elevation)]
-    )
+    return places if axes == CARTESIAN else from_polar(*places.T)

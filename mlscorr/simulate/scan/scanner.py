@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from mlscorr.frames import from_polar
 from mlscorr.simulate.scan.echoes import POWER, Surfaces
 from mlscorr.simulate.scan.noise import ScannerNoise
 from mlscorr.simulate.scan.rays import Platform, Turn
@@ -43,14 +44,7 @@ class MeasuredPulses(RecordedPulses):
     @property
     def scanner_xyz(self) -> np.ndarray:
         """X_L (n, 3) = range (cos e cos a, cos e sin a, sin e). Units: m."""
-        flat = self.range * np.cos(self.elevation)
-        return np.column_stack(
-            [
-                flat * np.cos(self.angle),
-                flat * np.sin(self.angle),
-                self.range * np.sin(self.elevation),
-            ]
-        )
+        return from_polar(self.range, self.angle, self.elevation)
 
     @property
     def scan_angle(self) -> np.ndarray:
