@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from mlscorr.report import style
@@ -94,7 +93,7 @@ def comparison_figure(document: dict) -> Figure:
     panels[0].set_ylim(len(ranked) - 0.4, -0.6)
     figure.supxlabel("RMSE (logarithmic scale; dotted: the least on this axis)", fontsize=8.5)
     handles = [
-        Line2D([], [], linestyle="none", marker=mark, color=color, label=words)
+        style.mark_handle(mark, color, words)
         for name, (color, mark, words) in KINDS.items()
         if any(row["kind"] == name for row in ranked)
     ]

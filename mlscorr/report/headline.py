@@ -217,7 +217,7 @@ def _weakest(report):
         f"{length_in_words(largest)} is to be expected (one sigma)."
     )
     rating = "green" if after is not None and largest <= after.maximum[4] else "amber"
-    return Statement("Weakest", rating, sentence, _capped(_stretches(weak)))
+    return Statement("Weakest", rating, sentence, capped(_stretches(weak)))
 
 
 def _stretches(weak):
@@ -274,11 +274,17 @@ def warning_statements(warnings: Iterable[str]) -> Iterator[Statement]:
 
 def _named(points):
     """Items of the points that took no part although they were surveyed."""
-    return _capped([*points.refused, *points.missing, *points.outside])
+    return capped([*points.refused, *points.missing, *points.outside])
 
 
-def _capped(items):
-    """The first of some items, and how many more there are."""
+def capped(items: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
+    """The first of some items, and how many more there are.
+
+    Parameters
+    ----------
+    items : iterable of (str, str)
+        As of a Statement.
+    """
     items = tuple(items)
     more = len(items) - NAMED
     return items if more <= 0 else (*items[:NAMED], ("", f"and {more} more"))

@@ -122,6 +122,20 @@ def mark_handles(words: dict[str, str], groups: set[str]) -> list[Line2D]:
     ]
 
 
+def mark_handle(marker: str, color: str, words: str, size: float | None = None) -> Line2D:
+    """A mark in a legend.
+
+    Parameters
+    ----------
+    marker, color, words : str
+    size : float, optional
+        As matplotlib has it by default. Units: pt.
+    """
+    return Line2D(
+        [], [], linestyle="none", marker=marker, markersize=size, color=color, label=words
+    )
+
+
 def svg(figure: Figure) -> bytes:
     """The figure as the bytes of an SVG, coordinates cut to 0.01 pt."""
     stream = io.BytesIO()

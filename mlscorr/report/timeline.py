@@ -144,14 +144,8 @@ def _shade(panels, trajectory, span, support):
             panel.axvspan(stretch.start - start, stretch.end - start, zorder=0.5, **style.OUTSIDE)
         low = panel.get_xaxis_transform()
         for begin, end in support.outages:  # a strip, as an outage may be extrapolated as well
-            panel.fill_between(
-                np.array([begin, end]) - start,
-                0.0,
-                0.06,
-                transform=low,
-                zorder=0.55,
-                **style.OUTAGE,
-            )
+            outage = np.array([begin, end]) - start
+            panel.fill_between(outage, 0.0, 0.06, transform=low, zorder=0.55, **style.OUTAGE)
         for step in support.steps:
             panel.axvline(step - start, **style.STEP)
         for edge in span:

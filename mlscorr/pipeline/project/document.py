@@ -16,6 +16,7 @@ from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.corrected import STATES, DriveState
 from mlscorr.pipeline.project.running import Run
+from mlscorr.report import headline
 
 RATINGS = {"controlled": "green", "tied": "green", "relative": "red", "uncorrected": "red"}
 
@@ -123,17 +124,13 @@ def project_document(
         {"drive": fault.drive, "name": fault.name, "stage": fault.kind, "fault": fault.fault}
         for fault in run.faults
     ]
-    statements = [
-        *_statements(project, rows, drives, faults), *_lost(run.engine.lost), *_left(older)
-    ]  # fmt: skip
-    ratings = [row["rating"] for row in statements]
+    facts = [*_statements(project, rows, drives, faults), *_lost(run.engine.lost), *_left(older)]
     content = document(
         "project",
         {
             "name": project.name,
             "crs": project.crs,
-            "rating": next(r for r in ("red", "amber", "green") if r in ratings),
-            "statements": statements,
+            **headline.statements_section(facts),
             "drives": rows,
             "faults": faults,
         },
@@ -155,7 +152,7 @@ def _row(result, report):
     return {
         **asdict(state),
         "meaning": STATES[state.state],
-        "rating": max(report["rating"], RATINGS[state.state], key=_worst),
+        "rating": max(report["rating"], RATINGS[state.state], key=headline.RATINGS.index),
         "files": len(report["files"]),
         "points": sum(file["points"] for file in report["files"]),
         "control": {key: control[key] for key in ("n_surveyed", "n_seen", "n_scored")},
@@ -169,10 +166,6 @@ def _row(result, report):
     }
 
 
-def _worst(rating):
-    return ("green", "amber", "red").index(rating)
-
-
 def _rmse(points, key):
     return points.get(key, {}).get("rmse_3d")
 
@@ -182,12 +175,14 @@ def _statements(project, rows, drives, faults):
     count = {state: [row["name"] for row in rows if row["state"] == state] for state in STATES}
     held = len(count["controlled"]) + len(count["tied"])
     states = [(state, names) for state, names in count.items() if names]
-    yield _statement(
+    yield headline.Statement(
         "Drives",
         "green" if held == len(project.drives) else "red",
         f"{held} of {len(project.drives)} drives are held by control points, "
         f"{len(count['tied'])} of them through ties with other drives.",
-        [(", ".join(names), STATES[state]) for state, names in states if state != "controlled"],
+        tuple(
+            (", ".join(names), STATES[state]) for state, names in states if state != "controlled"
+        ),
     )
     used = {
         target["name"]
@@ -195,19 +190,19 @@ def _statements(project, rows, drives, faults):
         for target in report["targets"]
         if target["role"] == "control" and target["used"]
     }
-    yield _statement(
+    yield headline.Statement(
         "Control points",
         "green" if len(used) == len(project.control) else "amber",
         f"{len(used)} of {len(project.control)} surveyed control points are used.",
     )
     yield from _minded(rows, [report for _, report in drives])
     if faults:
-        yield _statement(
+        yield headline.Statement(
             "Failures",
             "red",
             f"{len(faults)} files could not be corrected, and all else was. When they are whole, "
             "--resume does what is missing.",
-            [(fault["name"], fault["fault"]) for fault in faults],
+            tuple((fault["name"], fault["fault"]) for fault in faults),
         )
 
 
@@ -222,26 +217,17 @@ def _minded(rows, reports):
         doubts.append((row["rating"], row["name"], why))
     doubts = [doubt for doubt in doubts if doubt[0] != "green"]
     if doubts:
-        doubts.sort(key=lambda doubt: -_worst(doubt[0]))
+        doubts.sort(key=lambda doubt: -headline.RATINGS.index(doubt[0]))
         sentence = f"{len(doubts)} of {len(rows)} drives have something to mind."
-        yield _statement(
-            "Doubts", doubts[0][0], sentence, _first_items([row[1:] for row in doubts])
-        )
-
-
-def _first_items(items):
-    """Items that stand on the first screen."""
-    from mlscorr.report.headline import NAMED
-
-    more = len(items) - NAMED
-    return [*items[:NAMED], *([("", f"and {more} more")] if more > 0 else [])]
+        items = headline.capped(doubt[1:] for doubt in doubts)
+        yield headline.Statement("Doubts", doubts[0][0], sentence, items)
 
 
 def _lost(number):
     """A statement on lost workers, where there were any."""
     if number:
         sentence = f"{number} times a worker was lost; what it worked on was done again."
-        yield _statement("Workers", "amber", sentence)
+        yield headline.Statement("Workers", "amber", sentence)
 
 
 def _left(older):
@@ -251,10 +237,5 @@ def _left(older):
             f"{len(older)} corrected cloud{'s are' if len(older) > 1 else ' is'} left of an "
             "earlier run, of files or drives that are no more or failed now. Delete what is old."
         )
-        items = _first_items([(name, "not of this run") for name in older])
-        yield _statement("Older results", "amber", sentence, items)
-
-
-def _statement(what, rating, sentence, items=()):
-    named = [{"name": name, "text": text} for name, text in items]
-    return {"what": what, "rating": rating, "sentence": sentence, "items": named}
+        items = headline.capped((name, "not of this run") for name in older)
+        yield headline.Statement("Older results", "amber", sentence, items)

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from mlscorr.report import style
@@ -141,10 +140,7 @@ def _draw_windows(panel, windows, start, end):
 
 
 def _legend(styles, windows):
-    handles = [
-        Line2D([], [], linestyle="none", marker=mark, color=color, markersize=4, label=words)
-        for color, mark, words in styles.values()
-    ]
+    handles = [style.mark_handle(s.mark, s.color, s.words, size=4) for s in styles.values()]
     handles.append(Patch(color=STRIPE, label=f"±{SETTINGS.stripe_sigmas:.0f} sigma"))
     if windows:
         handles.append(Patch(color=WINDOW, label="When the effect acts"))

@@ -2,7 +2,6 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from mlscorr.effects.wording import known
@@ -11,7 +10,7 @@ from mlscorr.report.gap.labels import title
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.rows import DetectableRow
 from mlscorr.report.gap.settings import SETTINGS
-from mlscorr.report.style import BLUE, VERMILLION, legend_above, new_figure, styled
+from mlscorr.report.style import BLUE, VERMILLION, legend_above, mark_handle, new_figure, styled
 
 
 def classes_in_order(separability: dict) -> tuple[list[int], list[tuple[int, int]]]:
@@ -132,9 +131,5 @@ def detectable_figure(rows: list[DetectableRow]) -> Figure:
     panel.grid(axis="y", visible=False)
     panel.tick_params(axis="y", length=0)
     panel.set_xlabel("Smallest size that shows, over the usual size (logarithmic)")
-    handles = [
-        Line2D([], [], linestyle="none", marker=mark, color=color, label=words)
-        for mark, color, words in marks
-    ]
-    legend_above(figure, handles)
+    legend_above(figure, [mark_handle(*mark) for mark in marks])
     return figure

@@ -8,7 +8,7 @@ from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.settings import SETTINGS
 from mlscorr.report.map_frame import frame, map_panels
-from mlscorr.report.style import GREY, MARKS, TRACK, label, legend_above, styled
+from mlscorr.report.style import GREY, MARKS, TRACK, label, legend_above, mark_handle, styled
 from mlscorr.report.target_map import NEXT, NEXT_WORDS, mark_places
 
 ROLES = {"control": "Control point", "check": "Check point"}
@@ -106,8 +106,6 @@ def _legend(site, rows):
     if site.get("next_control"):
         handles.append(Line2D([], [], label=NEXT_WORDS, **NEXT))
     for channel in dict.fromkeys(row["channel"] for row in rows):
-        symbol = {"marker": channel_style(channel).mark, "markersize": 4, "color": GREY}
-        handles.append(
-            Line2D([], [], linestyle="none", label=channel_style(channel).words, **symbol)
-        )
+        drawn = channel_style(channel)
+        handles.append(mark_handle(drawn.mark, GREY, drawn.words, size=4))
     return handles

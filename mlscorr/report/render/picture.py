@@ -167,19 +167,9 @@ def _arrow(axes, pixel, width):
     if np.hypot(*(pixel[1] - pixel[0])) < 14.0:  # pixels: the head would be longer
         axes.plot(*pixel.T, color=MARK, linewidth=width, path_effects=HALO)
         return
-    axes.annotate(
-        "",
-        xy=pixel[1],
-        xytext=pixel[0],
-        arrowprops={
-            "arrowstyle": "-|>,head_width=0.28,head_length=0.55",
-            "color": MARK,
-            "linewidth": width,
-            "shrinkA": 0,
-            "shrinkB": 0,
-            "path_effects": HALO,
-        },
-    )
+    arrow = {"arrowstyle": "-|>,head_width=0.28,head_length=0.55", "shrinkA": 0, "shrinkB": 0}
+    arrow |= {"color": MARK, "linewidth": width, "path_effects": HALO}
+    axes.annotate("", xy=pixel[1], xytext=pixel[0], arrowprops=arrow)
 
 
 def _names(axes, marks, camera):
@@ -200,13 +190,5 @@ def _names(axes, marks, camera):
 def _words(figure, view, left):
     """The title, and the note in the foot."""
     figure.text(left, 0.982, view.title, va="top", fontsize=letter(figure, 1.55), parse_math=False)
-    figure.text(
-        1 - left,
-        0.018,
-        view.note,
-        ha="right",
-        va="bottom",
-        fontsize=letter(figure, 0.85),
-        color="#444444",
-        parse_math=False,
-    )
+    below = {"ha": "right", "va": "bottom", "color": "#444444", "parse_math": False}
+    figure.text(1 - left, 0.018, view.note, fontsize=letter(figure, 0.85), **below)

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from mlscorr.report.render.camera import Camera
 from mlscorr.report.render.quantities import LABELS, colour_table, swatches
-from mlscorr.report.style import nice
+from mlscorr.report.style import mark_handle, nice
 
 MARK = "#E6007E"  # what was surveyed: a colour that no scale has
 HALO = (withStroke(linewidth=4.0, foreground="white"),)
@@ -46,14 +46,8 @@ def scale_bar(axes: Axes, camera: Camera) -> None:
     right = left + length * camera.scale
     _paper(axes, 0.3 * unit, height - 1.45 * unit, right + 0.3 * unit, height - 0.2 * unit)
     axes.plot([left, right], [foot, foot], color="black", linewidth=4, solid_capstyle="butt")
-    axes.text(
-        (left + right) / 2,
-        foot - 0.2 * unit,
-        f"{length:g} m",
-        ha="center",
-        va="bottom",
-        fontsize=letter(axes, 0.9),
-    )
+    above: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": letter(axes, 0.9)}
+    axes.text((left + right) / 2, foot - 0.2 * unit, f"{length:g} m", **above)
 
 
 def _paper(axes, left, top, right, bottom):
@@ -160,15 +154,11 @@ def _handles(view) -> Iterator[Line2D]:
     if "surveyed" in kinds:
         yield Line2D([], [], color=MARK, linewidth=2.2, label="Where the target was surveyed")
     if "offset" in kinds:
-        yield _handle(arrow, MARK, "From the scanned centre to the surveyed one")
+        yield mark_handle(arrow, MARK, "From the scanned centre to the surveyed one", size=9)
     for kind, text in WORDS.items():
         if kind in kinds:
             yield Line2D([], [], linestyle="none", markersize=6, label=text, **SYMBOLS[kind])
     for number in {mark.text for mark in marks if mark.kind == "residual"}:
-        yield _handle(arrow, MARK, f"To its surveyed place, {number} times enlarged")
+        yield mark_handle(arrow, MARK, f"To its surveyed place, {number} times enlarged", size=9)
     for colour, text in swatches(view.colour, view.visits):
-        yield _handle("s", colour, text.capitalize())
-
-
-def _handle(marker, color, text):
-    return Line2D([], [], linestyle="none", marker=marker, markersize=9, color=color, label=text)
+        yield mark_handle("s", colour, text.capitalize(), size=9)
