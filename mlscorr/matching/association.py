@@ -10,7 +10,15 @@ from mlscorr.matching.marginals import marginals
 from mlscorr.matching.pairs import find_pairs
 from mlscorr.matching.reasons import Refusal, explain
 from mlscorr.pos import stated_sigma
-from mlscorr.survey import SEARCH_RADIUS, ControlPoints, Pos, TargetObservations, Trajectory
+from mlscorr.survey import (
+    SEARCH_RADIUS,
+    ControlPoints,
+    Matched,
+    Pos,
+    Survey,
+    TargetObservations,
+    Trajectory,
+)
 
 
 @dataclass(frozen=True)
@@ -39,6 +47,17 @@ class Matches:
     probability: np.ndarray
     reasons: tuple[str, ...]
     moved: TargetObservations | None = None
+
+    def by_role(self, survey: Survey) -> tuple[Matched, Matched]:
+        """The matched control points, and the matched check points.
+
+        Parameters
+        ----------
+        survey : Survey
+        """
+        matched = Matched.by_name(self.matched, survey.surveyed)
+        is_control = np.isin(matched.name, survey.control.name)
+        return matched[is_control], matched[~is_control]
 
 
 def match(

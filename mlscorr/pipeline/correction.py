@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from mlscorr.estimate import SETTINGS
+from mlscorr.estimate import SETTINGS, Estimate
 from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
+from mlscorr.pipeline.finding import Finding
 from mlscorr.pipeline.tying import TieUse, estimate_survey
-from mlscorr.survey import Survey
+from mlscorr.survey import Matched, Survey
 
 
 def correct(
@@ -64,15 +66,36 @@ def correct(
     True
     """
     survey, control, check, finding, estimate = estimate_survey(survey, order, ties, rng, progress)
-    datum = datum_warnings(control[estimate.used], survey.trajectory, survey.pos)
+    result = CorrectedSurvey(**corrected_fields(survey, control, check, finding, estimate))
+    datum = result.warnings[len(finding.warnings) :]  # those of the finding were told meanwhile
     for sentence in (*datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
-    return CorrectedSurvey(
-        survey=survey,
-        estimate=estimate,
-        matched_control=control,
-        matched_check=check,
-        missing=unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned),
-        fitted=finding.fitted,
-        warnings=(*finding.warnings, *datum),
-    )
+    return result
+
+
+def corrected_fields(
+    survey: Survey, control: Matched, check: Matched, finding: Finding, estimate: Estimate
+) -> dict[str, Any]:
+    """Fields of a CorrectedSurvey.
+
+    Parameters
+    ----------
+    survey : Survey
+    control, check : Matched
+    finding : Finding
+        Of which these are.
+    estimate : Estimate
+        By the control points.
+    """
+    datum = datum_warnings(control[estimate.used], survey.trajectory, survey.pos)
+    return {
+        "survey": survey,
+        "estimate": estimate,
+        "matched_control": control,
+        "matched_check": check,
+        "missing": unseen_rows(
+            survey, finding.matches.refusals, finding.candidates, finding.scanned
+        ),
+        "fitted": finding.fitted,
+        "warnings": (*finding.warnings, *datum),
+    }

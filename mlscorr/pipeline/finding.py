@@ -211,36 +211,13 @@ def find_control(
     """
     check_control(survey)
     finding = find_targets(survey, rng, progress, read)
-    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
-    is_control = np.isin(matched.name, survey.control.name)
-    control, check = matched[is_control], matched[~is_control]
+    control, check = finding.matches.by_role(survey)
     if len(control) == 0:
         raise ValueError(
             f"None of the {len(survey.control)} control points was found in the cloud, only "
             f"{len(check)} check points, which must not take part in the estimate."
         )
     return control, check, finding
-
-
-def find_check(
-    survey: Survey, progress: Callable | None = None, read: Callable = read_chunks
-) -> tuple[Matched, Matched, Finding]:
-    """Find the check points of a survey without control, where there are any.
-
-    Parameters
-    ----------
-    survey, progress, read
-        As of ``find_targets``; the clouds are read to their ends in any case.
-
-    Returns
-    -------
-    control, check : Matched
-        None of the first.
-    finding : Finding
-    """
-    finding, _ = find_or_compare_surfaces(survey, read, None, progress)
-    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
-    return Matched.none(), matched, finding
 
 
 def find_or_compare_surfaces(

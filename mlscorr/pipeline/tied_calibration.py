@@ -73,9 +73,7 @@ def estimate_site(
     collector = TieCollector(survey)
     read = read_into(collector.add)
     finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
-    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
-    is_control = np.isin(matched.name, survey.control.name)
-    control, check = matched[is_control], matched[~is_control]
+    control, check = finding.matches.by_role(survey)
     number = len(set(control.name))
     is_enough = number >= LIMITS.smallest_targets and np.ptp(control.gps_time) >= SAME_EPOCH
     estimate = estimate_mounting if is_enough else believed_mounting

@@ -21,7 +21,7 @@ from mlscorr.estimate import (
     with_ties,
 )
 from mlscorr.io.las import read_chunks
-from mlscorr.pipeline.finding import Finding, find_check, find_control, read_into
+from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.survey import Matched, Survey, TieFeatures, Ties
 from mlscorr.ties import (
     NORMAL_SCATTER,
@@ -85,7 +85,8 @@ def estimate_survey(
     collector = TieCollector(survey)
     read = read_chunks if ties == "off" else read_into(collector.add)
     if ties == "only":
-        control, check, finding = find_check(survey, progress, read)
+        finding, _ = find_or_compare_surfaces(survey, read, None, progress)
+        control, check = finding.matches.by_role(survey)
     else:
         control, check, finding = find_control(survey, rng, progress, read)
     features = None if ties == "off" else collector.features()

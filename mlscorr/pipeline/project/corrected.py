@@ -10,17 +10,16 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import Estimate, place_control
-from mlscorr.evaluate.datum import datum_warnings
-from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.evaluate.ties import misfit, misfit_section, tie_section
 from mlscorr.pipeline.clouds import MovedClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
+from mlscorr.pipeline.correction import corrected_fields
 from mlscorr.pipeline.file_finding import FileFinding, join_findings
 from mlscorr.pipeline.project.areas import Area
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, drive_estimates
 from mlscorr.pipeline.project.joint import FoundDrive
 from mlscorr.pipeline.project.joint_estimate import JointEstimate
-from mlscorr.survey import Matched, Survey
+from mlscorr.survey import Survey
 
 STATES = {
     "controlled": "held by control points of its own",
@@ -58,9 +57,7 @@ def found_drive(survey: Survey, files: Sequence[FileFinding]) -> FoundDrive:
         Of each of its clouds.
     """
     contents = join_findings(survey, files)
-    matched = Matched.by_name(contents.finding.matches.matched, survey.surveyed)
-    is_control = np.isin(matched.name, survey.control.name)
-    return FoundDrive(survey, contents, matched[is_control], matched[~is_control])
+    return FoundDrive(survey, contents, *contents.finding.matches.by_role(survey))
 
 
 def corrected_drives(
@@ -111,18 +108,8 @@ def drive_fields(drive: FoundDrive, estimate: Estimate) -> dict[str, Any]:
     estimate : Estimate
         Of its own control points and epochs.
     """
-    survey, finding = drive.survey, drive.contents.finding
-    datum = datum_warnings(drive.control[estimate.used], survey.trajectory, survey.pos)
-    missing = unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned)
-    return {
-        "survey": survey,
-        "estimate": estimate,
-        "matched_control": drive.control,
-        "matched_check": drive.check,
-        "missing": missing,
-        "fitted": finding.fitted,
-        "warnings": (*finding.warnings, *datum),
-    }
+    finding = drive.contents.finding
+    return corrected_fields(drive.survey, drive.control, drive.check, finding, estimate)
 
 
 def _state(part, number, area):
@@ -177,6 +164,17 @@ def tied_sentence(state: DriveState) -> str:
     return f"Estimated together with other drives of the project, by ties: {listed}."
 
 
+def bare_survey(survey: Survey) -> Survey:
+    """A survey without what only a report needs.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    none = survey.control[[]]
+    return replace(survey, control=none, check=none, notes=(), layouts=(), inputs=())
+
+
 def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> MovedClouds:
     """How a drive's clouds are moved, without what only a report needs.
 
@@ -189,13 +187,5 @@ def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> MovedClouds:
     survey, correction = corrected.survey, corrected.estimate.correction
     if not with_sigma:
         correction = Correction(correction.recorded, correction.corrected)
-    bare = replace(
-        survey,
-        trajectory=correction.recorded,
-        control=survey.control[[]],
-        check=survey.check[[]],
-        notes=(),
-        layouts=(),
-        inputs=(),
-    )
+    bare = replace(bare_survey(survey), trajectory=correction.recorded)
     return MovedClouds(bare, correction, corrected.held)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -200,14 +200,25 @@ def write(inputs: CloudInput) -> Written:
     return Written(written, tuple(outputs))
 
 
-def _of_file(survey, path):
-    """The survey of one of its files."""
-    clouds = tuple(file for file in survey.clouds if file.path == path)
-    mounted = [
+def with_clouds(survey: Survey, clouds: Collection[CloudFile]) -> Survey:
+    """A survey with some of its clouds alone.
+
+    Parameters
+    ----------
+    survey : Survey
+    clouds : collection of CloudFile
+    """
+    scanners = tuple(
         replace(scanner, clouds=tuple(file for file in scanner.clouds if file in clouds))
         for scanner in survey.scanners
-    ]
-    return replace(survey, clouds=clouds, scanners=tuple(m for m in mounted if m.clouds))
+    )
+    return replace(survey, clouds=tuple(clouds), scanners=scanners)
+
+
+def _of_file(survey, path):
+    """The survey of one of its files."""
+    survey = with_clouds(survey, [file for file in survey.clouds if file.path == path])
+    return replace(survey, scanners=tuple(m for m in survey.scanners if m.clouds))
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from mlscorr.io.storage import resolved
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.project.city import AreaInput, stored_results
+from mlscorr.pipeline.project.corrected import bare_survey
 from mlscorr.pipeline.project.file_tasks import (
     CloudInput,
     FindingInput,
@@ -24,6 +25,7 @@ from mlscorr.pipeline.project.file_tasks import (
     find,
     read_tile,
     report,
+    with_clouds,
     write,
 )
 from mlscorr.pipeline.project.tasks import VERSION, Task
@@ -98,12 +100,7 @@ class PlannedDrive:
         clouds = [file for file in survey.clouds if file.path not in lost]
         if len(clouds) == len(survey.clouds):
             return self
-        mounted = [
-            replace(m, clouds=tuple(file for file in m.clouds if file in clouds))
-            for m in survey.scanners
-        ]
-        survey = replace(survey, clouds=tuple(clouds), scanners=tuple(mounted))
-        return replace(self, survey=survey)
+        return replace(self, survey=with_clouds(survey, clouds))
 
 
 def planned_drive(project: ProjectParts, drive: DriveParts, tiles: Sequence[Tile]) -> PlannedDrive:
@@ -170,12 +167,9 @@ def finding_tasks(
     with_ties : bool
     """
     survey = drive.survey
-    bare = replace(
-        survey, control=survey.control[[]], check=survey.check[[]], notes=(), layouts=(), inputs=()
-    )
     core = digest(VERSION, survey.trajectory, survey.pos, survey.search_radius)
     kept = digest(core, survey.clouds, survey.mounting, survey.scanner, survey.scanners)
-    store.put("drives", kept, bare)
+    store.put("drives", kept, bare_survey(survey))
     tasks = []
     for file in survey.clouds:
         own, identity = survey.of(file), drive.identities[file.path]

@@ -81,8 +81,8 @@ def carry_out(task: Task, folder: Path) -> Outcome:
         Of the store.
     """
     start, store, fault, texts = time.perf_counter(), TaskStore(folder), "", []
-    with warnings.catch_warnings(record=True) as caught, threadpool_limits(limits=1):
-        warnings.simplefilter("always")
+    recorded = warnings.catch_warnings(record=True, action="always")
+    with recorded as caught, threadpool_limits(limits=1):
         try:
             result = task.function(*task.arguments)
             spoken = [w for w in caught if issubclass(w.category, UserWarning)]
