@@ -90,8 +90,7 @@ def fit_gaussian_process(trajectory: Trajectory, matched: Matched) -> Correction
         ) + WhiteKernel(0.01 * size, (1e-6 * size, 1e2 * size))
         process = GaussianProcessRegressor(kernel, random_state=0)
         mean = values.mean()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)
+        with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
             process.fit((epochs - first)[:, None], values - mean)
         error[:, axis] = mean + process.predict((trajectory.gps_time - first)[:, None])
     return _correction(trajectory, error)

@@ -38,8 +38,7 @@ def simulated_survey(path: Path | str, survey: Survey) -> Survey:
         for cloud in clouds:
             if conflict := crs_conflict(read_layout(cloud), survey.crs):
                 raise ValueError(f"The simulated clouds can't be compared. {conflict}")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the CRS, which agrees
+    with warnings.catch_warnings(action="ignore"):  # of the CRS, which agrees
         files = [cloud_file(cloud, survey.trajectory, "auto", survey.crs)[0] for cloud in clouds]
     return replace(survey, name=path.name, path=path, clouds=tuple(files))
 

@@ -176,10 +176,8 @@ class CalibratedSurvey(Summary):
         }
 
     def _statistics(self, role, correction):
-        if role == "check":
-            return score(self.matched_check, correction).document()
         used = self.matched_control[self.calibration.used]
-        return score(used, correction).document()
+        return score(self.matched_check if role == "check" else used, correction).document()
 
     def _rows(self, correction):
         """Rows of every surveyed point and pass."""

@@ -98,8 +98,7 @@ def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[st
     for conflict in filter(None, (crs_conflict(cloud.layout, crs) for cloud in clouds)):
         raise ValueError(conflict.replace("crs of survey.toml", f"the crs {reason}"))
     trajectory = drive.read(crs)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         try:
             check_area(projected, trajectory)
         except UserWarning as warning:

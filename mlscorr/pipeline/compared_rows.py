@@ -189,8 +189,7 @@ def _simulated_clouds(simulated, patches, progress):
     beams = None if patches is None else SimulatedBeams(patches)
     others = [sampler] if beams is None else [sampler, beams]
     read = read_into(collector.add, *map(_chunks_alone, others))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of beams, which refuse the clouds
+    with warnings.catch_warnings(action="ignore"):  # of beams, which refuse the clouds
         finding, _ = find_or_compare_surfaces(simulated, read, None, progress)
     if finding.warnings:
         raise ValueError(

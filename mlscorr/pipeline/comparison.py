@@ -86,8 +86,7 @@ def compare(
 
 def _row(method, survey, control, check, candidates):
     """A method's row of compare.json, and its correction or None."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         correction, details, why, seconds = _fitted(method, survey, control, candidates)
     doubts = [str(warning.message) for warning in caught]
     for sentence in doubts:
@@ -119,8 +118,7 @@ def _fitted(method, survey, matched, candidates):
 
 def _score(matched, correction):
     """N and the statistics of the misclosures; None where there is no correction."""
-    left = misclosures(matched, correction)
-    return _statistics(left, correction is not None)
+    return _statistics(misclosures(matched, correction), correction is not None)
 
 
 def _statistics(residuals, determined):
@@ -143,8 +141,7 @@ def _cross_validated(method, survey, control, candidates, groups, of_check, done
     parts, why = [of_check], None
     for group in groups:
         left_out = np.array([name in group for name in control.name])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # told of the fit to all control points
+        with warnings.catch_warnings(action="ignore"):  # told of the fit to all control points
             correction, _, problem, _ = _fitted(method, survey, control[~left_out], candidates)
         done(1)
         if correction is None:

@@ -70,8 +70,7 @@ class Faults:
         *arguments
             Its own.
         """
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as caught:
             try:
                 return function(*arguments)
             except ValueError as error:

@@ -260,8 +260,7 @@ def _read_notes(path, text):
     part = path.with_name(f".{path.name}.part")
     try:
         part.write_text(text, encoding="utf-8")
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as caught:
             survey = read_survey(part)
     except (ValueError, FileNotFoundError) as error:
         raise ValueError(str(error).replace(str(part), str(path))) from None
