@@ -162,16 +162,12 @@ def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nda
     ValueError
         Where a grid or the CRS does not reach.
     """
-    from pyproj import Transformer
     from pyproj.exceptions import ProjError
 
     crs = check_crs(crs)
     longitude, latitude = np.degrees(record["longitude"]), np.degrees(record["latitude"])
     try:
-        transformer = Transformer.from_crs(
-            crs.geodetic_crs.to_3d(), crs, always_xy=True, only_best=True, allow_ballpark=False
-        )
-        easting, northing, height = transformer.transform(
+        easting, northing, height = _exact(crs.geodetic_crs.to_3d(), crs).transform(
             longitude, latitude, record["height"], errcheck=True
         )
         factors = _map(crs).get_factors(longitude, latitude, errcheck=True)
@@ -229,18 +225,11 @@ def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray]
     ValueError
         Where a grid is missing, or the CRS does not reach.
     """
-    from pyproj import Transformer
     from pyproj.exceptions import ProjError
 
     projected = check_crs(crs)
     try:
-        transformer = Transformer.from_crs(
-            projected,
-            projected.geodetic_crs.to_3d(),
-            always_xy=True,
-            only_best=True,
-            allow_ballpark=False,
-        )
+        transformer = _exact(projected, projected.geodetic_crs.to_3d())
         easting, northing, height = position.T
         longitude, latitude, height = transformer.transform(
             easting, northing, height, errcheck=True
@@ -249,6 +238,15 @@ def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray]
         raise ValueError(f"{crs} can't be left for latitude and longitude: {error}") from None
     place = {"latitude": np.radians(latitude), "longitude": np.radians(longitude)}
     return place | {"height": height}, convergence_at(crs, *position[:, :2].T)
+
+
+def _exact(source, target):
+    """The transformation between two CRS, by the grids that it needs or not at all."""
+    from pyproj import Transformer
+
+    return Transformer.from_crs(
+        source, target, always_xy=True, only_best=True, allow_ballpark=False
+    )
 
 
 def _map(crs):

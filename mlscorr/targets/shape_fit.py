@@ -73,8 +73,7 @@ def rough_fit(echoes: Echoes, seed: Seed, kind: str, size: float | None) -> Shap
         away = np.linalg.norm(beams[0] - seed.middle, axis=1)
         beyond = away > SETTINGS.outside_middle * diameter(kind, known.mean)
         bright = echoes.intensity[seed.rows]
-        beams, level = _with_threshold(echoes.intensity, beams, bright, beyond, seed.threshold)
-        seed = replace(seed, threshold=float(level))
+        beams, seed = _with_threshold(echoes.intensity, beams, bright, beyond, seed)
     points, state, _ = beams
     blur = SETTINGS.rough_blur * known.mean
     start = seed.middle
@@ -141,8 +140,7 @@ def _refined(echoes, fit):
         beyond = inside < -2 * SETTINGS.rough_blur * fit.outline.size
         bright = echoes.intensity[rows[(state != MISS) & (inside > 0)]]
         if len(bright):
-            beams, level = _with_threshold(echoes.intensity, beams, bright, beyond, seed.threshold)
-            seed = replace(seed, threshold=float(level))
+            beams, seed = _with_threshold(echoes.intensity, beams, bright, beyond, seed)
     return replace(fit, seed=seed, beams=beams)
 
 
@@ -175,21 +173,24 @@ def _dark_inside(points, state, outline):
     return (about & (state == DARK)).sum() > max(3, 0.5 * about.sum())
 
 
-def _with_threshold(intensity, beams, bright, outside, otherwise):
-    """The beams with their state by a threshold, and it: half way between bright and dark.
+def _with_threshold(intensity, beams, bright, outside, seed):
+    """The beams with their state by a threshold, and the seed with it: half way between bright
+    and dark.
 
     bright are intensities on the target, outside tells which beams certainly aren't; where none
     of these returned from the plane, half as bright is dark, and where they are nearly as bright,
-    the threshold is the one given.
+    the threshold is the seed's own.
     """
     points, state, rows = beams
     dark = intensity[rows[outside & (state != MISS)]]
     # the brighter of what lies outside: beside a dark board, the wall that it hangs on
     dark = np.percentile(dark, 90) if len(dark) >= SETTINGS.smallest_count / 4 else 0.0
     bright = np.median(bright)
-    threshold = (bright + dark) / 2 if dark < SETTINGS.same_surface * bright else otherwise
+    is_apart = dark < SETTINGS.same_surface * bright
+    threshold = (bright + dark) / 2 if is_apart else seed.threshold
     returned = np.where(intensity[rows] >= threshold, BRIGHT, DARK)
-    return (points, np.where(state == MISS, MISS, returned), rows), threshold
+    beams = points, np.where(state == MISS, MISS, returned), rows
+    return beams, replace(seed, threshold=float(threshold))
 
 
 def _blur(echoes, fit, scanner):

@@ -98,8 +98,7 @@ class Surfaces:
         if divergence == 0:
             rows = rays.ray, self.cast(rays.single), *first
             in_slices(n, _thin, rows, (origin, self._planes, *limits, max_range))
-            whole = [*first[0].T, *first[1:], np.empty(0, np.int64)]
-            return Hits(*whole)
+            return Hits(*first[0].T, *first[1:], np.empty(0, np.int64))
         fan = room.array("fan", n, len(SUB_RAYS), 6, dtype=np.float32)
         offsets = SUB_RAYS * divergence / 2
         in_slices(n, _fan, (rays.ray, fan), (offsets,))
@@ -111,8 +110,7 @@ class Surfaces:
         hit = np.concatenate([rows[2] for _, rows in later])
         point = origin + rays.ray[pulse, :3] + more[:, :1] * rays.ray[pulse, 3:6]
         whole = [np.concatenate(pair) for pair in zip(first, (more, hit, point), strict=True)]
-        whole = [*whole[0].T, *whole[1:], pulse]
-        return Hits(*whole)
+        return Hits(*whole[0].T, *whole[1:], pulse)
 
 
 @njit(cache=True, nogil=True, inline="always")

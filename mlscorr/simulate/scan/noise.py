@@ -5,6 +5,7 @@ returns. Later echoes of a pulse, which a wide beam has, draw from streams of th
 """
 
 from concurrent.futures import wait
+from functools import partial
 
 import numpy as np
 from numba import njit
@@ -17,15 +18,9 @@ from mlscorr.simulate.settings import SETTINGS
 FULL_SCALE = np.iinfo(np.uint16).max  # of intensity, as LAS holds it
 
 
-def _normal(stream, n, sigma):
-    noise = stream.standard_normal(n)
-    noise *= sigma
-    return noise
-
-
-def _coarse(stream, n, sigma):
-    noise = stream.standard_normal(n, dtype=np.float32)
-    noise *= np.float32(sigma)
+def _normal(stream, n, sigma, kind=float):
+    noise = stream.standard_normal(n, dtype=kind)
+    noise *= kind(sigma)
     return noise
 
 
@@ -33,6 +28,7 @@ def _chance(stream, n, _):
     return stream.random(n)
 
 
+_coarse = partial(_normal, kind=np.float32)
 DRAWS = {"range": _normal, "angle": _normal, "speckle": _coarse, "loss": _chance}
 
 
