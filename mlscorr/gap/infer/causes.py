@@ -228,8 +228,7 @@ def cause_of(
     names, parameters, parts = label.split("+"), (), ()
     steady = [name for name in names if name not in evidence.noisy]
     if steady:
-        label_of_effects = "+".join(steady)
-        members = [best_member(signatures, evidence, name, label_of_effects) for name in steady]
+        members = [best_member(signatures, evidence, n, "+".join(steady)) for n in steady]
         parameters, estimates, shift = effect_parameters(rows, evidence, members, steady)
         parts = tuple(zip(members, estimates, strict=True))
     cause = Cause(label, probability, parameters, parts, shift)

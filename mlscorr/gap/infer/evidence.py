@@ -174,6 +174,5 @@ def suited_models(
     time = time - time[0]
     wave = np.arange(12) * np.pi * time[:, None] / max(time[-1], 1e-9)
     slow = (np.cos(wave)[:, :, None] * place[:, None]).reshape(len(observations), -1)
-    return relevant_models(
-        observations, models, residual, [steady[:, :0], np.hstack([steady, slow])]
-    )
+    nuisances = steady[:, :0], np.hstack([steady, slow])
+    return relevant_models(observations, models, residual, nuisances)

@@ -70,9 +70,8 @@ class LabelEvidence:
 
     def event(self, name: str, label: str) -> RefinedEvent | None:
         """The event of a name that is, or is part of, a label; None if it doesn't stand out."""
-        beside = self.refined.get(label)
-        is_of_pair = beside is not None and beside.signature.name == name
-        return beside if is_of_pair else self.refined.get(name)
+        known = (self.refined.get(key) for key in (label, name))
+        return next((each for each in known if each and each.signature.name == name), None)
 
     def lead(self) -> tuple[str, np.ndarray]:
         """What the best of the unknown blocks says in words, and its column numbers."""
@@ -118,8 +117,7 @@ def weigh_labels(
     unknown = unknown_blocks(rows, survey)
     table = column_table(rows, signatures, unknown, observations.sigma)
     table = without_known(observations, table)
-    steady = steady_columns(observations, table)
-    observations, tail = without_tails(observations, rows, steady)
+    observations, tail = without_tails(observations, rows, steady_columns(observations, table))
     residual = observations.columns(rows.residual[:, None])
     models = suited_models(observations, table, error_models(), residual)
     residual = np.hstack([residual, _replicas(observations, models, residual, rng, replicas)])

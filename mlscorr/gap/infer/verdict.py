@@ -135,12 +135,13 @@ def joint_score(
     given, refined = {}, {}
     for first in _accepted(evidence, score, best):
         regained, beside, events = _given(rows, survey, signatures, evidence, first)
-        refined |= {_joined(evidence, first, name): event for name, event in events.items()}
         base = score[first] = score[first] + regained
         given[first] = {name: gain for name, gain in beside.items() if name != first}
         for name, gain in given[first].items():
             label = "unknown" if name == "unknown" else _joined(evidence, first, name)
             score[label] = np.logaddexp(score.get(label, -np.inf), base + gain)
+            if name in events:
+                refined[label] = events[name]
     facts = _facts(rows, evidence, best)
     joint = JointScore(score, single, given.get(best, {}), facts, evidence.noisy)
     return joint, replace(evidence, refined=refined | evidence.refined)
@@ -203,9 +204,8 @@ def best_member(
         That it is part of.
     """
     event = evidence.event(name, label)
-    if event is not None:
-        return event.signature
-    return signatures[evidence.table.blocks[evidence.best(name)].member]
+    best = evidence.table.blocks[evidence.best(name)]
+    return signatures[best.member] if event is None else event.signature
 
 
 def _best_columns(evidence, name):

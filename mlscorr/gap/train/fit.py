@@ -155,6 +155,9 @@ def figures(
     def right(r, label):
         return r.is_right(label)
 
+    def unnamed(r, label):
+        return kind_of(label, r.joint.noisy) in ("unknown", "noise")
+
     everything = (0.0, np.inf)
     rates = {
         "clean, open sky: a cause claimed": rate("clean", *everything, claimed,
@@ -168,6 +171,7 @@ def figures(
         "both of a pair at 3 MDB and more": rate("pair", 3.0, np.inf, right),
         "noise named at 3 MDB and more": rate("noise", 3.0, np.inf, right),
         "withheld effect at 3 MDB and more: unknown": rate("withheld", 3.0, np.inf, right),
+        "withheld at 3 MDB and more: unknown or noise": rate("withheld", 3.0, np.inf, unnamed),
         "mechanism at 3 MDB and more: unknown": rate("outside", 3.0, np.inf, right),
     }  # fmt: skip
     stated = np.array([p[label] for p, label in zip(probabilities, labels, strict=True)])

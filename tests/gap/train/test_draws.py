@@ -33,10 +33,10 @@ def test_two_effects_are_of_their_size_and_unlike_each_other(world):
     ruler, known = world
     rng = np.random.default_rng(2)
     drawn = draw_effects(ruler, known, names_to_try(SYSTEMATIC, rng), 2, 4.0, rng)
-    (one, _), (two, like) = drawn
-    assert one.effect.name != two.effect.name
-    assert like[one.effect.name] < SETTINGS.same
-    for sized in (one, two):
+    (first, _), (second, like) = drawn
+    assert first.effect.name != second.effect.name
+    assert like[first.effect.name] < SETTINGS.same
+    for sized in (first, second):
         assert 0.5 <= sized.mdb <= 4.0 + 1e-9
         assert ruler.size(sized.shift) == pytest.approx(sized.mdb, rel=1e-6)
 
