@@ -34,8 +34,6 @@ class TieFeatures(Columns):
     extent : (n,) array
         One sigma of the points along a plane's narrow side, or along a pole. Units: m.
     points : (n,) int array
-    intensity : (n,) array
-        Mean of the points.
     sweep : (n, 3) array
         Gradient of the points' times over a plane, or along a pole: a line scanner on the move sees
         one end before the other. Units: s/m.
@@ -51,7 +49,6 @@ class TieFeatures(Columns):
     tilt: np.ndarray
     extent: np.ndarray
     points: np.ndarray
-    intensity: np.ndarray
     sweep: np.ndarray
 
     def time_beside(self, rows: np.ndarray, way: np.ndarray) -> np.ndarray:

@@ -12,10 +12,10 @@ EMPTY = -1
 CELL_BITS = 21  # of a key for each axis: a million cells to each side of the origin
 GROUP_BITS = 24  # of a key for the group, below the number of the moment
 # Columns of the moments of a cell: number of points; sums of their times since the cell's moment
-# began, of their intensity, of x, y, z; of xx, xy, xz, yy, yz, zz; number of points that follow
-# another one of the cell, and the sums of the same products of the differences from that;
-# sums of the times' products with x, y, z.
-COLUMNS = 22
+# began, of x, y, z; of xx, xy, xz, yy, yz, zz; number of points that follow another one of the
+# cell, and the sums of the same products of the differences from that; sums of the times' products
+# with x, y, z.
+COLUMNS = 21
 
 
 @njit(cache=True, inline="always")
@@ -54,7 +54,6 @@ def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
 def add_points(
     xyz: np.ndarray,
     gps_time: np.ndarray,
-    intensity: np.ndarray,
     begin: int,
     grid: np.ndarray,
     passes: np.ndarray,
@@ -69,7 +68,7 @@ def add_points(
 
     Parameters
     ----------
-    xyz, gps_time, intensity : (n, 3), (n,), (n,) arrays
+    xyz, gps_time : (n, 3), (n,) arrays
     begin : int
         The first point to add.
     grid : (6,) array
@@ -80,7 +79,7 @@ def add_points(
         Of the first segment: the key of a cell holds group + segment.
     starts : (s,) array
         First time of each segment, which is updated.
-    table, keys, moments : (t,), (k, 2), (k, 22) arrays
+    table, keys, moments : (t,), (k, 2), (k, 21) arrays
         Hash table, key and moments of each cell, which are updated.
     count : int
         Rows in use.
@@ -119,13 +118,12 @@ def add_points(
         sums[0] += 1.0
         since = time - grid[3] - second * grid[5]
         sums[1] += since
-        sums[2] += intensity[i]
-        _add_place(sums, 3, 1.0, x, y, z)
-        _add_place(sums, 19, since, x, y, z)
-        _add_products(sums, 6, x, y, z)
+        _add_place(sums, 2, 1.0, x, y, z)
+        _add_place(sums, 18, since, x, y, z)
+        _add_products(sums, 5, x, y, z)
         if follows:
-            sums[12] += 1.0
-            _add_products(sums, 13, x - last_x, y - last_y, z - last_z)
+            sums[11] += 1.0
+            _add_products(sums, 12, x - last_x, y - last_y, z - last_z)
         last_x, last_y, last_z = x, y, z
     return len(xyz), count
 
@@ -192,8 +190,8 @@ class CellTable:
         begin = 0
         while True:
             begin, self.count = add_points(
-                cloud.xyz, cloud.gps_time, cloud.intensity, begin, self._grid, passes, group,
-                starts, self._table, self.keys, self.moments, self.count,
+                cloud.xyz, cloud.gps_time, begin, self._grid, passes, group, starts, self._table,
+                self.keys, self.moments, self.count,
             )  # fmt: skip
             if begin == len(cloud):
                 return
@@ -220,7 +218,7 @@ class CellTable:
         begin : (k,) array
             Of their moments. Units: s.
         group : (k,) int array
-        moments : (k, 22) array
+        moments : (k, 21) array
         """
         keys, moments = self.keys[: self.count][rows], self.moments[: self.count][rows]
         half, rest, cell = 1 << (CELL_BITS - 1), keys[:, 0], np.empty((len(keys), 3))

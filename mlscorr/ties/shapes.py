@@ -43,7 +43,7 @@ def covariances(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Parameters
     ----------
-    moments : (n, 22) array
+    moments : (n, 21) array
         See mlscorr.ties.cells.
 
     Returns
@@ -53,10 +53,10 @@ def covariances(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     noise : (n, 3, 3) array
         Half the mean product of the differences; NaN where neighbours are too rare. Units: m^2.
     """
-    count, followers = moments[:, :1], moments[:, 12:13]
-    mean = moments[:, 3:6] / count
-    products = moments[:, 6:12] / count - mean[:, ROWS] * mean[:, COLUMNS]
-    differences = moments[:, 13:19] / np.maximum(2 * followers, 1.0)
+    count, followers = moments[:, :1], moments[:, 11:12]
+    mean = moments[:, 2:5] / count
+    products = moments[:, 5:11] / count - mean[:, ROWS] * mean[:, COLUMNS]
+    differences = moments[:, 12:18] / np.maximum(2 * followers, 1.0)
     differences[~_is_ordered(moments)] = np.nan  # points in no order, or beams that take turns
     return _symmetric(products), _symmetric(differences)
 
@@ -81,7 +81,7 @@ def find_shapes(
         Of the cells' moments. Units: s.
     group : (n,) int array
         Of each cell; it stands for pass_number and scanner in what is returned.
-    moments : (n, 22) array
+    moments : (n, 21) array
         See mlscorr.ties.cells.
     """
     rows = np.flatnonzero(moments[:, 0] >= SETTINGS.points)
@@ -96,7 +96,7 @@ def find_shapes(
     values, axes = np.linalg.eigh(covariance[rows])
     values = np.maximum(values, SETTINGS.rounding**2)  # points of a file may be the same
     count = moments[:, 0]
-    time, local = begin + moments[:, 1] / count, moments[:, 3:6] / count[:, None]
+    time, local = begin + moments[:, 1] / count, moments[:, 2:5] / count[:, None]
     sight = middle + local - scanner_position(survey.trajectory, survey.mounting, time)
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)
     believed = survey.scanner.range_noise**2 * np.eye(3)
@@ -118,7 +118,6 @@ def find_shapes(
         tilt=shapes.tilt,
         extent=shapes.extent,
         points=count[rows].astype(int),
-        intensity=moments[rows, 2] / count[rows],
         sweep=_sweep(moments[rows], values[rows], axes[rows], kind == "pole"),
     )
 
@@ -126,7 +125,7 @@ def find_shapes(
 def _sweep(moments, values, axes, is_pole):
     """Gradient (n, 3) of the points' times over planes, or along poles. Units: s/m."""
     count = moments[:, :1]
-    with_time = moments[:, 19:22] / count - moments[:, 1:2] * moments[:, 3:6] / count**2
+    with_time = moments[:, 18:21] / count - moments[:, 1:2] * moments[:, 2:5] / count**2
     along = np.einsum("nik,ni->nk", axes, with_time) / values
     along[:, 0] = 0.0
     along[is_pole, 1] = 0.0
@@ -155,7 +154,7 @@ def _scatter(variance, moments, between):
     points of a line 1 / (2 ripple - 1). Across the lines the surface is as smooth as along them:
     what is curved or broken is in a piece, and its mean no better than its roughness.
     """
-    points, followers = moments[:, 0], moments[:, 12]
+    points, followers = moments[:, 0], moments[:, 11]
     variance = variance * points / (points - 3)
     between = np.clip(between, SETTINGS.rounding**2, variance)
     lines = np.where(_is_ordered(moments), points - followers, np.sqrt(points))
@@ -166,7 +165,7 @@ def _scatter(variance, moments, between):
 
 def _is_ordered(moments):
     """Whether enough points (n,) follow another one of their cell: else noise can't be told."""
-    return moments[:, 12] >= moments[:, 0] / 4
+    return moments[:, 11] >= moments[:, 0] / 4
 
 
 def _poles(moments, values, axes, noise, sight):
@@ -185,7 +184,7 @@ def _poles(moments, values, axes, noise, sight):
     is_pole &= axis[:, 2] >= np.cos(SETTINGS.largest_lean)
     # what touches the border of its cell goes on beyond: it is cut, and its mean is not the whole's
     spread = np.sqrt(np.einsum("nii->ni", matrix)[:, :2])
-    to_border = SETTINGS.cell / 2 - np.abs(moments[:, 3:5] / points[:, None])
+    to_border = SETTINGS.cell / 2 - np.abs(moments[:, 2:4] / points[:, None])
     is_pole &= (to_border >= 2 * spread).all(axis=1)
     of_radius = radius**2 / (5 * points)  # a uniform distribution's variance^2 is known to 0.8 / m
     variance = side / points + DEPTH**2 * of_radius + (SETTINGS.roundness * radius) ** 2

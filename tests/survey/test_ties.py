@@ -23,7 +23,6 @@ def wall():
         tilt=np.full(2, 1e-4),
         extent=np.full(2, 0.3),
         points=np.array([200, 300]),
-        intensity=np.array([90.0, 110.0]),
         sweep=np.zeros((2, 3)),
     )
 

@@ -27,7 +27,6 @@ def walls(place, number, normal=(1.0, 0.0, 0.0), time=None):
         tilt=np.full(n, 1e-4),
         extent=np.full(n, 0.3),
         points=np.full(n, 100),
-        intensity=np.full(n, 90.0),
         sweep=np.zeros((n, 3)),
     )
 
