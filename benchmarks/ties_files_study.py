@@ -1,12 +1,14 @@
 """What ties between passes add through files: clouds there and back, targets and ties found.
 
 python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--scanners 2] [--elsewhere]
+    [--road [--without-paint]]
 
 RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
 far apart the trajectories of both passes are left in a place. Without control only the latter is
 claimed. Drives are the simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each
 pass of 150 s alone: its smoothed drift is 0.6 to 1 m. With --elsewhere each pass loses it once, for
-70 to 120 s from a random moment. A second scanner is turned to the other side.
+70 to 120 s from a random moment. A second scanner is turned to the other side. With --road the
+scanner sees the road alone, which has a dashed middle line and lines along the kerbs.
 """
 
 import argparse
@@ -24,19 +26,21 @@ from mlscorr.pipeline.finding import find_control
 from mlscorr.pipeline.tying import tie_passes
 from mlscorr.simulate import read_scenario, simulate
 from mlscorr.simulate.recording import join_passes
+from mlscorr.survey import PAINTED
 from mlscorr.ties import TieCollector
 
 POINTS_PER_LINE = 400  # of 700: a survey takes two minutes
 DURATION = 150.0  # s of each pass
 GNSS = 5.0  # s, at both ends of a pass
 OUTAGE = 70.0, 120.0  # s: shortest and longest of a pass, where passes lose GNSS by themselves
+DOWNWARD = (-150.0, -30.0)  # deg, scan angles that meet the road or what stands less than 2 m high
 NEAREST = 5.0  # m between two passes that are compared in a place
 
 
-def scenario(scanners=1, duration=DURATION, rng=None):
+def scenario(scanners=1, duration=DURATION, rng=None, road=False):
     """The canyon as a MEMS unit records it, with GNSS at the ends of the passes alone.
 
-    With a generator of random numbers, without it once in each pass.
+    With a generator of random numbers, without it once in each pass; or its painted road alone.
     """
     canyon = read_scenario(FOLDER / "canyon.toml")
     outages = []
@@ -46,11 +50,15 @@ def scenario(scanners=1, duration=DURATION, rng=None):
         begin = GNSS if rng is None else rng.uniform(GNSS, latest)
         outages.append((start + begin, length))
     pos = {"grade": "mems", "sky_view": False, "outages": tuple(outages)}
-    first = canyon.scanner[0].model_copy(update={"points_per_line": POINTS_PER_LINE})
+    seen = {"points_per_line": POINTS_PER_LINE}
+    if road:  # as many points as a scanner has that sees paint
+        seen = {"points_per_line": 4 * POINTS_PER_LINE, "field_of_view": DOWNWARD}
+    first = canyon.scanner[0].model_copy(update=seen)
     turn = np.array([1.0, 1.0, -1.0])
     second = first.model_copy(update={"boresight": tuple(turn * first.boresight)})
     return canyon.model_copy(
         update={
+            "scene": canyon.scene.model_copy(update={"markings": road}),
             "pos": canyon.pos.model_copy(update=pos),
             "drive": canyon.drive.model_copy(update={"duration": duration, "stops": ()}),
             "scanner": (first, second)[:scanners],
@@ -113,13 +121,15 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scanners", type=int, choices=(1, 2), default=1)
     parser.add_argument("--elsewhere", action="store_true", help="outages by pass")
+    parser.add_argument("--road", action="store_true", help="nothing but a painted road")
+    parser.add_argument("--without-paint", action="store_true", help="ties of planes and poles")
     parser.add_argument("--control", type=int, nargs="+", default=[0, 3, 6, 12])
     arguments = parser.parse_args()
     print("control  seed     raw   alone  within    ties  within   apart   ratio")
     ratios = {number: [] for number in arguments.control}
     for seed in range(arguments.first, arguments.first + arguments.seeds):
         rng = np.random.default_rng([seed, 1]) if arguments.elsewhere else None
-        drive = scenario(arguments.scanners, rng=rng)
+        drive = scenario(arguments.scanners, rng=rng, road=arguments.road)
         with tempfile.TemporaryDirectory() as folder:
             simulated = simulate(drive, np.random.default_rng(seed))
             simulated.write(Path(folder) / "survey")
@@ -127,6 +137,8 @@ def main():
             with warnings.catch_warnings(action="ignore"):
                 survey = mlscorr.read_survey(Path(folder) / "survey")
                 found, features = read(survey)
+            if arguments.without_paint:
+                features = features[~np.isin(features.kind, PAINTED)]
         recorded = survey.trajectory
         raw = rms(true.at(recorded.gps_time).position - recorded.position)
         for number in arguments.control:

@@ -12,7 +12,7 @@ def ties(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find planes and poles that two passes both saw, and how far they lie apart."""
+    """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.find_ties(recorded, progress=progress).write(out, overwrite)
@@ -24,7 +24,8 @@ def _tell(content, out):
     """How many ties there are, how far apart passes lie, and where the results are."""
     features = content["features"]
     say(
-        f"{content['ties']} ties between {features['plane']} planes and {features['pole']} poles; "
+        f"{content['ties']} ties between {features['plane']} planes, {features['pole']} poles, "
+        f"{features['line']} pieces of painted lines and {features['dash']} dashes; "
         f"{content['refused']} more contradict their neighbours."
     )
     for pair in content["pairs"]:

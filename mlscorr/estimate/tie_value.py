@@ -11,6 +11,7 @@ from mlscorr.collocation import leave_each_out
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.prediction import pose_rows
 from mlscorr.estimate.settings import SETTINGS
+from mlscorr.survey import TIE_KINDS
 
 
 @dataclass(frozen=True)
@@ -20,8 +21,8 @@ class TieValue:
     Parameters
     ----------
     share : dict
-        Of what both tell of the POS error, by kind: control, plane, pole. An observation tells what
-        its redundancy number lacks to one, the part of an error in it that the result takes up.
+        Of what both tell of the POS error, by kind: control, and TIE_KINDS. An observation tells
+        what its redundancy number lacks to one, the part of an error that the result takes up.
     sufficient : int or None
         Number of control points, evenly chosen, with which the drive's median sigma would have been
         no worse than a tenth of all of them; None without control.
@@ -47,7 +48,7 @@ def tie_value(estimate: Estimate) -> TieValue:
     control, ties = leave_each_out(solved)
     absorbed = (1.0 - ties.redundancy).ravel()
     kind = residuals.ties.kind[residuals.used]
-    parts = {name: float(absorbed[kind == name].sum()) for name in ("plane", "pole")}
+    parts = {name: float(absorbed[kind == name].sum()) for name in TIE_KINDS}
     parts = {"control": float((1.0 - control.redundancy[: len(equations.names)]).sum()), **parts}
     total = sum(parts.values())
     share = {name: part / total for name, part in parts.items()}

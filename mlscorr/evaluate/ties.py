@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mlscorr.estimate import Estimate, TieResiduals, tie_value
+from mlscorr.survey import TIE_KINDS
 
 
 def tie_section(estimate: Estimate) -> dict[str, object] | None:
@@ -42,7 +43,7 @@ def misfit_section(residuals: TieResiduals | None) -> dict[str, object] | None:
     return {
         "n": len(ties),
         "used": int(used.sum()),
-        "kinds": {kind: int((ties.kind == kind).sum()) for kind in ("plane", "pole")},
+        "kinds": {kind: int((ties.kind == kind).sum()) for kind in TIE_KINDS},
         "before": misfit(ties.misclosure[used]),
         "after": misfit(residuals.after[used]),
         "pairs": pair_rows(residuals),

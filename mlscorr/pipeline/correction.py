@@ -26,7 +26,7 @@ def correct(
 ) -> CorrectedSurvey:
     """Find the targets of a survey and estimate the POS error from its control points.
 
-    Planes and poles that two passes both saw hold the passes together, where there are any.
+    Planes, poles and paint that two passes both saw hold the passes together, where there are any.
 
     Parameters
     ----------

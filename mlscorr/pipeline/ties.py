@@ -15,7 +15,7 @@ from mlscorr.io.las import read_chunks
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_ties_csv
 from mlscorr.pipeline.finding import silent
-from mlscorr.survey import Survey, TieFeatures
+from mlscorr.survey import TIE_KINDS, Survey, TieFeatures
 from mlscorr.survey.summary import Summary
 from mlscorr.ties import (
     SETTINGS,
@@ -35,7 +35,7 @@ AXES = ("across", "along", "up")  # of the way of the earlier view
 
 
 def find_ties(survey: Survey, progress: Callable | None = None) -> TiedSurvey:
-    """Find planes and poles that two passes both saw, without control.
+    """Find planes, poles and paint that two passes both saw, without control.
 
     Parameters
     ----------
@@ -106,6 +106,8 @@ class TiedSurvey(Summary):
                     "n": int(inside.sum()),
                     "planes": int((ties.kind[inside] == "plane").sum()),
                     "poles": int((ties.kind[inside] == "pole").sum()) // 2,
+                    "lines": int((ties.kind[inside] == "line").sum()),
+                    "dashes": int((ties.kind[inside] == "dash").sum()),
                     "misfit": by_axis,
                     "weakest": _weakest(ties[inside]),
                 }
@@ -118,11 +120,12 @@ class TiedSurvey(Summary):
 
     def _overview(self):
         """What a notebook shows."""
-        rows = [("passes", "planes", "poles", "apart across, along, up (m, RMS)")]
+        kinds = ("planes", "poles", "lines", "dashes")
+        rows = [("passes", *kinds, "apart across, along, up (m, RMS)")]
         for pair in self.pairs:
             apart = (pair["misfit"][axis]["rms"] for axis in AXES)
             numbers = ", ".join("-" if rms is None else f"{rms:.3f}" for rms in apart)
-            rows.append((pair["passes"], pair["planes"], pair["poles"], numbers))
+            rows.append((pair["passes"], *(pair[kind] for kind in kinds), numbers))
         return [(self.survey.name,), *rows, *((sentence,) for sentence in self.warnings)]
 
     @property
@@ -151,10 +154,10 @@ class TiedSurvey(Summary):
         passes = np.unique(self.features.pass_number)
         if len(ties) == 0:
             return (
-                f"No tie was found: {len(passes)} passes with {len(self.features)} planes and "
-                f"poles saw nothing twice within {self.search.radius:.2f} m. Drive the street "
-                "twice, best in both directions; where that was done, passes lie farther apart "
-                "than the POS states: raise its sigmas, or [matching] search_radius.",
+                f"No tie was found: {len(passes)} passes with {len(self.features)} planes, "
+                f"poles and markings saw nothing twice within {self.search.radius:.2f} m. Drive "
+                "the street twice, best in both directions; where that was done, passes lie "
+                "farther apart than the POS states: raise its sigmas, or [matching] search_radius.",
             )
         sentences = []
         if len(refused) > len(ties):
@@ -193,7 +196,7 @@ class TiedSurvey(Summary):
                 "name": self.survey.name,
                 "crs": self.survey.crs,
                 "features": {
-                    **{kind: int((kinds == kind).sum()) for kind in ("plane", "pole")},
+                    **{kind: int((kinds == kind).sum()) for kind in TIE_KINDS},
                     "passes": {str(p): int((passes == p).sum()) for p in np.unique(passes)},
                 },
                 "search_radius": self.search.radius,

@@ -226,8 +226,9 @@ def _untied(estimate, features, radius):
     """The estimate with the reason why nothing is tied, a warning where something should be."""
     passes, near = len(np.unique(features.pass_number)), _revisited(features, radius)
     what = (
-        f"{near} of {len(features)} planes and poles of {passes} pass{'es' * (passes > 1)} lie "
-        f"within about {radius:.1f} m of what was scanned at another time"
+        f"{near} of {len(features)} planes, poles and markings of {passes} "
+        f"pass{'es' * (passes > 1)} lie within about {radius:.1f} m of what was scanned at another "
+        "time"
     )
     if near < SETTINGS.neighbours:
         reason = (

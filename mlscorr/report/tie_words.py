@@ -39,9 +39,9 @@ def _misfit(section):
     """How far apart passes lay and lie, and how many ties contradict the others."""
     before, after = (length_in_words(section[state]["median"]) for state in ("before", "after"))
     yield (
-        f"Two passes both saw the same wall, road surface or pole in {thousands(section['n'])} "
-        f"places: there they lay {before} apart before the correction and lie {after} apart after "
-        "it (median)."
+        "Two passes both saw the same wall, road surface, pole or painted line in "
+        f"{thousands(section['n'])} places: there they lay {before} apart before the correction "
+        f"and lie {after} apart after it (median)."
     )
     wrong = section["n"] - section["used"]
     if wrong:

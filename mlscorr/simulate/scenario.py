@@ -34,6 +34,7 @@ class SceneScenario(_Part):
     trees: NotNegative = 4.0  # per 100 m of street
     cars: NotNegative = 5.0  # parked, per 100 m of street
     poles: NotNegative = 5.5  # per 100 m of street: lamps every 18 m
+    markings: bool = False  # a dashed middle line, and a line along each kerb of a street
     reference: bool = False  # write reference.ply: ground and walls as a static scan gives them
 
     @model_validator(mode="after")

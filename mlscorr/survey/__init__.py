@@ -7,5 +7,5 @@ from mlscorr.survey.beliefs import SEARCH_RADIUS, Pos, Scanner
 from mlscorr.survey.clouds import CloudFile, PointCloud
 from mlscorr.survey.recording import InputFile, MountedScanner, Survey
 from mlscorr.survey.targets import KINDS, ControlPoints, Matched, TargetObservations
-from mlscorr.survey.ties import TieFeatures, Ties
+from mlscorr.survey.ties import PAINTED, TIE_KINDS, TieFeatures, Ties
 from mlscorr.survey.trajectory import GAP_FACTOR, SAME_EPOCH, Mounting, Trajectory, control_epochs

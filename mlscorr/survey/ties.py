@@ -1,4 +1,4 @@
-"""What passes saw of the street itself: planes and poles, and which of them are the same thing."""
+"""What passes saw of the street itself: planes, poles and paint, and which are the same thing."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import numpy as np
 
 from mlscorr.survey.columns import Columns
 
+PAINTED = ("line", "dash")  # on the road
+TIE_KINDS = ("plane", "pole", *PAINTED)  # of features
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TieFeatures(Columns):
-    """Planes and poles as each pass saw them, a metre and a second of it in a row.
+    """Planes, poles and paint as each pass saw them, a metre and a second of it in a row.
 
     Parameters
     ----------
@@ -20,20 +23,22 @@ class TieFeatures(Columns):
     scanner : (n,) int array
         Number of the scanner, from 0.
     kind : (n,) str array
-        ``plane`` or ``pole``.
+        Of TIE_KINDS.
     gps_time : (n,) array
         Mean of the points. Units: s.
     centre : (n, 3) array
-        Mean of the points. Units: m.
+        Mean of the points; of a dash, midway between its ends. Units: m.
     direction : (n, 3) array
-        Unit normal of a plane, towards the scanner; axis of a pole, upwards.
+        Unit normal of a plane, towards the scanner; axis of a pole, upwards; level, across a
+        painted line or along a dash, either way.
     variance : (n,) array
-        Of the centre along the normal, or along any direction across the axis. Units: m^2.
+        Of the centre along the direction; of a pole, along any across the axis. Units: m^2.
     tilt : (n,) array
         Variance of the direction about either axis across it. Units: rad^2.
     extent : (n,) array
-        One sigma of the points along a plane's narrow side, or along a pole. Units: m.
+        One sigma of the points along a plane's narrow side, or along a pole or paint. Units: m.
     points : (n,) int array
+        Of paint, scan lines that cross it.
     sweep : (n, 3) array
         Gradient of the points' times over a plane, or along a pole: a line scanner on the move sees
         one end before the other. Units: s/m.
@@ -78,7 +83,8 @@ class Ties(Columns):
     """Things that were seen twice: scalar observations of what is wrong between both times.
 
     n . (correction of place 1 at time 1 - correction of place 2 at time 2) = misclosure + noise. A
-    plane gives a row along its normal, a pole two rows across its axis.
+    plane gives a row along its normal, a pole two rows across its axis, paint one along its
+    direction.
 
     Parameters
     ----------
@@ -93,7 +99,7 @@ class Ties(Columns):
     variance : (n,) array
         Of the noise. Units: m^2.
     kind : (n,) str array
-        ``plane`` or ``pole``.
+        Of TIE_KINDS.
     pass_number : (n, 2) int array
     scanner : (n, 2) int array
         Numbers of the scanners, from 0.

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import georeference, mounting_partials, to_scanner
-from mlscorr.survey import Mounting, TieFeatures, Trajectory
+from mlscorr.survey import PAINTED, Mounting, TieFeatures, Trajectory
 from mlscorr.ties.pairing import candidate_pairs
 from mlscorr.ties.settings import SETTINGS
 from mlscorr.ties.thinning import some_blocks
@@ -110,9 +110,12 @@ def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
         way = SETTINGS.narrowest * unit
         return move(features.centre + way, features.time_beside(rows, way)) - centre
 
-    is_pole = (features.kind == "pole")[:, None]
-    turned = np.cross(tangent(side), tangent(np.cross(axis, side)))
-    turned = np.where(is_pole, tangent(axis), turned)
+    up = np.array([0.0, 0.0, 1.0])
+    is_plane, is_line = ((features.kind == kind)[:, None] for kind in ("plane", "line"))
+    turned = tangent(np.where(is_line, np.cross(up, axis), axis))
+    turned[np.isin(features.kind, PAINTED), 2] = 0.0
+    turned = np.where(is_line, np.cross(turned, up), turned)
+    turned = np.where(is_plane, np.cross(tangent(side), tangent(np.cross(axis, side))), turned)
     return turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
 

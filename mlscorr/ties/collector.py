@@ -7,16 +7,19 @@ import numpy as np
 
 from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures
 from mlscorr.ties.cells import CellTable
+from mlscorr.ties.markings import find_markings, window_of
+from mlscorr.ties.paint import Crossings, find_crossings
 from mlscorr.ties.settings import SETTINGS
 from mlscorr.ties.shapes import find_shapes
 from mlscorr.ties.thinning import thin
 
 
 class TieCollector:
-    """Finds the planes and poles of the chunks that it is given, in any order.
+    """Finds planes, poles and markings of the chunks that it is given, in any order.
 
     What it holds grows neither with the points nor with the file: cells of the last moments, whose
-    points may still come, and of those before a bounded number of features a second (see thin).
+    points may still come, crossings of paint likewise, and of those before a bounded number of
+    features a second (see thin).
 
     Parameters
     ----------
@@ -39,6 +42,8 @@ class TieCollector:
         self._origin = np.floor(survey.trajectory.position[0]) if origin is None else origin
         self._cells = CellTable(self._origin, start, SETTINGS.cell, SETTINGS.moment)
         self._starts = np.full((len(survey.clouds), len(self._segments)), np.inf)
+        self._start = start
+        self._crossings: list[Crossings] = []
         self._kept: list[TieFeatures] = []
         self._kept_in_order, self._loose = 0, 0
 
@@ -54,15 +59,21 @@ class TieCollector:
         source = self._survey.clouds.index(file)
         group = source * len(self._segments)
         self._cells.add(chunk, self._segments, group, self._starts[source])
+        self._crossings.append(find_crossings(chunk, self._segments, group))
         if self._cells.count > self._held_cells:
-            moment = self._cells.moment
-            self._close(moment < moment.max() - 1)  # beams that take turns come a little late
+            # beams that take turns come a little late
+            self._close(self._cells.moment.max() - 1)
 
-    def _close(self, rows):
-        """Keep the features of cells (count,), and of all so far so many as may stay."""
+    def _close(self, moment):
+        """Keep the features of the moments before one, and of all so far so many as may stay."""
+        rows = self._cells.moment < moment
         self._kept.append(self._shapes(rows))
         self._cells.remove(rows)
-        self._loose += len(self._kept[-1])
+        crossings = Crossings.concatenate(self._crossings)
+        later = window_of(crossings.gps_time - self._start) >= window_of(moment * SETTINGS.moment)
+        self._kept.append(find_markings(crossings[~later], self._start))
+        self._crossings = [crossings[later]]
+        self._loose += len(self._kept[-1]) + len(self._kept[-2])
         if self._loose > max(self._held_cells, self._kept_in_order):
             features = TieFeatures.concatenate(self._kept)
             self._kept = [features[thin(features, self._origin)]]
@@ -83,8 +94,10 @@ class TieCollector:
 
     def features(self) -> TieFeatures:
         """Features of all chunks so far, in order of pass and time; chunks may still follow."""
-        rest = self._shapes(np.ones(self._cells.count, bool))
-        features = TieFeatures.concatenate([*self._kept, rest])
+        rest = [self._shapes(np.ones(self._cells.count, bool))]
+        if self._crossings:
+            rest.append(find_markings(Crossings.concatenate(self._crossings), self._start))
+        features = TieFeatures.concatenate([*self._kept, *rest])
         group = features.pass_number
         number = np.empty(self._starts.size, int)
         number[np.argsort(self._starts.ravel(), kind="stable")] = np.arange(1, number.size + 1)

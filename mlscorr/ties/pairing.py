@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlscorr.survey import TieFeatures, Ties
+from mlscorr.survey import PAINTED, TIE_KINDS, TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import direction_class
+from mlscorr.ties.thinning import direction_class, kind_number
 
 
 def pair_features(
@@ -49,9 +49,8 @@ def pair_features(
     present = features if turned is None else replace(features, direction=turned)
     pairs = _mutual(present, *candidate_pairs(present, correction, sigma, radius, angle))
     pairs = pairs[_beyond_chance(present, correction, sigma, radius, angle, pairs)]
-    first, second = present.direction[pairs.T]
-    direction = first + second
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    pairs = pairs[_is_unique(present, features.centre + correction, sigma)[pairs].all(axis=1)]
+    direction = _common_direction(present, pairs)
     apart = np.diff((features.centre + correction)[pairs], axis=1)[:, 0]
     along = np.einsum("ni,ni->n", apart, direction)
     is_pole = features.kind[pairs[:, 0]] == "pole"
@@ -100,6 +99,32 @@ def _beyond_chance(features, correction, sigma, radius, angle, pairs):
     return ~is_chance
 
 
+def _is_unique(features, place, sigma):
+    """Whether nothing like a painted feature (n,) lies within two gates of it: lanes repeat.
+
+    Gates are as wide as sigmas make them. Where they are wider than the least, two of them reach
+    over the next lane, and no paint is unique.
+    """
+    width = 2 * np.sqrt(2) * SETTINGS.gate_sigmas * sigma
+    is_painted = np.isin(features.kind, PAINTED)
+    unique = ~is_painted | (width <= 2 * SETTINGS.least_gate)
+    painted = np.flatnonzero(is_painted)
+    for rows in (painted[visit] for visit in _visits(features[is_painted])):
+        pairs = cKDTree(place[rows]).query_pairs(
+            2 * SETTINGS.least_gate + SETTINGS.cell, output_type="ndarray"
+        )
+        pairs = rows[np.concatenate([pairs, pairs[:, ::-1]])]
+        apart = np.diff(place[pairs], axis=1)[:, 0]
+        first, second = _directions(features, pairs)
+        along = np.abs(np.einsum("ni,ni->n", apart, first))
+        beside = np.sqrt(np.maximum((apart**2).sum(axis=1) - along**2, 0.0))
+        like = (along > SETTINGS.widest_paint) & (along <= width[pairs[:, 0]])
+        like &= (beside <= SETTINGS.cell) & (np.diff(kind_number(features)[pairs])[:, 0] == 0)
+        like &= np.einsum("ni,ni->n", first, second) >= np.cos(SETTINGS.parallel)
+        unique[pairs[like, 0]] = False
+    return unique
+
+
 def _largest_near(place, sigma, edge):
     """The largest sigma (n,) in each one's cell of an edge."""
     cell = np.unique(np.floor(place / edge), axis=0, return_inverse=True)[1].ravel()
@@ -117,8 +142,8 @@ def _passes(features, pairs):
 def _passes_and_direction(features, pairs):
     """Number (k,) of both passes, the kind and the direction of pairs."""
     bins = direction_class(features.direction[pairs[:, 0]])
-    kind = features.kind[pairs[:, 0]] == "pole"
-    return (_passes(features, pairs) * 14 + np.minimum(bins, 26 - bins)) * 2 + kind
+    kind = kind_number(features)[pairs[:, 0]]
+    return (_passes(features, pairs) * 14 + np.minimum(bins, 26 - bins)) * len(TIE_KINDS) + kind
 
 
 def _count(values, others):
@@ -159,8 +184,7 @@ def candidate_pairs(
     limit = np.hypot(min(radius, 2 * SETTINGS.gate_sigmas * sigma.max(initial=0.0)), SETTINGS.cell)
     # directions that differ by the angle are as far apart as places may be; no pole is near a plane
     weight = limit / (2 * np.sin(angle / 2))
-    points = np.column_stack([place, weight * features.direction])
-    points[features.kind == "pole", 3:] += 4 * weight
+    points = np.column_stack([place, weight * _attitude(features)])
     trees = [cKDTree(points[rows]) for rows in visits]
     low, high = (
         np.array([edge(place[rows], axis=0) for rows in visits]).reshape(-1, 3)
@@ -187,9 +211,35 @@ def candidate_pairs(
     pairs = np.column_stack(np.divmod(number, len(features)))
     apart = np.diff(place[pairs], axis=1)[:, 0] + shift[pairs[:, 1]]
     distance = _distance(features, apart, sigma, radius, pairs)
-    cosine = np.einsum("ni,ni->n", *features.direction[pairs.T])
+    cosine = np.einsum("ni,ni->n", *_directions(features, pairs))
     kept = np.isfinite(distance) & (cosine >= np.cos(angle))
     return pairs[kept], distance[kept]
+
+
+def _attitude(features):
+    """Vectors (n, 3) that are near each other for parallel features of a kind: their directions.
+
+    Paint has neither front nor back: half of the unit vector of twice its azimuth stands for it.
+    """
+    attitude = features.direction.copy()
+    is_painted = np.isin(features.kind, PAINTED)
+    east, north, _ = attitude[is_painted].T
+    attitude[is_painted, :2] = np.column_stack([east**2 - north**2, 2 * east * north]) / 2
+    return attitude + 4.0 * kind_number(features)[:, None]
+
+
+def _directions(features, pairs):
+    """Directions (2, k, 3) of pairs, of paint those that point to the same side."""
+    first, second = features.direction[pairs.T]
+    is_opposite = np.isin(features.kind[pairs[:, 0]], PAINTED)
+    is_opposite &= np.einsum("ni,ni->n", first, second) < 0
+    return first, np.where(is_opposite[:, None], -second, second)
+
+
+def _common_direction(features, pairs):
+    """Mean directions (k, 3) of pairs."""
+    direction = np.add(*_directions(features, pairs))
+    return direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
 def _visits(features):
@@ -204,8 +254,7 @@ def _visits(features):
 def _distance(features, apart, sigma, radius, pairs):
     """Distances (k,) of pairs, ways (k, 3) apart, in units of gate and cell; infinite for none."""
     first, second = pairs.T
-    axis = features.direction[first] + features.direction[second]
-    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    axis = _common_direction(features, pairs)
     along = np.abs(np.einsum("ni,ni->n", apart, axis))
     across = np.sqrt(np.maximum((apart**2).sum(axis=1) - along**2, 0.0))
     is_pole = features.kind[first] == "pole"
@@ -217,6 +266,10 @@ def _distance(features, apart, sigma, radius, pairs):
     is_pair |= features.scanner[first] != features.scanner[second]
     is_pair &= (features.kind[first] == features.kind[second]) & (misfit <= gate)
     is_pair &= beside <= SETTINGS.cell
+    # a dash as long as the other: else one of them was hidden in part
+    longer = np.sqrt(12) * np.abs(np.diff(features.extent[pairs])[:, 0])
+    unlike = longer > SETTINGS.gate_sigmas * 2 * np.sqrt(features.variance[pairs].sum(axis=1))
+    is_pair &= ~unlike | (features.kind[first] != "dash")
     return np.where(is_pair, np.hypot(misfit / gate, beside / SETTINGS.cell), np.inf)
 
 

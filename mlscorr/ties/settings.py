@@ -17,8 +17,13 @@ class Settings:
     rounding: float = 0.0003  # m; one sigma of a coordinate at the usual LAS scale of 1 mm
     grazing: float = 0.05  # sine of beam to plane: a road 50 m from a scanner 2.5 m above it
     thickest: float = 0.18  # m: radius of a pole or young trunk; people are wider
-    largest_lean: float = 0.2  # rad: of a pole; branches lean more
+    largest_lean: float = 0.2  # rad: of a pole, branches lean more; of a road, ramps lean less
     roundness: float = 0.1  # of the radius, one sigma: trunks are no cylinders, masts have edges
+    widest_paint: float = 0.75  # m along a scan line: a stop line of 0.5 m, seen 45 deg askew
+    contrast: float = (
+        5.0  # sigmas of the road's intensity, 15 % of it: worn paint is twice as bright
+    )
+    crossings: int = 6  # of a line: a scatter of 4 degrees of freedom is known to a third
     features: int = 32  # of a second and direction of a pass: two blocks of a wall, or of the road
     ties: int = 6  # of a second, direction and pass: 10 mm each make 4 mm, two may be wrong
     coarse_features: int = 6000  # for six unknowns of a mounting; more cost time alone

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.survey import TieFeatures, Ties
+from mlscorr.survey import TIE_KINDS, TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
 
 
@@ -16,6 +16,16 @@ def direction_class(direction: np.ndarray) -> np.ndarray:
     """
     largest = np.abs(direction).max(axis=1, keepdims=True)
     return np.rint(direction / largest).astype(int) @ [9, 3, 1] + 13
+
+
+def kind_number(features: TieFeatures) -> np.ndarray:
+    """Numbers (n,) of the kinds of features among TIE_KINDS.
+
+    Parameters
+    ----------
+    features : TieFeatures
+    """
+    return sum(number * (features.kind == kind) for number, kind in enumerate(TIE_KINDS))
 
 
 def thin(features: TieFeatures, origin: np.ndarray) -> np.ndarray:
@@ -33,7 +43,7 @@ def thin(features: TieFeatures, origin: np.ndarray) -> np.ndarray:
         Of the blocks: the same for all passes. Units: m.
     """
     moment = np.floor(features.gps_time / SETTINGS.moment).astype(np.int64)
-    bins = 2 * direction_class(features.direction) + (features.kind == "pole")
+    bins = len(TIE_KINDS) * direction_class(features.direction) + kind_number(features)
     chances = [
         integer_hash(np.floor((features.centre - origin) / edge).astype(np.int64))
         for edge in (SETTINGS.block, SETTINGS.cell)

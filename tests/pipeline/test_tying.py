@@ -10,6 +10,8 @@ import mlscorr
 from mlscorr.estimate import believed_correction
 from mlscorr.pipeline.tying import tie_passes
 from mlscorr.simulate import Scenario, simulate
+from mlscorr.survey import Pos
+from tests.beds import painted_roads as road_bed
 from tests.beds import tie_streets as street_bed
 from tests.beds.reports import words
 
@@ -118,7 +120,8 @@ def test_passes_that_never_meet_are_named():
     apart = replace(features, centre=features.centre + of_second(features, [0.0, 500.0, 0.0]))
     estimate = tied_street(apart)
     assert estimate.ties is None
-    assert f"twice, or hardly: 0 of {len(features)} planes and poles of 2 passes" in estimate.untied
+    number = f"0 of {len(features)} planes, poles and markings of 2 passes"
+    assert f"twice, or hardly: {number}" in estimate.untied
     assert estimate.untied not in estimate.warnings
 
 
@@ -150,3 +153,46 @@ def test_a_tunnel_names_the_direction_that_nobody_holds():
     (sentence,) = [text for text in estimate.warnings if "unheld" in text]
     assert "E, N, H = 1.00" in sentence.replace("-", "")
     assert estimate.untied == ""
+
+
+def apart_on_road(features, shift):
+    "What is left (3,) of a shift between both passes of the painted road. Units: m"
+    recorded = replace(road_bed.survey(), pos=Pos(position_sigma=0.1))
+    start = believed_correction(recorded.trajectory, recorded.pos)
+    correction = tie_passes(recorded, start, features).correction
+    change = correction.corrected.position - recorded.trajectory.position
+    back = recorded.trajectory.gps_time > road_bed.START + road_bed.PAUSE / 2
+    return shift + np.median(change[back], axis=0) - np.median(change[~back], axis=0)
+
+
+def test_paint_holds_passes_on_a_bare_road():
+    """Passes 0.12 m apart along, across and up: the road alone tells the height, with paint 5 mm
+    are left across and 15 mm along, where dashes are 9 m apart
+    """
+    shift = road_bed.turned(np.array([[0.12, -0.12, 0.12]]), 70.0)[0] - road_bed.ORIGIN
+    features = road_bed.features(shift=shift)
+    planes = features[features.kind == "plane"]
+    bare, painted = (
+        road_bed.along_and_left(road_bed.ORIGIN + apart_on_road(part, shift)[None])[0]
+        for part in (planes, features)
+    )
+    assert np.abs(bare).min() > 0.05  # m
+    assert np.abs(painted[0]) < 0.015  # m
+    assert np.abs(painted[1]) < 0.005  # m
+
+
+def test_ties_of_paint_are_counted(tmp_path):
+    "Through files: lines and dashes of a painted street are in ties.json, and in what is printed"
+    scenario = Scenario(
+        scene={"markings": True, "cars": 0.0},
+        drive={"duration": 8.0, "turns": 2.0, "passes": [{}, {"direction": "back"}]},
+        targets={"control": 2, "check": 1},
+        scanner=[{"lines_per_second": 75, "points_per_line": 1600}],
+    )
+    simulate(scenario, np.random.default_rng(4)).write(tmp_path / "survey")
+    tied = mlscorr.find_ties(mlscorr.read_survey(tmp_path / "survey"))
+    (pair,) = tied.write(tmp_path / "out")["pairs"]
+    assert pair["lines"] > 20
+    assert pair["dashes"] >= 3
+    assert pair["n"] == pair["planes"] + 2 * pair["poles"] + pair["lines"] + pair["dashes"]
+    assert "dashes" in tied._repr_html_()

@@ -538,3 +538,27 @@ def test_the_line_along_positions_keeps_to_them():
     speed = np.linalg.norm(line.curve(s, 1)[:, :2], axis=1)
     assert np.abs(speed - 1.0).max() < 0.01
     assert line.distance(path).max() < 0.6  # m
+
+
+def test_paint_lies_on_the_carriageway():
+    "Dashes of 3 m every 9 m in the middle and a line along each kerb, bright, 1.5 mm on the crown, 3 mm beside it"
+    scenario = street(scene=SceneScenario(markings=True, cars=0.0))
+    line, length, _ = drive(scenario, np.random.default_rng(1))
+    scenes = [
+        build_scene(each, line, length, np.random.default_rng(101))
+        for each in (street(scene=SceneScenario(cars=0.0)), scenario)
+    ]
+    part = section(scenario.drive, length)
+    s = np.arange(20.25, 60.0, 0.5)
+    middle, edge = np.zeros_like(s), part.half_width(s) - part.line_from_kerb
+    painted = {"middle": middle, "right": edge, "left": -edge, "lane": edge / 2}
+    for name, lateral in painted.items():
+        above = line.place(s, lateral, part.height(s, lateral) + 1.0)
+        rays = np.concatenate([above, np.broadcast_to(-UP, above.shape)], axis=1).astype(np.float32)
+        bare, with_paint = (scene.mesh.caster.cast_rays(rays) for scene in scenes)
+        lifted = bare["t_hit"].numpy() - with_paint["t_hit"].numpy()
+        on = {"middle": s % 9.0 < 3.0, "lane": np.zeros(len(s), bool)}.get(name, s > 0)
+        thick = part.paint / 2 if name == "middle" else part.paint
+        assert np.allclose(lifted, np.where(on, thick, 0.0), atol=5e-4)  # m, single precision
+        hit = with_paint["primitive_ids"].numpy()
+        assert (scenes[1].mesh.reflectance[hit[on]] == 0.6).all()

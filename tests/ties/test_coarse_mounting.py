@@ -7,6 +7,7 @@ from mlscorr.frames import georeference, to_scanner
 from mlscorr.survey import Mounting
 from mlscorr.ties import coarse_mounting, remounted
 from mlscorr.ties.thinning import some_blocks
+from tests.beds import painted_roads as road
 from tests.beds import tie_streets as street
 
 TRUE = Mounting(np.zeros(3), Rotation.identity())
@@ -19,14 +20,15 @@ def wrong(degrees):
     return Mounting(TRUE.lever_arm, turn.inv(), KNOWN)
 
 
-def scanned_wrong(degrees):
+def scanned_wrong(degrees, survey=None, clouds=None):
     "Features of a street whose every point a wrong mounting put where it is"
-    parts, way = [], street.trajectory()
-    for cloud in street.clouds():
+    survey = street.survey() if survey is None else survey
+    parts, way = [], survey.trajectory
+    for cloud in street.clouds() if clouds is None else clouds:
         seen = to_scanner(way, TRUE, cloud.xyz, cloud.gps_time)
         put = georeference(way, wrong(degrees), seen, cloud.gps_time)
         parts.append(type(cloud)(put, cloud.gps_time, cloud.intensity))
-    return street.collect(street.survey(), parts)
+    return street.collect(survey, parts)
 
 
 def test_a_wall_that_is_passed_keeps_its_direction():
@@ -36,6 +38,24 @@ def test_a_wall_that_is_passed_keeps_its_direction():
     corrected = remounted(features, street.trajectory(), wrong([0.0, 0.0, 3.0]), TRUE)
     for direction in (features.direction[is_wall], corrected.direction[is_wall]):
         assert np.degrees(np.abs(np.median(direction[:, 0]))) < 0.1
+
+
+def test_paint_turns_with_the_mounting():
+    "A scanner that rolls 4 deg too far paints lines and dashes aside; corrected, they lie true"
+    survey, rng = road.survey(), np.random.default_rng(1)
+    clouds = [road.cloud(number, rng) for number in (0, 1)]
+    features = scanned_wrong([1.0, 4.0, 2.0], survey, clouds)
+    corrected = remounted(features, survey.trajectory, wrong([1.0, 4.0, 2.0]), TRUE)
+    way = road.turned(np.eye(3)[:1], 70.0)[0] - road.ORIGIN
+    left = np.cross([0.0, 0.0, 1.0], way)
+    for kind, axis in (("line", left), ("dash", way)):
+        seen, true = (f[f.kind == kind] for f in (features, corrected))
+        assert len(true) > 4
+        off = np.abs(road.along_and_left(seen.centre)[:, 1])
+        assert np.median(np.minimum(off, np.abs(off - road.EDGE))) > 0.05  # m
+        left_over = np.abs(road.along_and_left(true.centre)[:, 1])
+        assert np.median(np.minimum(left_over, np.abs(left_over - road.EDGE))) < 0.01  # m
+        assert np.median(np.abs(true.direction @ axis)) > np.cos(np.radians(0.5))
 
 
 def test_degrees_are_found_from_planes():

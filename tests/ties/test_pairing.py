@@ -7,6 +7,7 @@ import pytest
 
 from mlscorr.survey import TieFeatures
 from mlscorr.ties import pair_features, residuals
+from tests.beds import painted_roads as road
 from tests.beds import tie_streets as street
 
 NOTHING = np.zeros(3)
@@ -199,3 +200,52 @@ def test_a_pole_ties_both_directions_across_it():
     assert np.abs(ties.direction[:, 2]).max() < 1e-12
     shift = np.linalg.solve(ties.direction[:, :2], ties.misclosure)
     assert np.allclose(shift, [0.1, 0.05], atol=1e-9)
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 45.0, 70.0, 135.0])
+def test_paint_is_paired_whichever_way_it_was_crossed(azimuth):
+    "Passes 15 cm apart across, 20 along: lines tell the one, dashes the other, to their sigmas"
+    along, left = (0.20, 0.15)  # m
+    shift = road.turned(np.array([[along, left, 0.0]]), azimuth)[0] - road.ORIGIN
+    ties = pair(road.features(azimuth, shift=shift), 0.08)
+    for kind, least in (("line", 40), ("dash", 4)):
+        part = ties[ties.kind == kind]
+        assert len(part) >= least
+        error = part.misclosure - part.direction @ shift
+        assert np.mean(np.abs(error) < 3 * part.sigma) > 0.95
+        size = np.median(np.abs(part.direction @ shift))
+        assert np.isclose(size, left if kind == "line" else along, atol=0.01)  # m
+
+
+def painted(place, number, kind="line", extent=0.3, direction=(0.6, -0.8, 0.0)):
+    "Paint at each place (n, 3), of the passes (n,)"
+    features = walls(place, number, direction)
+    n = len(features)
+    return replace(features, kind=np.full(n, kind), extent=np.broadcast_to(extent, n).copy())
+
+
+def test_paint_has_no_front():
+    "Lines whose directions are opposite are a pair, walls that face away from each other are none"
+    opposite = np.array([[0.6, -0.8, 0.0], [-0.6, 0.8, 0.0]])
+    lines = replace(painted([[0, 0, 0], [0.1, 0, 0]], [1, 2]), direction=opposite)
+    ties = pair(lines, 0.1)
+    assert np.allclose(np.abs(ties.misclosure), 0.06, atol=1e-9)  # m
+    assert np.allclose(np.sign(ties.misclosure), ties.direction[:, 0] / 0.6, atol=1e-9)
+    assert len(pair(replace(lines, kind=np.full(2, "plane")), 0.1)) == 0
+
+
+@pytest.mark.parametrize(("sigma", "number"), [(0.2, 2), (0.4, 0), (0.6, 0)])
+def test_lanes_that_drift_could_exchange_are_not_paired(sigma, number):
+    "Lines 3.2 m apart are pairs while two gates of three sigmas of a difference reach less far"
+    across = 3.2 * np.array([0.6, -0.8, 0.0])
+    place = np.array([[0.0, 0.0, 0.0], across])
+    ties = pair(painted(np.concatenate([place, place + 0.1]), [1, 1, 2, 2]), sigma)
+    assert len(ties) == number
+
+
+def test_dashes_of_other_lengths_are_not_paired():
+    "A dash of which a parked car hid a metre is no pair of the whole; one as long is"
+    place = [[0, 0, 0], [0.1, 0.0, 0.0]]
+    whole, part = 3.0 / np.sqrt(12), 2.0 / np.sqrt(12)  # m
+    assert len(pair(painted(place, [1, 2], "dash", np.array([whole, part])), 0.1)) == 0
+    assert len(pair(painted(place, [1, 2], "dash", whole), 0.1)) == 1

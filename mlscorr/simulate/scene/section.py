@@ -28,6 +28,11 @@ class StreetSection:
         Of the carriageway, usual for drainage. Units: ratio.
     clearance : float
         By which other parts of the way may come nearer than a thing's own. Units: m.
+    line, line_from_kerb, paint : float
+        Width of a painted line, way from its middle to the kerb beside it, thickness of
+        thermoplastic paint. Units: m.
+    dash : tuple of float
+        Length of a dash of the middle line, and of the gap after it, usual in towns. Units: m.
     """
 
     road: float = 3.0
@@ -38,6 +43,10 @@ class StreetSection:
     kerb: float = 0.12
     cross_fall: float = 0.025
     clearance: float = 0.7
+    line: float = 0.12
+    line_from_kerb: float = 0.3
+    paint: float = 0.003
+    dash: tuple[float, float] = (3.0, 6.0)
 
     def half_width(self, s: float | np.ndarray) -> np.ndarray:
         """Half width (...) at lengths s (...). Units: m.

@@ -80,7 +80,7 @@ class Street:
     def mesh(self) -> Mesh:
         """Ground and houses."""
         rng, low_high = self._house_rng, self.scenario.house_height
-        pieces = [self._ground()]
+        pieces = [self._ground(), *(self._markings() if self.scenario.markings else ())]
         for front in self.houses:
             inward = front.side * np.cross(front.far - front.near, UP)
             inward /= np.linalg.norm(inward)
@@ -114,6 +114,22 @@ class Street:
             quad = (left[:-1], right[:-1], right[1:], left[1:])
             strips.append(four_corners(*(c[owned] for c in quad), reflectance[surface]))
         return join(strips)
+
+    def _markings(self):
+        """Paint on the carriageway: a dashed middle line, and a line along each kerb."""
+        s = np.arange(-SETTINGS.margin, self.length + SETTINGS.margin)
+        edge = self.section.half_width(s) - self.section.line_from_kerb
+        half, up = self.section.line / 2, self.section.paint
+        dash, between = self.section.dash
+        for middle, gap in ((np.zeros_like(s), between), (-edge, 0.0), (edge, 0.0)):
+            left, right = (
+                self.line.place(s, x, self.section.height(s, x) + up)
+                for x in (middle - half, middle + half)
+            )
+            painted = self._owns(s[:-1], (left[:-1] + right[1:]) / 2, middle[:-1])
+            painted &= s[:-1] % (dash + gap) < dash
+            quad = (left[:-1], right[:-1], right[1:], left[1:])
+            yield four_corners(*(corner[painted] for corner in quad), 0.6)
 
     def _owns(self, s, middle, lateral):
         """Which ground quads belong to their part of the way, where it crosses or repeats itself.
