@@ -154,13 +154,19 @@ def _scatter(variance, moments, between):
     points of a line 1 / (2 ripple - 1). Across the lines the surface is as smooth as along them:
     what is curved or broken is in a piece, and its mean no better than its roughness.
     """
-    points, followers = moments[:, 0], moments[:, 11]
+    points = moments[:, 0]
     variance = variance * points / (points - 3)
     between = np.clip(between, SETTINGS.rounding**2, variance)
-    lines = np.where(_is_ordered(moments), points - followers, np.sqrt(points))
+    lines = _lines(moments)
     pieces = np.maximum(points / lines / (2 * variance / between - 1), 1.0)
     pieces = pieces * np.minimum(lines, pieces)
     return variance, between / points + (variance - between) / pieces
+
+
+def _lines(moments):
+    """Number of scan lines (n,), or about so where the order of points doesn't tell."""
+    points, followers = moments[:, 0], moments[:, 11]
+    return np.where(_is_ordered(moments), points - followers, np.sqrt(points))
 
 
 def _is_ordered(moments):
@@ -187,8 +193,11 @@ def _poles(moments, values, axes, noise, sight):
     to_border = SETTINGS.cell / 2 - np.abs(moments[:, 2:4] / points[:, None])
     is_pole &= (to_border >= 2 * spread).all(axis=1)
     of_radius = radius**2 / (5 * points)  # a uniform distribution's variance^2 is known to 0.8 / m
-    variance = side / points + DEPTH**2 * of_radius + (SETTINGS.roundness * radius) ** 2
-    tilt, extent = side / points / values[:, 2], np.sqrt(values[:, 2])
+    # evenly spaced, scan lines leave the middle open by half of a step; one tells no width
+    lines = _lines(moments)
+    is_pole &= lines > 1
+    variance = side / lines**2 + DEPTH**2 * of_radius + (SETTINGS.roundness * radius) ** 2
+    tilt, extent = side / lines**2 / values[:, 2], np.sqrt(values[:, 2])
     shift, rows = DEPTH * radius[:, None] * beam, np.arange(len(points))
     return Shapes(rows, axis, variance, tilt, extent, shift)[is_pole]
 

@@ -541,7 +541,7 @@ def test_the_line_along_positions_keeps_to_them():
 
 
 def test_paint_lies_on_the_carriageway():
-    "Dashes of 3 m every 9 m in the middle and a line along each kerb, bright, 1.5 mm on the crown, 3 mm beside it"
+    "A dash of 3 m every 9 m on the crown, 1.5 mm thick, and lines along the kerbs, 3 mm; bright"
     scenario = street(scene=SceneScenario(markings=True, cars=0.0))
     line, length, _ = drive(scenario, np.random.default_rng(1))
     scenes = [

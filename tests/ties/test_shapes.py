@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mlscorr.survey import PointCloud
 from mlscorr.ties import TieCollector
 from mlscorr.ties.thinning import direction_class
 from tests.beds import tie_streets as street
@@ -111,3 +112,24 @@ def test_what_is_no_plane_or_pole_is_refused(shape):
         "strip": foot + np.outer(rng.uniform(-0.15, 0.15, n), [1, 0, 0]) + np.outer(up, [0, 0, 3]),
     }[shape]
     assert len(collected(points)) == 0
+
+
+@pytest.mark.parametrize("sides", [(0.0,), (-0.05, 0.0, 0.05)])
+def test_one_scan_line_is_no_post(sides):
+    """What one scan line meets, as the edge of a house, has no width: where it stands is open by
+    the step between lines. Three lines 5 cm apart tell a post to 1.5 cm
+    """
+    rng, n = np.random.default_rng(2), 300
+    side, height = np.repeat(sides, n), np.tile(np.linspace(0.2, 5.8, n), len(sides))
+    line = np.repeat(np.arange(len(sides)), n)
+    depth = np.sqrt(street.RADIUS**2 - side**2) + rng.normal(0, street.NOISE, len(side))
+    places = np.column_stack([10.2 + side, 5.95 - depth, height])
+    time = street.START + 1.0 + 0.01 * line + np.tile(np.arange(n), len(sides)) * 1e-6
+    cloud = PointCloud(street.ORIGIN + places, time, np.full(len(side), 100, np.uint16))
+    features = street.collect(street.survey(1), [cloud])
+    poles = features[features.kind == "pole"]
+    if len(sides) == 1:
+        assert len(poles) == 0
+    else:
+        assert len(poles) >= 2
+        assert np.allclose(np.sqrt(poles.variance), 0.015, atol=0.003)  # m
