@@ -18,7 +18,7 @@ class Settings:
     grazing: float = 0.05  # sine of beam to plane: a road 50 m from a scanner 2.5 m above it
     thickest: float = 0.18  # m: radius of a pole or young trunk; people are wider
     largest_lean: float = 0.2  # rad: of a pole, branches lean more; of a road, ramps lean less
-    roundness: float = 0.1  # of the radius, one sigma: trunks are no cylinders, masts have edges
+    roundness: float = 0.1  # of the radius, one sigma: a square mast's axis lies 1 - pi/4 deeper
     widest_paint: float = 0.75  # m along a scan line: a stop line of 0.5 m, seen 45 deg askew
     contrast: float = (
         5.0  # sigmas of the road's intensity, 15 % of it: worn paint is twice as bright

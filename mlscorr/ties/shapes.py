@@ -124,12 +124,16 @@ def find_shapes(
 
 def _sweep(moments, values, axes, is_pole):
     """Gradient (n, 3) of the points' times over planes, or along poles. Units: s/m."""
-    count = moments[:, :1]
-    with_time = moments[:, 18:21] / count - moments[:, 1:2] * moments[:, 2:5] / count**2
-    along = np.einsum("nik,ni->nk", axes, with_time) / values
+    along = np.einsum("nik,ni->nk", axes, _with_time(moments)) / values
     along[:, 0] = 0.0
     along[is_pole, 1] = 0.0
     return np.einsum("nik,nk->ni", axes, along)
+
+
+def _with_time(moments):
+    """Covariances (n, 3) of the points' places with their times. Units: m s."""
+    count = moments[:, :1]
+    return moments[:, 18:21] / count - moments[:, 1:2] * moments[:, 2:5] / count**2
 
 
 def _planes(moments, values, axes, noise, sight):
@@ -184,14 +188,18 @@ def _poles(moments, values, axes, noise, sight):
     matrix = np.einsum("nik,nk,njk->nij", axes, values, axes)
     side, deep, between = _along(across, matrix), _along(beam, matrix), _along(beam, noise)
     radius = np.sqrt(side / ACROSS)
-    # a strip of a wall is flatter than a pole, a bush deeper
-    is_pole = np.abs(deep - ALONG * radius**2 - between) <= ALONG * radius**2 / 2 + between
+    # a bush is deeper than a round pole, the face of a square one flatter
+    is_pole = deep <= 1.5 * ALONG * radius**2 + 2 * between
     is_pole &= (values[:, 2] >= 2 * SETTINGS.narrowest**2) & (radius <= SETTINGS.thickest)
     is_pole &= axis[:, 2] >= np.cos(SETTINGS.largest_lean)
-    # what touches the border of its cell goes on beyond: it is cut, and its mean is not the whole's
+    # what touches the border of its cell or moment goes on beyond: it is cut, and its mean is not
+    # the whole's. Of an even strip the border is sqrt(3) sigmas away, by few points up to 2.5
     spread = np.sqrt(np.einsum("nii->ni", matrix)[:, :2])
     to_border = SETTINGS.cell / 2 - np.abs(moments[:, 2:4] / points[:, None])
-    is_pole &= (to_border >= 2 * spread).all(axis=1)
+    is_pole &= (to_border >= 2.5 * spread).all(axis=1)
+    time = np.einsum("ni,ni->n", across, _with_time(moments)) / np.sqrt(np.maximum(side, 1e-12))
+    to_end = SETTINGS.moment / 2 - np.abs(moments[:, 1] / points - SETTINGS.moment / 2)
+    is_pole &= to_end >= 2.5 * np.abs(time)
     of_radius = radius**2 / (5 * points)  # a uniform distribution's variance^2 is known to 0.8 / m
     # evenly spaced, scan lines leave the middle open by half of a step; one tells no width
     lines = _lines(moments)

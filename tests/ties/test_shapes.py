@@ -133,3 +133,22 @@ def test_one_scan_line_is_no_post(sides):
     else:
         assert len(poles) >= 2
         assert np.allclose(np.sqrt(poles.variance), 0.015, atol=0.003)  # m
+
+
+def test_the_face_of_a_square_mast_is_a_post_and_a_cut_wall_is_none():
+    """A mast 14 cm wide is found where it is from both sides, to 2 cm across the way; what a cell
+    and the second leave of a wall is no post in any of twenty streets
+    """
+    rng, n = np.random.default_rng(4), 1_500
+    for number in (0, 1):
+        side = rng.uniform(-0.07, 0.07, n)
+        places = np.column_stack([10.2 + side, np.full(n, 5.5), rng.uniform(0.3, 5.0, n)])
+        features = collected(places, number, rng)
+        assert set(features.kind) == {"pole"}
+        assert np.abs(features.centre[:, 0] - street.ORIGIN[0] - 10.2).max() < 0.02  # m
+    feet = street.ORIGIN[:2] + np.array(street.POSTS)
+    for seed in range(20):
+        features = street.features(seed)
+        poles = features[features.kind == "pole"]
+        apart = np.linalg.norm(poles.centre[:, None, :2] - feet, axis=2).min(axis=1)
+        assert apart.max() < 0.03  # m
