@@ -72,36 +72,45 @@ def find_markings(crossings: Crossings, start: float) -> TieFeatures:
     """
     since = crossings.gps_time - start
     whole = _connected(crossings, window_of(since))
-    pieces = np.column_stack([np.floor(since / SETTINGS.moment), crossings.place[:, :2]])
-    lines = fit_stripes(crossings, _numbered(whole, np.floor(pieces / [1.0, *[SETTINGS.cell] * 2])))
+    moment = np.floor(since / SETTINGS.moment)
+    cell = np.floor(crossings.place[:, :2] / SETTINGS.cell)
+    pieces = _numbered(whole, moment, cell)
     dashes = _with_both_ends(fit_stripes(crossings, whole), start)
-    middle, size = dashes.ends.mean(axis=1), np.diff(dashes.ends)[:, 0]
-    across, level = np.cross(lines.along, [0.0, 0.0, 1.0]), middle[:, None] * dashes.along
-    # what all crossings of a line share of their edges doesn't scatter; across it is less than
-    # along the scan lines, but for those that cross straight
-    shared = np.maximum(lines.edges - lines.width, 0.0)
-    kinds = (
-        ("line", lines, across, lines.centre, shared + lines.width / lines.count,
-         np.sqrt(lines.length)),
-        # either end is anywhere between two scan lines, as likely as elsewhere
-        ("dash", dashes, dashes.along, dashes.centre + level,
-         (size / (dashes.count - 1)) ** 2 / 24, size / np.sqrt(12)),
-    )  # fmt: skip
-    return TieFeatures.concatenate(
-        TieFeatures(
-            pass_number=stripes.group,
-            scanner=stripes.group,
-            kind=np.full(len(stripes), kind),
-            gps_time=stripes.gps_time,
-            centre=centre,
-            direction=direction,
-            variance=variance,
-            tilt=stripes.width / stripes.count / stripes.length,
-            extent=extent,
-            points=stripes.count,
-            sweep=stripes.pace[:, None] * stripes.along,
-        )
-        for kind, stripes, direction, centre, variance, extent in kinds
+    return TieFeatures.concatenate([_lines(fit_stripes(crossings, pieces)), _dashes(dashes)])
+
+
+def _lines(pieces):
+    """Pieces of lines: where they are across."""
+    # what all crossings share of their edges doesn't scatter; across the line it is less than along
+    # the scan lines, but for those that cross straight
+    shared = np.maximum(pieces.edges - pieces.width, 0.0)
+    variance = shared + pieces.width / pieces.count
+    across = np.cross(pieces.along, [0.0, 0.0, 1.0])
+    return _features("line", pieces, pieces.centre, across, variance, np.sqrt(pieces.length))
+
+
+def _dashes(dashes):
+    """Dashes: where the middle between their ends is along."""
+    centre = dashes.centre + dashes.ends.mean(axis=1)[:, None] * dashes.along
+    size = np.diff(dashes.ends)[:, 0]
+    # either end is anywhere between two scan lines, as likely as elsewhere
+    variance = (size / (dashes.count - 1)) ** 2 / 24
+    return _features("dash", dashes, centre, dashes.along, variance, size / np.sqrt(12))
+
+
+def _features(kind, stripes, centre, direction, variance, extent):
+    return TieFeatures(
+        pass_number=stripes.group,
+        scanner=stripes.group,
+        kind=np.full(len(stripes), kind),
+        gps_time=stripes.gps_time,
+        centre=centre,
+        direction=direction,
+        variance=variance,
+        tilt=stripes.width / stripes.count / stripes.length,
+        extent=extent,
+        points=stripes.count,
+        sweep=stripes.pace[:, None] * stripes.along,
     )
 
 
@@ -117,16 +126,16 @@ def window_of(since: np.ndarray) -> np.ndarray:
 
 
 def _with_both_ends(dashes, start):
-    """Those seen at once of which nothing goes on in another window."""
+    """Those seen at once, and wholly in one window: two lost crossings are no end."""
     took = dashes.end - dashes.begin
     margin = 3 * took / (dashes.count - 1)
     begin, end = (window_of(t - start) for t in (dashes.begin - margin, dashes.end + margin))
     return dashes[(begin == end) & (took <= SETTINGS.moment)]
 
 
-def _numbered(number, columns):
-    """Number (n,) from 0 of each number (n,) with its columns (n, k)."""
-    keys = np.column_stack([number, columns])
+def _numbered(*columns):
+    """Number (n,) from 0 of each different row of columns (n,) or (n, k)."""
+    keys = np.column_stack(columns)
     return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
 
 
@@ -135,7 +144,7 @@ def _connected(crossings, window):
     if len(crossings) == 0:
         return np.empty(0, int)
     radius = SETTINGS.cell / 2
-    key = _numbered(crossings.group, window[:, None])
+    key = _numbered(crossings.group, window)
     place = crossings.place[:, :2] - crossings.place[0, :2]
     tree = cKDTree(np.column_stack([place, 2 * radius * key]))
     pairs = tree.query_pairs(radius, output_type="ndarray")

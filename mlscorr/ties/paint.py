@@ -88,7 +88,8 @@ def bright_runs(xyz: np.ndarray, intensity: np.ndarray, limits: np.ndarray) -> n
         if step > widest / 5:  # fewer points don't tell the ground's intensity
             first, end, known = -1, -1, 0.0
             continue
-        is_bright = known >= widest and value > mean + contrast * np.sqrt(variance)
+        sigma = np.sqrt(variance + 1 / 12)  # of integers
+        is_bright = known >= widest and value > mean + contrast * sigma
         if is_bright and first < 0:
             first, width = i, 0.0
         if first >= 0:

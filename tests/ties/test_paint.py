@@ -83,3 +83,20 @@ def test_crossings_scale_with_intensity():
     offset = crossings(change=lambda c: replace(c, intensity=c.intensity + np.uint16(20_000)))[0]
     for other in (half, offset):
         assert abs(len(other) - len(whole)) <= 3
+
+
+def test_eight_bits_are_enough():
+    "Intensities of 0 to 255, or those times 257, tell as much paint; texture of a level is none"
+    whole = crossings()[0]
+    for factor in (1, 257):
+        coarse = crossings(
+            change=lambda c, f=factor: replace(
+                c, intensity=(c.intensity // 100 * f).astype(np.uint16)
+            )
+        )[0]
+        assert abs(len(coarse) - len(whole)) < 0.02 * len(whole)
+    level = crossings(
+        lambda x, y: np.zeros(len(x), bool),
+        change=lambda c: replace(c, intensity=40 + (c.intensity > 2_300).astype(np.uint16)),
+    )[0]
+    assert len(level) == 0
