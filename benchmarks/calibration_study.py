@@ -22,7 +22,7 @@ import numpy as np
 
 import mlscorr
 from mlscorr.estimate import estimate_mounting
-from mlscorr.estimate.calibration import MOUNTING_COMPONENTS as COMPONENTS
+from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS as COMPONENTS
 from mlscorr.evaluate.scores import misclosures
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.simulate import Scenario, simulate
@@ -98,7 +98,9 @@ def features(scenario, seed):
     observations, is_check = observe(simulated, np.random.default_rng([seed, 1]))
     control, check = (simulated.targets[of] for of in (~simulated.is_check, simulated.is_check))
     calibration = estimate_mounting(
-        simulated.trajectory, simulated.mounting, Matched.by_name(observations[~is_check], control)
+        simulated.trajectory,
+        [simulated.mounting],
+        Matched.by_name(observations[~is_check], control),
     )
     return score(calibration, simulated, Matched.by_name(observations[is_check], check))
 
@@ -111,7 +113,7 @@ def whole_survey(scenario, seed):
         simulated.write(Path(folder))
         result = mlscorr.calibrate(mlscorr.read_survey(folder))
         alone = estimate_mounting(
-            result.survey.trajectory, simulated.mounting, result.matched_control
+            result.survey.trajectory, [simulated.mounting], result.matched_control
         )
     return score(result.calibration, simulated, result.matched_check, alone)
 

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mlscorr
-from mlscorr.estimate.calibration import MOUNTING_COMPONENTS as COMPONENTS
+from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS as COMPONENTS
 from mlscorr.evaluate.scores import misclosures
 
 ASSETS = Path(__file__).parents[1] / "assets"

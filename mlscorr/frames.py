@@ -1,5 +1,7 @@
 """Angles, body and map axes; from the scanner to the map and back (Mao et al. 2015, Eq. 1-9)."""
 
+from collections.abc import Callable, Mapping, Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
@@ -168,6 +170,28 @@ def to_scanner(
     return mounting.boresight.inv().apply(body - mounting.lever_arm)
 
 
+def georeferenced_anew(
+    trajectory: Trajectory, recorded: Sequence[Mounting], mountings: Sequence[Mounting],
+    position: np.ndarray, gps_time: np.ndarray, scanner: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Places that recorded mountings gave, as others give them  (Eq. 1). Units: m.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    recorded, mountings : sequence of Mounting
+        Of each scanner: that of the places, and the other.
+    position, gps_time, scanner : (..., 3), (...) array
+        With the number of the scanner of each place. Units: m, s.
+    """
+    place = np.empty_like(position)
+    for number, (before, after) in enumerate(zip(recorded, mountings, strict=True)):
+        rows = scanner == number
+        in_scanner = to_scanner(trajectory, before, position[rows], gps_time[rows])
+        place[rows] = georeference(trajectory, after, in_scanner, gps_time[rows])
+    return place
+
+
 def skew(vector: np.ndarray) -> np.ndarray:
     """Cross-product matrices Phi (n, 3, 3) of vectors (n, 3)  (Eq. 4).
 
@@ -246,3 +270,29 @@ def scanner_partials(
     attitude = trajectory.at(gps_time).attitude
     turned = [attitude.apply(mounting.boresight.apply(part)) for part in (along, across)]
     return np.stack(turned, axis=2)
+
+
+def partials_by_scanner(
+    partials: Callable,
+    trajectory: Trajectory,
+    mountings: Mapping[int, Mounting],
+    position: np.ndarray,
+    gps_time: np.ndarray,
+    scanner: np.ndarray,
+) -> np.ndarray:
+    """Partial derivatives (n, 3, q k) by q unknowns of each of k scanners; zero by another's.
+
+    Parameters
+    ----------
+    partials : function
+        mounting_partials or scanner_partials, of the arguments that follow.
+    mountings : dict
+        By the number of the scanner.
+    scanner : (n,) int array
+        Number of the scanner that saw each point.
+    """
+    columns = [
+        partials(trajectory, mounting, position, gps_time) * (scanner == number)[:, None, None]
+        for number, mounting in mountings.items()
+    ]
+    return np.concatenate(columns, axis=2)

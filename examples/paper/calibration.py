@@ -26,7 +26,7 @@ from tables import (
 )
 
 from mlscorr.estimate import estimate_mounting
-from mlscorr.estimate.calibration import MOUNTING_COMPONENTS as COMPONENTS
+from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS as COMPONENTS
 from mlscorr.evaluate.scores import misclosures
 from mlscorr.report.style import BLUE, GREEN, GREY, STYLE, VERMILLION
 from mlscorr.simulate import read_scenario, simulate
@@ -56,7 +56,9 @@ def study(scenario, seed):
     observations, is_check = observe(simulated, np.random.default_rng([seed, 1]))
     control, check = (simulated.targets[of] for of in (~simulated.is_check, simulated.is_check))
     calibration = estimate_mounting(
-        simulated.trajectory, simulated.mounting, Matched.by_name(observations[~is_check], control)
+        simulated.trajectory,
+        [simulated.mounting],
+        Matched.by_name(observations[~is_check], control),
     )
     checked = Matched.by_name(observations[is_check], check)
     found = score(calibration, simulated, checked)

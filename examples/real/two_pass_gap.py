@@ -138,7 +138,7 @@ def study(scene, rng, folds=FOLDS, chance=CHANCE):
     survey = scene.survey
     collector = TieCollector(survey)
     collector.add(survey.clouds[0], scene.cloud)
-    start = believed_mounting(survey.trajectory, survey.mounting, Matched.none(), survey.pos)
+    start = believed_mounting(survey.trajectory, survey.mountings, Matched.none(), survey.pos)
     calibration = tie_mounting(survey, start, Matched.none(), collector.features())
     if calibration.ties is None:
         return None

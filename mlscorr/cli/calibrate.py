@@ -31,10 +31,10 @@ def calibrate(
         result = mlscorr.calibrate(recorded, progress=progress, ties=False if no_ties else None)
         content = result.write(out, with_drift, clouds, overwrite, progress)
     print_json(content, as_json)
+    say_statements(content["statements"])
     if "scanners" in content:
         _tell_scanners(content["scanners"])
     else:
-        say_statements(content["statements"])
         _tell_mounting(content)
         _tell_misclosures(content)
     say(f"Calibration: {out / 'calibration.json'}")

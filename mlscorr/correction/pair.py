@@ -201,3 +201,24 @@ class Correction(Summary):
         gap = np.isin(self.recorded.gps_time, self.recorded.gaps[:, 0])
         gap[-1] = True
         return gap
+
+
+def increments_by_scanner(
+    corrections: Sequence[Correction], xyz: np.ndarray, gps_time: np.ndarray, scanner: np.ndarray
+) -> np.ndarray:
+    """What must be added to points that scanners saw, each by its own correction. Units: m.
+
+    Parameters
+    ----------
+    corrections : sequence of Correction
+        Of each scanner.
+    xyz : (..., 3) array
+        Units: m.
+    gps_time, scanner : (...) array
+        Of each point, and the number of its scanner. Units: s.
+    """
+    increments = np.empty_like(xyz)
+    for number, correction in enumerate(corrections):
+        rows = scanner == number
+        increments[rows] = correction.increments(xyz[rows], gps_time[rows])[0]
+    return increments

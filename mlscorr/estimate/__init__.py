@@ -13,10 +13,11 @@ outage. Scales, correlation times and covariance family are estimated from the c
 what they leave open of them is a part of the stated sigmas.
 """
 
-from mlscorr.estimate.calibration import Calibration, MountingEstimate
+from mlscorr.estimate.calibration import Calibration, mounted_corrections
 from mlscorr.estimate.guards import COMPONENTS, guard_warnings, guards_of
-from mlscorr.estimate.mounting import believed_mounting, estimate_mounting
+from mlscorr.estimate.mounting import believed_mounting, control_fault, estimate_mounting
 from mlscorr.estimate.mounting_check import find_mounting_error, mounting_warnings, scanner_warnings
+from mlscorr.estimate.mounting_estimate import MountingEstimate, corrected_mounting
 from mlscorr.estimate.orders import Alternative
 from mlscorr.estimate.placement import NextControl, PlannedAccuracy, place_control, predict_accuracy
 from mlscorr.estimate.pos_error import (

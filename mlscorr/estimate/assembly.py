@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from mlscorr.collocation import Noise
 from mlscorr.estimate.equations import NO_TREND, Equations
-from mlscorr.frames import mounting_partials, pose_partials
+from mlscorr.frames import mounting_partials, partials_by_scanner, pose_partials
 from mlscorr.pos import Steps, stated_sigma
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos, Trajectory
 
@@ -87,25 +87,25 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
 def mounting_equations(
     equations: Equations,
     matched: Matched,
-    mounting: Mounting,
+    mountings: Sequence[Mounting],
     corrected: np.ndarray,
     weak: np.ndarray,
 ) -> Equations:
-    """The equations of what a mounting lacks  (Eq. 16-18), from those of the POS error.
+    """The equations of what k mountings lack  (Eq. 16-18), from those of the POS error.
 
-    Below the targets two epochs of three rows hold the mounting weakly.
+    Below the targets two epochs of three rows hold each mounting weakly.
 
     Parameters
     ----------
     equations : Equations
     matched : Matched
-        As georeferenced with the mounting.
-    mounting : Mounting
-        Corrected by ``corrected`` already; what is estimated adds to it.
-    corrected : (6,) array
+        As georeferenced with the mountings.
+    mountings : sequence of Mounting
+        Corrected by ``corrected`` already; what is estimated adds to them.
+    corrected : (6 k,) array
         Units: m and rad.
-    weak : (6,) array
-        One sigma of what is known of the mounting without the survey. Units: m and rad.
+    weak : (6 k,) array
+        One sigma of what is known of the mountings without the survey. Units: m and rad.
     """
     times, position = matched.gps_time, matched.observations.position
     bare = replace(
@@ -116,7 +116,14 @@ def mounting_equations(
         partials=pose_partials(equations.trajectory, position, times),
         order=NO_TREND,
     )
-    columns = mounting_partials(equations.trajectory, mounting, position, times)
+    columns = partials_by_scanner(
+        mounting_partials,
+        equations.trajectory,
+        dict(enumerate(mountings)),
+        position,
+        times,
+        matched.scanner,
+    )
     return with_mountings(bare, columns, -corrected, weak)
 
 

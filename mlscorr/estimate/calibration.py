@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.guards import Guards, global_test_warnings
+from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS, MountingEstimate
 from mlscorr.estimate.posterior import Posterior
-from mlscorr.estimate.prediction import predict_pose_error
 from mlscorr.estimate.screening import Outlier, Screening
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
@@ -20,27 +20,18 @@ from mlscorr.estimate.tied import TieResiduals
 from mlscorr.survey import Mounting, Trajectory
 from mlscorr.survey.summary import Summary
 
-MOUNTING_COMPONENTS = (
-    "lever arm right",
-    "lever arm forward",
-    "lever arm up",
-    "boresight about right",
-    "boresight about forward",
-    "boresight about up",
-)
-
 SCANNER_COMPONENTS = ("range offset", "encoder scale")
 
 
 @dataclass(frozen=True)
 class ScannerErrors:
-    """What a scanner's own ranges and encoder lack.
+    """What the own ranges and encoders of k scanners lack.
 
     Parameters
     ----------
-    correction, sigma : (2,) array
+    correction, sigma : (2 k,) array
         To be added to each range (m), and to each scan angle by its size (ratio).
-    determined, significant : (2,) bool array
+    determined, significant : (2 k,) bool array
         Whether this geometry can tell it at all; whether the mounting is free of it.
     """
 
@@ -49,9 +40,20 @@ class ScannerErrors:
     determined: np.ndarray
     significant: np.ndarray
 
+    def of(self, number: int) -> ScannerErrors:
+        """Those of a scanner.
+
+        Parameters
+        ----------
+        number : int
+            From 0.
+        """
+        rows = slice(2 * number, 2 * number + 2)
+        return ScannerErrors(*(values[rows] for values in vars(self).values()))
+
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence where something is significant."""
+        """A sentence where something is significant, of one scanner."""
         rows = zip(SCANNER_COMPONENTS, self.correction, self.sigma, self.significant, strict=True)
         lacks = [
             f"{part} {1000 * a:.1f} ± {1000 * s:.1f} {unit}"
@@ -67,49 +69,17 @@ class ScannerErrors:
         )
 
 
-@dataclass(frozen=True)
-class MountingEstimate:
-    """What the recorded mounting lacks, by one method.
-
-    Parameters
-    ----------
-    mounting : Mounting
-        The calibrated one.
-    correction : (6,) array
-        Lever arm (m) and boresight (rad) about right, forward, up: lever_arm_true = recorded + c,
-        R_L^P true = Exp(c) R_L^P recorded.
-    covariance : (6, 6) array
-    sigma0 : float
-        Of weight one; one if the model is right.
-    """
-
-    mounting: Mounting
-    correction: np.ndarray
-    covariance: np.ndarray
-    sigma0: float
-
-    @property
-    def sigma(self) -> np.ndarray:
-        """One sigma (6,) of the correction: m and rad."""
-        return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def correlation(self) -> np.ndarray:
-        """Correlation matrix (6, 6) of the correction."""
-        return self.covariance / np.outer(self.sigma, self.sigma)
-
-
 @dataclass(frozen=True, repr=False)
 class Calibration(Summary):
-    """The calibrated mounting by collocation and by plain least squares.
+    """The calibrated mountings of k scanners by collocation and by plain least squares.
 
     Parameters
     ----------
-    trajectory, recorded : Trajectory, Mounting
+    trajectory, recorded : Trajectory, tuple of Mounting
         As recorded.
     lsc, ls : MountingEstimate
-        By collocation and by least squares.
-    determined : (6,) bool array
+        By collocation and by least squares; the latter by the control points alone.
+    determined : (6 k,) bool array
         Which components this geometry can tell, whatever constant difference there is between the
         coordinates of control and trajectory.
     screening : Screening
@@ -119,6 +89,9 @@ class Calibration(Summary):
     guards : Guards
     equations : Equations
         Of the observations that took part.
+    drift : Correction
+        Of the POS error beside the mountings, which all scanners share  (Eq. 14-15). It is zero on
+        average, so the farther from a control point, the less of it is corrected.
     notes : tuple of str
         Of warnings, those on the inputs.
     ties : TieResiduals, optional
@@ -128,7 +101,7 @@ class Calibration(Summary):
     """
 
     trajectory: Trajectory
-    recorded: Mounting
+    recorded: tuple[Mounting, ...]
     lsc: MountingEstimate
     ls: MountingEstimate
     determined: np.ndarray
@@ -136,6 +109,7 @@ class Calibration(Summary):
     used: np.ndarray
     guards: Guards
     equations: Equations
+    drift: Correction
     notes: tuple[str, ...] = ()
     ties: TieResiduals | None = None
     scanner: ScannerErrors | None = None
@@ -164,32 +138,85 @@ class Calibration(Summary):
         )
 
     @property
+    def own_warnings(self) -> tuple[str, ...]:
+        """Those of the sentences that concern the one scanner."""
+        scanner = () if self.scanner is None else self.scanner.warnings
+        return (*_warnings(self.lsc, self.determined), *scanner)
+
+    @property
+    def shared_warnings(self) -> tuple[str, ...]:
+        """Those of the sentences that concern all scanners."""
+        return (
+            *self.notes,
+            *_few_control(self.equations),
+            *global_test_warnings(self.guards),
+            *self.screening.warnings,
+            *(() if self.ties is None else self.ties.warnings),
+        )
+
+    @property
     def parameters(self) -> tuple[tuple[SignalParameters, float], ...]:
         """Parameters of the POS error and their probabilities."""
         return self.posterior.points
 
     def correction(self, method: str = "lsc") -> Correction:
-        """The Correction that brings points from the recorded to the calibrated mounting.
+        """The Correction that brings points from a scanner's recorded to its calibrated mounting.
 
         Parameters
         ----------
         method : {"lsc", "ls"}
         """
         mounting = getattr(self, method).mounting
-        return Correction(self.trajectory, self.trajectory, self.recorded, mounting)
+        return Correction(self.trajectory, self.trajectory, self.recorded[0], mounting)
 
     @cached_property
-    def correction_with_drift(self) -> Correction:
-        """The Correction of the mounting and of the POS error at each epoch  (Eq. 14-15).
+    def corrections_with_drift(self) -> tuple[Correction, ...]:
+        """The Correction of each scanner's mounting and of the POS error."""
+        return mounted_corrections(self.drift, self.recorded, self.lsc.mountings)
 
-        The POS error is zero on average, so the farther from a control point, the less of it is
-        corrected.
+    @property
+    def correction_with_drift(self) -> Correction:
+        """That of the first scanner."""
+        return self.corrections_with_drift[0]
+
+    def of(self, number: int, scanner: np.ndarray) -> Calibration:
+        """The calibration of a scanner, with the POS error by all of them.
+
+        Parameters
+        ----------
+        number : int
+            From 0.
+        scanner : (n,) int array
+            That of each observation.
         """
-        with threadpool_limits(limits=1, user_api="blas"):
-            pose, covariance = predict_pose_error(self.equations, self.posterior)
-        return Correction.by_pose_error(
-            self.trajectory, pose, covariance, self.recorded, self.lsc.mounting
+        return replace(
+            self,
+            recorded=self.recorded[number : number + 1],
+            lsc=self.lsc.of(number),
+            ls=self.ls.of(number),
+            determined=self.determined[6 * number : 6 * number + 6],
+            used=self.used[scanner == number],
+            ties=None if self.ties is None else self.ties.of_scanner(number),
+            scanner=None if self.scanner is None else self.scanner.of(number),
         )
+
+
+def mounted_corrections(
+    drift: Correction, recorded: Sequence[Mounting], mountings: Sequence[Mounting]
+) -> tuple[Correction, ...]:
+    """The correction of each scanner: its mounting, and the POS error that all share.
+
+    Parameters
+    ----------
+    drift : Correction
+        Of the POS error.
+    recorded, mountings : sequence of Mounting
+        Of each scanner, as recorded and as calibrated.
+    """
+    return tuple(
+        replace(drift, recorded_mounting=before, corrected_mounting=after)
+        for before, after in zip(recorded, mountings, strict=True)
+    )
 
 
 def _few_control(equations):

@@ -1,76 +1,90 @@
-"""From misclosures to the calibrated mounting (Mao et al. 2015, section 2.4.3, Eq. 16-18).
+"""From misclosures to the calibrated mountings (Mao et al. 2015, section 2.4.3, Eq. 16-18).
 
-The mounting is the trend and the POS error the signal: 3 of the position and 3 small rotations
-about the map axes. Plain least squares, which takes the POS to be free of error, stands beside it.
+The mountings of all scanners are the trend, six columns each, and the POS error that they share is
+the signal: 3 of the position and 3 small rotations about the map axes. Plain least squares, which
+takes the POS to be free of error, stands beside it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.correction import Correction
 from mlscorr.estimate.assembly import mounting_equations, position_equations
-from mlscorr.estimate.calibration import Calibration, MountingEstimate
+from mlscorr.estimate.calibration import Calibration
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.guards import find_guards
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
+from mlscorr.estimate.mounting_estimate import (
+    MountingEstimate,
+    combined_correction,
+    corrected_mountings,
+)
 from mlscorr.estimate.posterior import Objective, Posterior
 from mlscorr.estimate.prediction import predict_pose_error
 from mlscorr.estimate.prior import mounting_prior
 from mlscorr.estimate.screening import Screening, screen
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.frames import georeference, to_scanner
+from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import SAME_EPOCH, Matched, Mounting, Pos, Trajectory
 
 
 # The matrices are small: on a busy machine threads would wait longer than they work
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def estimate_mounting(
-    trajectory: Trajectory, mounting: Mounting, matched: Matched, pos: Pos | None = None
+    trajectory: Trajectory,
+    mountings: Sequence[Mounting],
+    matched: Matched,
+    pos: Pos | None = None,
 ) -> Calibration:
-    """Estimate what a recorded mounting lacks from matched targets  (Mao et al. 2015, Eq. 16-18).
+    """Estimate what recorded mountings lack from matched targets  (Mao et al. 2015, Eq. 16-18).
 
     Parameters
     ----------
     trajectory : Trajectory
         As recorded.
-    mounting : Mounting
-        As recorded: the observations were georeferenced with it.
+    mountings : sequence of Mounting
+        Of each scanner as recorded: the observations were georeferenced with them.
     matched : Matched
-        Observed control points.
+        Observed control points; the survey error of one is the same whichever scanner saw it.
     pos : Pos, optional
         Beliefs, used where the trajectory has no sigmas.
 
     Raises
     ------
     ValueError
-        For fewer than 3 targets, where all of them were seen at one time, and for sigmas that
+        Where each scanner saw fewer than 3 targets or all of them at one time, and for sigmas that
         can't be.
     """
     pos = Pos() if pos is None else pos
-    _check(matched)
+    faults = [control_fault(matched, number) for number in range(len(mountings))]
+    if all(faults):
+        raise ValueError(faults[0])
     filled, notes = checked_inputs(trajectory, matched, pos, 0)
     equations = position_equations(filled, matched, pos, 0, mounting_prior)
-    screening = screen(_least_squares(equations, matched, mounting)[0])
+    screening = screen(_least_squares(equations, matched, mountings)[0])
     used = ~np.isin(equations.names, [outlier.name for outlier in screening.outliers])
-    kept, start, ls = _least_squares(equations.select(used), matched[used], mounting)
-    return calibration_by(trajectory, mounting, kept, screening, (start, ls), used, notes)
+    kept, start, ls = _least_squares(equations.select(used), matched[used], mountings)
+    return calibration_by(trajectory, mountings, kept, screening, (start, ls), used, notes)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def believed_mounting(
-    trajectory: Trajectory, mounting: Mounting, matched: Matched, pos: Pos | None = None
+    trajectory: Trajectory,
+    mountings: Sequence[Mounting],
+    matched: Matched,
+    pos: Pos | None = None,
 ) -> Calibration:
-    """What is known of a mounting before ties, where control points can't tell it alone.
+    """What is known of mountings before ties, where control points can't tell them alone.
 
     Parameters
     ----------
-    trajectory, mounting : Trajectory, Mounting
+    trajectory, mountings : Trajectory, sequence of Mounting
         As recorded.
     matched : Matched
         Observed control points: any number, none of which can be tested.
@@ -85,17 +99,17 @@ def believed_mounting(
     pos = Pos() if pos is None else pos
     filled, notes = filled_sigmas(trajectory)
     equations = position_equations(filled, matched, pos, 0, mounting_prior)
-    kept, start, ls = _least_squares(equations, matched, mounting)
+    kept, start, ls = _least_squares(equations, matched, mountings)
     objective = Objective.of(kept)
     mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
     screening = Screening(Posterior(mode, mode), (), (), (), ())
     used = np.ones(len(matched), dtype=bool)
-    return calibration_by(trajectory, mounting, kept, screening, (start, ls), used, notes)
+    return calibration_by(trajectory, mountings, kept, screening, (start, ls), used, notes)
 
 
 def calibration_by(
     trajectory: Trajectory,
-    recorded: Mounting,
+    recorded: Sequence[Mounting],
     equations: Equations,
     screening: Screening,
     least_squares: tuple[np.ndarray, MountingEstimate],
@@ -106,11 +120,11 @@ def calibration_by(
 
     Parameters
     ----------
-    trajectory, recorded : Trajectory, Mounting
+    trajectory, recorded : Trajectory, sequence of Mounting
     equations : Equations
-        About the mounting with a correction.
+        About the mountings with a correction.
     screening : Screening
-    least_squares : (6,) array and MountingEstimate
+    least_squares : (6 k,) array and MountingEstimate
         That correction, and the estimate by least squares. Units: m and rad.
     used : (n,) bool array
     notes : tuple of str
@@ -118,11 +132,10 @@ def calibration_by(
     posterior = screening.posterior
     lsc, determined = _collocation(equations, posterior, recorded, least_squares[0])
     parameters = posterior.modes[0][0]
-    pose, covariance = predict_pose_error(equations, posterior)
-    drift = Correction.by_pose_error(trajectory, pose, covariance, recorded, lsc.mounting)
+    drift = Correction.by_pose_error(trajectory, *predict_pose_error(equations, posterior))
     return Calibration(
         trajectory=trajectory,
-        recorded=recorded,
+        recorded=tuple(recorded),
         lsc=lsc,
         ls=least_squares[1],
         determined=determined,
@@ -130,35 +143,46 @@ def calibration_by(
         used=used,
         guards=find_guards(equations, parameters, drift.corrected),
         equations=equations,
+        drift=drift,
         notes=notes,
     )
 
 
-def _check(matched):
+def control_fault(matched: Matched, number: int) -> str:
+    """Why control points alone can't tell a scanner's mounting; nothing where they can.
+
+    Parameters
+    ----------
+    matched : Matched
+    number : int
+        Of the scanner, from 0.
+    """
+    matched = matched[matched.scanner == number]
     count = len(set(matched.name))
     if count < SETTINGS.smallest_targets:
-        raise ValueError(
+        return (
             f"{count} control points were found in the cloud; a calibration of lever arm and "
             f"boresight needs {SETTINGS.smallest_targets} at least, and 8 or more on both sides "
             "of the way, near and far, to be of use."
         )
     span = np.ptp(matched.gps_time)
     if span < SAME_EPOCH:
-        raise ValueError(
+        return (
             f"All {count} control points were seen within {span:.2f} s (at least "
             f"{SAME_EPOCH:.0f} s are needed): at one time the error of the POS can't be told from "
             "that of the mounting. Drive past control points in both directions."
         )
+    return ""
 
 
 def _least_squares(equations, matched, recorded):
-    """Equations about the mounting of plain least squares, its correction (6,), and the estimate.
+    """Equations about the mountings of plain least squares, their correction, and the estimate.
 
     Iterated, as a rotation is not linear; the targets are georeferenced anew each time.
     """
-    correction = np.zeros(6)
+    correction = np.zeros(6 * len(recorded))
     for _ in range(SETTINGS.iterations):
-        mounting, about = linearized(equations, matched, recorded, correction)
+        mountings, about = linearized(equations, matched, recorded, correction)
         solved = about.solve(None)
         step = combined_correction(correction, solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
@@ -167,35 +191,40 @@ def _least_squares(equations, matched, recorded):
     covariance = solved.trend_covariance
     # What the weak hold of the mounting adds to the redundancy is what it adds to the estimate
     observed, sigma0 = 3 * len(matched), 1.0
-    redundancy = observed - 6 + np.sum(np.diag(covariance) / prior_sigma(recorded) ** 2)
+    redundancy = observed - len(correction) + np.sum(np.diag(covariance) / _weak(recorded) ** 2)
     if observed:
         sigma0 = solved.sigma0 * np.sqrt(observed / redundancy)
-    estimate = MountingEstimate(mounting, correction, sigma0**2 * covariance, float(sigma0))
+    estimate = MountingEstimate(mountings, correction, sigma0**2 * covariance, float(sigma0))
     return about, correction, estimate
 
 
 def linearized(
-    equations: Equations, matched: Matched, recorded: Mounting, correction: np.ndarray
-) -> tuple[Mounting, Equations]:
-    """The mounting with a correction, and the equations about it, its targets georeferenced anew.
+    equations: Equations, matched: Matched, recorded: Sequence[Mounting], correction: np.ndarray
+) -> tuple[tuple[Mounting, ...], Equations]:
+    """Mountings with a correction, and the equations about them, targets georeferenced anew.
 
     Parameters
     ----------
     equations : Equations
-        Of the same targets, about any mounting.
+        Of the same targets, about any mountings.
     matched : Matched
-        As georeferenced with the recorded mounting.
-    recorded : Mounting
-    correction : (6,) array
-        Lever arm and rotation. Units: m and rad.
+        As georeferenced with the recorded mountings.
+    recorded : sequence of Mounting
+    correction : (6 k,) array
+        Lever arm and rotation of each. Units: m and rad.
     """
-    mounting = corrected_mounting(recorded, correction)
-    position = georeferenced_anew(
-        equations.trajectory, (recorded, mounting), matched.observations.position, matched.gps_time
-    )
-    moved = replace(matched, observations=replace(matched.observations, position=position))
-    weak = prior_sigma(recorded)
-    return mounting, mounting_equations(equations, moved, mounting, correction, weak)
+    mountings = corrected_mountings(recorded, correction)
+    seen = matched.observations
+    place = seen.position, matched.gps_time, matched.scanner
+    position = georeferenced_anew(equations.trajectory, recorded, mountings, *place)
+    moved = replace(matched, observations=replace(seen, position=position))
+    weak = _weak(recorded)
+    return mountings, mounting_equations(equations, moved, mountings, correction, weak)
+
+
+def _weak(mountings):
+    """One sigma (6 k,) of what is known of mountings without the survey. Units: m, rad."""
+    return np.concatenate([prior_sigma(mounting) for mounting in mountings])
 
 
 def prior_sigma(mounting: Mounting) -> np.ndarray:
@@ -213,57 +242,10 @@ def prior_sigma(mounting: Mounting) -> np.ndarray:
     return np.where(np.isnan(mounting.measured), unmeasured, mounting.measured)
 
 
-def georeferenced_anew(
-    trajectory: Trajectory,
-    mountings: tuple[Mounting, Mounting],
-    position: np.ndarray,
-    gps_time: np.ndarray,
-) -> np.ndarray:
-    """Places (n, 3) that one mounting gave, as another gives them  (Eq. 1). Units: m.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    mountings : pair of Mounting
-        That of the places, and the other.
-    position : (n, 3) array
-        Units: m.
-    gps_time : (n,) array
-        Units: s.
-    """
-    in_scanner = to_scanner(trajectory, mountings[0], position, gps_time)
-    return georeference(trajectory, mountings[1], in_scanner, gps_time)
-
-
-def corrected_mounting(mounting: Mounting, correction: np.ndarray) -> Mounting:
-    """The mounting that lacked a correction  (Eq. 2).
-
-    Parameters
-    ----------
-    mounting : Mounting
-    correction : (6,) array
-        Lever arm and rotation. Units: m and rad.
-    """
-    turn = Rotation.from_rotvec(correction[3:])
-    return Mounting(mounting.lever_arm + correction[:3], turn * mounting.boresight)
-
-
-def combined_correction(correction: np.ndarray, more: np.ndarray) -> np.ndarray:
-    """The correction (6,) of one after another: Exp(more) Exp(correction).
-
-    Parameters
-    ----------
-    correction, more : (6,) array
-        Lever arm and rotation. Units: m and rad.
-    """
-    turn = Rotation.from_rotvec(more[3:]) * Rotation.from_rotvec(correction[3:])
-    return np.append(correction[:3] + more[:3], turn.as_rotvec())
-
-
 def _collocation(equations, posterior, recorded, start):
-    """The estimate by collocation, averaged over the parameters, and what is determined (6,)."""
+    """The estimate by collocation, averaged over the parameters, and what is determined (6 k,)."""
     constant = np.tile(np.eye(3), (len(equations.mounting), 1, 1))
-    constant[-2:] = 0.0  # the rows that hold the mounting
+    constant[len(equations.names) :] = 0.0  # the rows that hold the mountings
     with_shift = np.concatenate([equations.mounting, constant], axis=2)
     if len(equations.names) == 0:  # nothing sees a constant difference
         with_shift = equations.mounting
@@ -274,9 +256,8 @@ def _collocation(equations, posterior, recorded, start):
         square += probability * (solved.trend_covariance + np.outer(solved.trend, solved.trend))
         sigma0 += probability * solved.sigma0
         free = replace(equations, mounting=with_shift).solve(parameters)
-        shifted += probability * np.diag(free.trend_covariance)[:6]
-    correction = combined_correction(start, mean)
-    covariance = square - np.outer(mean, mean)
-    mounting = replace(corrected_mounting(recorded, correction), covariance=covariance)
-    estimate = MountingEstimate(mounting, correction, covariance, float(sigma0))
-    return estimate, np.sqrt(shifted) < np.repeat(SETTINGS.determined_sigma, 3)
+        shifted += probability * np.diag(free.trend_covariance)[: len(start)]
+    correction, covariance = combined_correction(start, mean), square - np.outer(mean, mean)
+    estimate = MountingEstimate.about(recorded, correction, covariance, float(sigma0))
+    limit = np.tile(np.repeat(SETTINGS.determined_sigma, 3), len(recorded))
+    return estimate, np.sqrt(shifted) < limit

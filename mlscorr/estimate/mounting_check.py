@@ -12,8 +12,8 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from mlscorr.estimate.added_unknowns import AddedUnknowns
-from mlscorr.estimate.calibration import MOUNTING_COMPONENTS
 from mlscorr.estimate.mounting import prior_sigma
+from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import mounting_columns

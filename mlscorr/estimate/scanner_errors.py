@@ -1,4 +1,4 @@
-"""What a scanner's own ranges and encoder lack, found along with its mounting.
+"""What the scanners' own ranges and encoders lack, found along with the mountings.
 
 An offset of all ranges pushes both sides of the street outward, where a lever arm moves them one
 way; a wrong scale of the encoder turns what lies far from the zero beam. (An offset of the encoder
@@ -12,12 +12,14 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from mlscorr.correction import Correction
 from mlscorr.estimate.added_unknowns import AddedUnknowns, misclosures_of, with_misclosures
 from mlscorr.estimate.calibration import SCANNER_COMPONENTS, Calibration, ScannerErrors
-from mlscorr.estimate.mounting import combined_correction, corrected_mounting, georeferenced_anew
+from mlscorr.estimate.mounting_estimate import MountingEstimate, combined_correction
+from mlscorr.estimate.prediction import predict_pose_error
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import along_ties
-from mlscorr.frames import scanner_partials
+from mlscorr.frames import georeferenced_anew, partials_by_scanner, scanner_partials
 from mlscorr.survey import Matched
 
 
@@ -34,7 +36,8 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
     """
     columns = _columns(calibration, matched[calibration.used])
     equations, parameters = calibration.equations, calibration.parameters[0][0]
-    prior, least = np.array(SETTINGS.unmeasured_scanner), np.array(SETTINGS.least_scanner_error)
+    known = SETTINGS.unmeasured_scanner, SETTINGS.least_scanner_error
+    prior, least = (np.tile(sigma, len(calibration.recorded)) for sigma in known)
     lacks = AddedUnknowns.of(equations, parameters, columns, prior)
     is_wrong = lacks.is_wrong(least)
     errors = ScannerErrors(lacks.correction, lacks.sigma, lacks.sigma < least, is_wrong)
@@ -43,9 +46,12 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
     columns = columns[:, is_wrong]
     lacks = AddedUnknowns.of(equations, parameters, columns, prior[is_wrong])
     left = misclosures_of(equations) - columns @ lacks.correction
+    equations = with_misclosures(equations, left)
+    pose_error = predict_pose_error(equations, calibration.posterior)
     return replace(
         calibration,
-        equations=with_misclosures(equations, left),
+        equations=equations,
+        drift=Correction.by_pose_error(calibration.trajectory, *pose_error),
         lsc=_without(calibration.recorded, calibration.lsc, lacks),
         scanner=errors,
     )
@@ -53,27 +59,28 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
 
 def _columns(calibration, targets):
     """Partial derivatives of all misclosures by ranges and encoder: of targets, then of ties."""
-    equations, mounting = calibration.equations, calibration.lsc.mounting
+    equations, mountings = calibration.equations, calibration.lsc.mountings
+    trajectory, numbered = equations.trajectory, dict(enumerate(mountings))
 
-    def partials(place, gps_time):
-        both = calibration.recorded, mounting
-        place = georeferenced_anew(equations.trajectory, both, place, gps_time)
-        return scanner_partials(equations.trajectory, mounting, place, gps_time)
+    def partials(place, *seen):
+        place = georeferenced_anew(trajectory, calibration.recorded, mountings, place, *seen)
+        return partials_by_scanner(scanner_partials, trajectory, numbered, place, *seen)
 
-    control = np.zeros((*equations.misclosure.shape, len(SCANNER_COMPONENTS)))
-    control[: len(targets)] = partials(targets.observations.position, targets.gps_time)
-    control = control.reshape(-1, len(SCANNER_COMPONENTS))
+    number = len(SCANNER_COMPONENTS) * len(mountings)
+    control = np.zeros((*equations.misclosure.shape, number))
+    sightings = targets.observations.position, targets.gps_time, targets.scanner
+    control[: len(targets)] = partials(*sightings)
+    control = control.reshape(-1, number)
     if equations.ties is None:
         return control
     ties = calibration.ties.ties[calibration.ties.used]
-    views = partials(ties.place.reshape(-1, 3), ties.gps_time.ravel())
+    views = partials(ties.place.reshape(-1, 3), ties.gps_time.ravel(), ties.scanner.ravel())
     return np.vstack([control, along_ties(ties.direction, views).sum(axis=1)])
 
 
 def _without(recorded, estimate, lacks):
-    """The estimate of a mounting that took a part of what ranges and encoder lack."""
-    taken = lacks.response[:6]
+    """The estimate of mountings that took a part of what ranges and encoders lack."""
+    taken = lacks.response[: len(estimate.correction)]
     correction = combined_correction(estimate.correction, -taken @ lacks.correction)
     covariance = estimate.covariance + taken @ lacks.covariance @ taken.T
-    mounting = replace(corrected_mounting(recorded, correction), covariance=covariance)
-    return replace(estimate, mounting=mounting, correction=correction, covariance=covariance)
+    return MountingEstimate.about(recorded, correction, covariance, estimate.sigma0)

@@ -14,7 +14,7 @@ import numpy as np
 from mlscorr.collocation import Noise, SparseRows
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, pose_signals
-from mlscorr.frames import mounting_partials, pose_partials
+from mlscorr.frames import mounting_partials, partials_by_scanner, pose_partials
 from mlscorr.pos import StatedSigma, stated_sigma
 from mlscorr.survey import Mounting, Pos, Ties, Trajectory
 
@@ -155,13 +155,9 @@ def mounting_columns(
         By the number of their scanner.
     ties : Ties
     """
-    times, places = ties.gps_time.ravel(), ties.place.reshape(-1, 3)
-    columns = []
-    for number, mounting in mountings.items():
-        partials = mounting_partials(trajectory, mounting, places, times)
-        is_its = (ties.scanner == number)[:, :, None]
-        columns.append((along_ties(ties.direction, partials) * is_its).sum(axis=1))
-    return np.hstack(columns)
+    views = ties.place.reshape(-1, 3), ties.gps_time.ravel(), ties.scanner.ravel()
+    partials = partials_by_scanner(mounting_partials, trajectory, mountings, *views)
+    return along_ties(ties.direction, partials).sum(axis=1)
 
 
 def _epochs(gps_time, history):

@@ -8,12 +8,13 @@ Black and Rangarajan 1996), then Student's t in turn with the restricted likelih
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
 
-from mlscorr.correction import Correction
+from mlscorr.correction import Correction, increments_by_scanner
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.outages import with_likely_starts
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters
@@ -48,21 +49,35 @@ class TieResiduals:
     after: np.ndarray
 
     @classmethod
-    def of(cls, ties: Ties, used: np.ndarray, correction: Correction) -> TieResiduals:
+    def of(
+        cls, ties: Ties, used: np.ndarray, correction: Correction | Sequence[Correction]
+    ) -> TieResiduals:
         """The residuals of ties after a correction.
 
         Parameters
         ----------
         ties : Ties
         used : (n,) bool array
-        correction : Correction
+        correction : Correction, or sequence of Correction
+            Of all scanners, or of each.
         """
-        moved = [
-            correction.increments(ties.place[:, view], ties.gps_time[:, view])[0]
-            for view in range(2)
-        ]
-        change = np.einsum("ni,ni->n", ties.direction, moved[0] - moved[1])
+        if isinstance(correction, Correction):
+            correction = [correction] * (1 + ties.scanner.max(initial=0))
+        moved = increments_by_scanner(correction, ties.place, ties.gps_time, ties.scanner)
+        change = np.einsum("ni,ni->n", ties.direction, moved[:, 0] - moved[:, 1])
         return cls(ties, used, ties.misclosure - change)
+
+    def of_scanner(self, number: int) -> TieResiduals | None:
+        """The residuals of what a scanner saw, by itself or with another; None without any.
+
+        Parameters
+        ----------
+        number : int
+            From 0.
+        """
+        rows = (self.ties.scanner == number).any(axis=1)
+        residuals = TieResiduals(self.ties[rows], self.used[rows], self.after[rows])
+        return residuals if rows.any() else None
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -1,32 +1,30 @@
-"""A mounting by control points and by what two passes both saw (Eq. 16-18).
+"""Mountings by control points and by what two passes, or two scanners, both saw (Eq. 16-18).
 
 A tie compares two views of one thing. What is wrong with the mounting turns and moves both with the
 body, so that views in opposite directions, or far and near, tell it; its rows of A are the
-differences of the partial derivatives at both.
+differences of the partial derivatives at both. Two scanners that saw it a second apart share nearly
+all of the POS error: what is left between them is the one mounting beside the other.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
-from mlscorr.estimate.calibration import Calibration
+from mlscorr.estimate.calibration import Calibration, mounted_corrections
 from mlscorr.estimate.equations import Equations
-from mlscorr.estimate.mounting import (
-    calibration_by,
-    combined_correction,
-    corrected_mounting,
-    georeferenced_anew,
-    linearized,
-)
+from mlscorr.estimate.mounting import calibration_by, linearized
+from mlscorr.estimate.mounting_estimate import combined_correction, corrected_mountings
 from mlscorr.estimate.prediction import pose_rows
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.estimate.tie_weights import WeighedTies, graduated
 from mlscorr.estimate.tied import TieResiduals, screen_with_ties
+from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import Matched, Mounting, Ties
 
 
@@ -41,7 +39,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     calibration : Calibration
         By control points alone.
     matched : Matched
-        These, as georeferenced with the recorded mounting.
+        These, as georeferenced with the recorded mountings.
     ties : Ties
         The places likewise; the directions are those of the things themselves.
     """
@@ -51,7 +49,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     bare = replace(tied.equations, ties=None)
     predictions, screening, is_used = screen_with_ties(bare, calibration.screening, rows)
     if not is_used.any():
-        residuals = TieResiduals.of(ties, is_used, calibration.correction_with_drift)
+        residuals = TieResiduals.of(ties, is_used, calibration.corrections_with_drift)
         return replace(calibration, ties=residuals)
     used = calibration.used & ~np.isin(matched.name, [o.name for o in screening.outliers])
     changed = calibration_by(
@@ -63,13 +61,15 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
         used,
         calibration.notes,
     )
-    residuals = TieResiduals.of(ties, is_used, changed.correction_with_drift)
+    residuals = TieResiduals.of(ties, is_used, changed.corrections_with_drift)
     return replace(changed, ties=residuals)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def previewed_mounting(calibration: Calibration, matched: Matched, ties: Ties) -> Correction:
-    """The correction by mounting and POS error with ties that were paired so far.
+def previewed_mounting(
+    calibration: Calibration, matched: Matched, ties: Ties
+) -> tuple[Correction, ...]:
+    """The corrections by each mounting and the POS error with ties that were paired so far.
 
     Under the parameters of the control points alone, and without sigmas.
 
@@ -82,19 +82,20 @@ def previewed_mounting(calibration: Calibration, matched: Matched, ties: Ties) -
     """
     parameters = calibration.parameters[0][0]
     tied, correction = _converged(calibration, matched, ties, parameters)
-    mounting = corrected_mounting(calibration.recorded, correction)
+    recorded = calibration.recorded
+    mountings = corrected_mountings(recorded, correction)
     pose = tied.solved.predict_mean(*pose_rows(tied.equations, parameters))
-    trajectory, recorded = calibration.trajectory, calibration.recorded
-    return Correction.by_pose_error(trajectory, pose, None, recorded, mounting)
+    drift = Correction.by_pose_error(calibration.trajectory, pose)
+    return mounted_corrections(drift, recorded, mountings)
 
 
 def _converged(calibration, matched, ties, parameters) -> tuple[WeighedTies, np.ndarray]:
-    """Equations with robust weights about the mounting that they give, and its correction (6,)."""
+    """Equations with robust weights about the mountings that they give, and these' correction."""
     recorded, targets = calibration.recorded, matched[calibration.used]
     correction, equations = calibration.lsc.correction, calibration.equations
     for _ in range(SETTINGS.iterations):
-        mounting, about = linearized(equations, targets, recorded, correction)
-        moved = georeferenced_ties(about, (recorded, mounting), ties)
+        mountings, about = linearized(equations, targets, recorded, correction)
+        moved = georeferenced_ties(about, recorded, mountings, ties)
         tied = graduated(about, parameters, moved)
         step = combined_correction(correction, tied.solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
@@ -104,20 +105,20 @@ def _converged(calibration, matched, ties, parameters) -> tuple[WeighedTies, np.
 
 
 def georeferenced_ties(
-    equations: Equations, mountings: tuple[Mounting, Mounting], ties: Ties
+    equations: Equations, recorded: Sequence[Mounting], mountings: Sequence[Mounting], ties: Ties
 ) -> TieEquations:
-    """The equations of ties that a mounting georeferenced, about another one.
+    """The equations of ties that mountings georeferenced, about other ones.
 
     Parameters
     ----------
     equations : Equations
-    mountings : pair of Mounting
-        The recorded one, and that about which the equations are.
+    recorded, mountings : sequence of Mounting
+        Of each scanner: the recorded one, and that about which the equations are.
     ties : Ties
     """
-    trajectory, times = equations.trajectory, ties.gps_time.ravel()
-    place = georeferenced_anew(trajectory, mountings, ties.place.reshape(-1, 3), times)
-    place = place.reshape(-1, 2, 3)
+    trajectory, views = equations.trajectory, (ties.place, ties.gps_time, ties.scanner)
+    place = georeferenced_anew(trajectory, recorded, mountings, *views)
     misclosure = np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
     moved = replace(ties, place=place, misclosure=misclosure)
-    return TieEquations.of(trajectory, equations.pos, moved, equations.stated, {0: mountings[1]})
+    numbered = dict(enumerate(mountings))
+    return TieEquations.of(trajectory, equations.pos, moved, equations.stated, numbered)

@@ -12,7 +12,7 @@ import numpy as np
 from mlscorr.correction import Correction
 from mlscorr.effects import Effect, effect_class, make_effect
 from mlscorr.effects.wording import joined
-from mlscorr.estimate.mounting import corrected_mounting
+from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.io.conversion import written_name
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.survey_copy import write_survey_copy

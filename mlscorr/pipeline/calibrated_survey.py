@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mlscorr.correction import Correction
 from mlscorr.estimate import Calibration
-from mlscorr.estimate.calibration import MOUNTING_COMPONENTS, SCANNER_COMPONENTS
+from mlscorr.estimate.calibration import SCANNER_COMPONENTS
+from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.evaluate.scores import score
 from mlscorr.evaluate.target_rows import surveyed_rows
@@ -42,6 +42,8 @@ class CalibratedSurvey(Summary):
     matched_control, matched_check : Matched
     missing : list of TargetRow
         Surveyed points without an observation.
+    warnings : tuple of str
+        Sentences on this scanner, and on what all share where it is the one.
     """
 
     survey: Survey
@@ -49,6 +51,7 @@ class CalibratedSurvey(Summary):
     matched_control: Matched
     matched_check: Matched
     missing: list[TargetRow] = field(default_factory=list)
+    warnings: tuple[str, ...] = ()
 
     @property
     def components(self) -> list[dict]:
@@ -91,7 +94,7 @@ class CalibratedSurvey(Summary):
         out : path
             The folder, which appears whole or not at all.
         with_drift : bool
-            Estimate the POS error along with the mounting, and write trajectory.csv.
+            Write the POS error that was estimated along with the mounting as trajectory.csv.
         clouds : bool
             Write the clouds as the calibrated mounting (and trajectory) puts them; survey.toml
             then names these.
@@ -108,27 +111,18 @@ class CalibratedSurvey(Summary):
         ValueError, OSError
             As ``CorrectedSurvey.write`` does.
         """
-        drift = self.calibration.correction_with_drift if with_drift else None
-        content = document("calibration", self.report(drift))
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
-            write_calibration(folder, content)
-            if with_drift:
-                write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
-            if clouds:
-                done = (progress or silent)("Writing the cloud", self.survey.points)
-                correction = drift or self.calibration.correction()
-                write_clouds(self.survey, folder, correction, done)
-            trajectory = "trajectory.csv" if clouds and with_drift else None
-            write_calibrated_survey(folder, out, [self], clouds, trajectory)
-        return content
+        parts, content = {"": self}, self.report(with_drift)
+        return write_calibrated(
+            self.survey, parts, content, out, with_drift, clouds, overwrite, progress
+        )
 
-    def report(self, drift: Correction | None = None) -> dict[str, object]:
-        """The content of calibration.json.
+    def report(self, with_drift: bool = False) -> dict[str, object]:
+        """The content of calibration.json, of one scanner.
 
         Parameters
         ----------
-        drift : Correction, optional
-            Of mounting and POS error.
+        with_drift : bool
+            Whether with what the POS error beside the mounting explains.
         """
         from mlscorr.report.calibration_page import calibration_screen
 
@@ -146,10 +140,11 @@ class CalibratedSurvey(Summary):
             "outliers": [vars(outlier) for outlier in calibration.outliers],
             "targets": [row.document() for row in rows],
             "ties": misfit_section(calibration.ties),
-            "warnings": list(calibration.warnings),
+            "warnings": list(self.warnings),
             "notes": list(self.survey.notes),
         }
-        if drift is not None:
+        if with_drift:
+            drift = calibration.correction_with_drift
             change = drift.corrected.position - drift.recorded.position
             content["with_drift"] = {
                 "control": self._statistics("control", drift),
@@ -162,13 +157,8 @@ class CalibratedSurvey(Summary):
     def _method(self, method):
         estimate = getattr(self.calibration, method)
         correction = self.calibration.correction(method)
-        turn, sigma = np.degrees([estimate.correction[3:], estimate.sigma[3:]])
         return {
-            "lever_arm": {
-                "correction": estimate.correction[:3].tolist(),
-                "sigma": estimate.sigma[:3].tolist(),
-            },
-            "boresight": {"correction": turn.tolist(), "sigma": sigma.tolist()},
+            **estimate_section(estimate.correction, estimate.sigma),
             "correlation": estimate.correlation.tolist(),
             "sigma0": estimate.sigma0,
             "control": self._statistics("control", correction),
@@ -185,51 +175,71 @@ class CalibratedSurvey(Summary):
         return surveyed_rows(*points, correction, self.calibration.outliers) + self.missing
 
 
-def write_calibration(folder: Path, content: dict) -> None:
-    """Write calibration.json and calibration.html.
+def estimate_section(correction: np.ndarray, sigma: np.ndarray) -> dict[str, object]:
+    """``lever_arm`` (m) and ``boresight`` (deg) of calibration.json, each with its sigma.
 
     Parameters
     ----------
-    folder : Path
+    correction, sigma : (6,) array
+        Units: m and rad.
+    """
+    values = {"correction": correction, "sigma": sigma}
+    return {
+        "lever_arm": {name: value[:3].tolist() for name, value in values.items()},
+        "boresight": {name: np.degrees(value[3:]).tolist() for name, value in values.items()},
+    }
+
+
+def write_calibrated(
+    survey: Survey,
+    parts: Mapping[str, CalibratedSurvey],
+    content: dict[str, object],
+    out: str | Path,
+    with_drift: bool,
+    clouds: bool,
+    overwrite: bool,
+    progress: Callable | None,
+) -> dict:
+    """Write calibration.json, its page, and survey.toml with the mountings of all scanners.
+
+    Parameters
+    ----------
+    survey : Survey
+    parts : dict
+        CalibratedSurvey by the scanner's name.
     content : dict
-        The document.
+        Of calibration.json.
+    out, with_drift, clouds, overwrite, progress
+        As of ``CalibratedSurvey.write``.
     """
     from mlscorr.report.calibration_page import calibration_page
 
-    write_json(folder / "calibration.json", content)
-    calibration_page(content).write(folder / "calibration.html")
-
-
-def write_calibrated_survey(
-    folder: Path,
-    out: str | Path,
-    scanners: Sequence[CalibratedSurvey],
-    clouds: bool,
-    trajectory: str | None = None,
-) -> None:
-    """Write survey.toml with the calibrated mountings of its scanners.
-
-    Parameters
-    ----------
-    folder : Path
-    out : path
-        Where the folder will stand in the end.
-    scanners : sequence of CalibratedSurvey
-        In the order of survey.toml.
-    clouds : bool
-        Whether it shall name the clouds in the folder.
-    trajectory : str, optional
-        New trajectory in the folder.
-    """
-    files = [[written_name(file.path) for file in part.survey.clouds] for part in scanners]
-    write_survey_copy(
-        scanners[0].survey.path,
-        folder / FILE_NAME,
-        out,
-        [part.calibration.lsc.mounting for part in scanners],
-        files if clouds else (),
-        trajectory,
-    )
+    content = document("calibration", content)
+    calibrations = {name: part.calibration for name, part in parts.items()}
+    with output_folder(out, survey.inputs, overwrite) as folder:
+        write_json(folder / "calibration.json", content)
+        calibration_page(content).write(folder / "calibration.html")
+        if with_drift:  # the one of all
+            drift = next(iter(calibrations.values())).drift
+            write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
+        if clouds:
+            done = (progress or silent)("Writing the cloud", survey.points)
+            moved = {
+                name: c.correction_with_drift if with_drift else c.correction()
+                for name, c in calibrations.items()
+            }
+            write_clouds(survey, folder, moved, done)
+        write_survey_copy(
+            survey.path,
+            folder / FILE_NAME,
+            out,
+            [calibration.lsc.mounting for calibration in calibrations.values()],
+            [[written_name(file.path) for file in part.survey.clouds] for part in parts.values()]
+            if clouds
+            else (),
+            "trajectory.csv" if clouds and with_drift else None,
+        )
+    return content
 
 
 def _mounting(mounting):

@@ -10,20 +10,22 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.estimate import Calibration
 from mlscorr.evaluate.target_rows import unseen_rows
+from mlscorr.evaluate.ties import misfit_section
 from mlscorr.io.las import sample_gps_times
-from mlscorr.io.output import document, output_folder
+from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import (
     CalibratedSurvey,
-    write_calibrated_survey,
-    write_calibration,
+    estimate_section,
+    write_calibrated,
 )
-from mlscorr.pipeline.clouds import write_clouds
-from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
 from mlscorr.survey import Survey
 from mlscorr.survey.summary import Summary
+
+SEEN_BY_OTHERS = "Another scanner saw it, this one did not."
 
 
 def calibrate(
@@ -37,14 +39,15 @@ def calibrate(
     Parameters
     ----------
     survey : Survey
-        Where it has several scanners, each is calibrated by its own files in turn.
+        Where it has several scanners, one estimate has the mountings of all, and the POS error that
+        they share, by the targets of all and by what any two of them both saw.
     rng : numpy.random.Generator, optional
         For the plane fit's random samples; the same seed each time by default.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
     ties : bool, optional
-        Whether planes and poles that two passes both saw take part; where they do, less than 3
-        control points, or none, are enough. What survey.toml says by default.
+        Whether planes and poles that two passes, or scanners, both saw take part; where they do,
+        less than 3 control points, or none, are enough. What survey.toml says by default.
 
     Returns
     -------
@@ -72,45 +75,67 @@ def calibrate(
     >>> round(float(result.calibration.lsc.correction[2]), 1)  # m, up
     0.2
     """
-    if not survey.scanners:
-        return _calibrated(survey, "", rng, progress, ties)
-    parts = {}
     for name, part in survey.by_scanner.items():
-        try:
-            parts[name] = _calibrated(part, f"Scanner {name}: ", rng, progress, ties)
-        except ValueError as error:
-            raise ValueError(f"Scanner {name}: {error}") from error
-    return CalibratedScanners(survey, parts)
-
-
-def _calibrated(survey, title, rng, progress, ties):
-    """The CalibratedSurvey of one scanner, with its title before each warning."""
-    if survey.mounting is None:
-        raise ValueError(
-            f"{survey.path} has no [mounting]: a calibration needs the lever_arm (m) and boresight "
-            "(deg) that the cloud was georeferenced with. Add that section."
-        )
-    warn_of_scanners(survey)
+        if part.mounting is None:
+            raise ValueError(
+                f"{_title(name)}{survey.path} has no [mounting]: a calibration needs the lever_arm "
+                "(m) and boresight (deg) that the cloud was georeferenced with. Add that section."
+            )
+        warn_of_scanners(part)
     ties = survey.use_ties if ties is None else ties
     control, check, finding, calibration = estimate_site(survey, ties, rng, progress)
-    for sentence in calibration.warnings:
-        warnings.warn(f"{title}{sentence}", stacklevel=3)
-    missing = unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned)
-    return CalibratedSurvey(survey, calibration, control, check, missing)
+    parts = _parts(survey, control, check, finding, calibration)
+    for name, part in parts.items():
+        for sentence in part.warnings:
+            warnings.warn(f"{_title(name)}{sentence}", stacklevel=2)
+    if not survey.scanners:
+        return parts[""]
+    for sentence in calibration.shared_warnings:
+        warnings.warn(sentence, stacklevel=2)
+    return CalibratedScanners(survey, calibration, parts)
+
+
+def _title(name):
+    """What stands before a sentence on a scanner, where there are several."""
+    return f"Scanner {name}: " if name else ""
+
+
+def _parts(survey, control, check, finding, calibration):
+    """CalibratedSurvey of each scanner by its name, with the sentences on it alone."""
+    parts, of_pass = {}, finding.scanners(survey)
+    for number, (name, part) in enumerate(survey.by_scanner.items()):
+        matched = [points[points.scanner == number] for points in (control, check)]
+        refusals = [
+            refusal
+            for refusal in finding.matches.refusals
+            if of_pass.get(refusal.pass_number, number) == number
+        ]
+        known = {*matched[0].name, *matched[1].name, *(refusal.name for refusal in refusals)}
+        others = [point for point in survey.surveyed.name if point not in known]
+        refusals += [Refusal(point, None, SEEN_BY_OTHERS) for point in others]
+        scanned = finding.scanned.difference(others)
+        missing = unseen_rows(part, refusals, finding.candidates, scanned)
+        view = calibration.of(number, control.scanner)
+        sentences = view.own_warnings if name else view.warnings
+        parts[name] = CalibratedSurvey(part, view, *matched, missing, sentences)
+    return parts
 
 
 @dataclass(frozen=True, repr=False)
 class CalibratedScanners(Summary):
-    """A calibrated survey of several scanners, each by what it saw, and ``write``.
+    """A survey whose scanners were calibrated together, and ``write``.
 
     Parameters
     ----------
     survey : Survey
+    calibration : Calibration
+        Of all mountings, and of the POS error that the scanners share.
     by_scanner : dict
         CalibratedSurvey by the scanner's name.
     """
 
     survey: Survey
+    calibration: Calibration
     by_scanner: dict[str, CalibratedSurvey]
 
     def write(
@@ -125,10 +150,8 @@ class CalibratedScanners(Summary):
 
         Parameters
         ----------
-        out, clouds, overwrite, progress
+        out, with_drift, clouds, overwrite, progress
             As of ``CalibratedSurvey.write``.
-        with_drift : bool
-            Can't be: each scanner gives a trajectory of its own.
 
         Returns
         -------
@@ -140,27 +163,33 @@ class CalibratedScanners(Summary):
         ValueError, OSError
             As ``CalibratedSurvey.write`` does.
         """
-        if with_drift:
-            raise ValueError(
-                f"Each of the {len(self.by_scanner)} scanners of {self.survey.path} would give a "
-                "trajectory of its own. Calibrate without --with-drift, and run mlscorr correct "
-                "with the survey.toml that is written: it finds one drift by all of them."
-            )
-        content = document("calibration", self.report())
-        parts = list(self.by_scanner.values())
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
-            write_calibration(folder, content)
-            if clouds:
-                done = (progress or silent)("Writing the cloud", self.survey.points)
-                moved = {name: p.calibration.correction() for name, p in self.by_scanner.items()}
-                write_clouds(self.survey, folder, moved, done)
-            write_calibrated_survey(folder, out, parts, clouds)
-        return content
+        parts, content = self.by_scanner, self.report(with_drift)
+        return write_calibrated(
+            self.survey, parts, content, out, with_drift, clouds, overwrite, progress
+        )
 
-    def report(self) -> dict[str, object]:
-        """The content of calibration.json: by scanner what it is of one."""
-        scanners = {name: part.report() for name, part in self.by_scanner.items()}
-        return {"name": self.survey.name, "scanners": scanners}
+    def report(self, with_drift: bool = False) -> dict[str, object]:
+        """The content of calibration.json: by scanner what it is of one, and what all share.
+
+        Parameters
+        ----------
+        with_drift : bool
+            As of ``CalibratedSurvey.report``.
+        """
+        from mlscorr.report.calibration_page import scanners_screen
+
+        first, *others = self.by_scanner
+        content = {
+            "name": self.survey.name,
+            "scanners": {n: part.report(with_drift) for n, part in self.by_scanner.items()},
+            "relative": {
+                name: {"beside": first} | estimate_section(*self.calibration.lsc.beside_first(i))
+                for i, name in enumerate(others, start=1)
+            },
+            "ties": misfit_section(self.calibration.ties),
+            "warnings": list(self.calibration.shared_warnings),
+        }
+        return scanners_screen(content) | content
 
 
 def warn_of_scanners(survey: Survey) -> None:

@@ -49,6 +49,16 @@ class Finding:
     scanned: frozenset[str] = frozenset()
     warnings: tuple[str, ...] = ()
 
+    def scanners(self, survey: Survey) -> dict[int, int]:
+        """Number of the scanner of each pass.
+
+        Parameters
+        ----------
+        survey : Survey
+        """
+        numbers = survey.scanner_numbers
+        return {number: int(numbers[key[0]]) for key, number in self.candidates.passes.items()}
+
 
 def find_targets(
     survey: Survey,

@@ -1,4 +1,4 @@
-"""Ties for a calibration: paired while the mounting may be wrong by degrees, and paired again."""
+"""Ties for a calibration: paired while mountings may be wrong by degrees, and paired again."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.estimate import SETTINGS as LIMITS
+from mlscorr.correction import increments_by_scanner
 from mlscorr.estimate import (
     Calibration,
     believed_mounting,
     calibration_with_ties,
+    control_fault,
     estimate_mounting,
+    mounted_corrections,
     previewed_mounting,
     with_scanner_errors,
 )
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.tying import narrowest_gate, placed_sigma, widest_gate
-from mlscorr.survey import SAME_EPOCH, Matched, Survey, TieFeatures
+from mlscorr.survey import Matched, Survey, TieFeatures
 from mlscorr.ties import (
     SETTINGS,
     TieCollector,
@@ -43,14 +45,14 @@ def estimate_site(
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
 ) -> tuple[Matched, Matched, Finding, Calibration]:
-    """Read a survey's clouds once, and calibrate with all that is in them.
+    """Read a survey's clouds once, and calibrate all its scanners together by what is in them.
 
     Parameters
     ----------
     survey : Survey
-        With a mounting.
+        With a mounting of each scanner.
     ties : bool
-        Whether what two passes both saw takes part.
+        Whether what two passes, or two scanners, both saw takes part.
     rng, progress
         As of ``find_targets``.
 
@@ -63,25 +65,45 @@ def estimate_site(
     Raises
     ------
     ValueError
-        Where less than 3 control points were found, or all of them at one time, and nothing was
-        seen twice or ties are not wanted.
+        Where a scanner saw less than 3 control points, or all of them at one time, and nothing that
+        was seen twice, or ties are not wanted.
     """
-    if not ties:
+    collector, notes = TieCollector(survey), ()
+    if ties:
+        read = read_into(collector.add)
+        finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
+        control, check = finding.matches.by_role(survey)
+    else:
         control, check, finding = find_control(survey, rng, progress)
-        calibration = estimate_mounting(survey.trajectory, survey.mounting, control, survey.pos)
-        return control, check, finding, with_scanner_errors(calibration, control)
-    collector = TieCollector(survey)
-    read = read_into(collector.add)
-    finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
-    control, check = finding.matches.by_role(survey)
-    number = len(set(control.name))
-    is_enough = number >= LIMITS.smallest_targets and np.ptp(control.gps_time) >= SAME_EPOCH
-    estimate = estimate_mounting if is_enough else believed_mounting
-    start = estimate(survey.trajectory, survey.mounting, control, survey.pos)
-    calibration = tie_mounting(survey, start, control, collector.features())
-    if not is_enough and (calibration.ties is None or not calibration.ties.used.any()):
-        raise ValueError(" ".join([NOTHING_CALIBRATES.format(survey.path, number), *notes]))
+    of_pass = finding.scanners(survey)
+    control, check = (
+        replace(part, scanner=np.array([of_pass[n] for n in part.observations.pass_number], int))
+        for part in (control, check)
+    )
+    faults = {name: control_fault(control, i) for i, name in enumerate(survey.by_scanner)}
+    if not ties and any(faults.values()):
+        _refuse(next((name, fault) for name, fault in faults.items() if fault))
+    estimate = believed_mounting if all(faults.values()) else estimate_mounting
+    calibration = estimate(survey.trajectory, survey.mountings, control, survey.pos)
+    if ties:
+        calibration = tie_mounting(survey, calibration, control, collector.features())
+    for number, name in enumerate(faults):
+        if faults[name] and not _is_tied(calibration, number):
+            count = len(set(np.array(control.name)[control.scanner == number]))
+            _refuse((name, " ".join([NOTHING_CALIBRATES.format(survey.path, count), *notes])))
     return control, check, finding, with_scanner_errors(calibration, control)
+
+
+def _refuse(fault):
+    """Raise a sentence on a scanner, with its name where there are several."""
+    name, sentence = fault
+    raise ValueError(f"Scanner {name}: {sentence}" if name else sentence)
+
+
+def _is_tied(calibration, number):
+    """Whether a tie that is used has a scanner's view."""
+    ties = calibration.ties and calibration.ties.of_scanner(number)
+    return bool(ties and ties.used.any())
 
 
 def tie_mounting(
@@ -89,46 +111,49 @@ def tie_mounting(
 ) -> Calibration:
     """The calibration with the ties of a survey; the same where nothing was seen twice.
 
-    A mounting that puts the planes of all visits on each other is looked for as far from the
-    calibrated one as its sigmas allow. Then pairs are made as far apart as the POS allows, and half
-    as far with each correction that they give, down to the scatter of what is left of them.
+    Mountings that put the planes of all visits on each other are looked for as far from the
+    calibrated ones as their sigmas allow. Then pairs are made as far apart as the POS allows, and
+    half as far with each correction that they give, down to the scatter of what is left of them.
 
     Parameters
     ----------
     survey : Survey
         Its search radius is the limit.
     calibration : Calibration
-        By control points alone, or what is believed of the mounting.
+        By control points alone, or what is believed of the mountings.
     matched : Matched
         These points.
     features : TieFeatures
     """
-    correction, mounting = calibration.correction_with_drift, calibration.lsc.mounting
-    sigma = placed_sigma(correction, replace(survey, mounting=mounting), features)
+    recorded, mountings = calibration.recorded, calibration.lsc.mountings
+    drift, trajectory = calibration.drift, calibration.trajectory
+    sigma = placed_sigma(drift, survey.with_mountings(mountings), features)
     radius = min(widest_gate(sigma), survey.search_radius)
-    recorded, trajectory = calibration.recorded, calibration.trajectory
-    moved = remounted(features, trajectory, recorded, mounting)
-    known = replace(survey, mounting=replace(mounting, covariance=None))
-    sigma = placed_sigma(correction, known, features)
-    start = coarse_mounting(moved, trajectory, mounting, sigma, radius)
-    correction = replace(correction, corrected_mounting=start)
+    moved = remounted(features, trajectory, recorded, mountings)
+    known = survey.with_mountings(replace(mounting, covariance=None) for mounting in mountings)
+    sigma = placed_sigma(drift, known, features)
+    start = coarse_mounting(moved, trajectory, mountings, sigma, radius)
+    corrections = mounted_corrections(drift, recorded, start)
     sigma = np.hypot(sigma, SETTINGS.roughest)
     radius = min(widest_gate(sigma), survey.search_radius)
+    seen = features.centre, features.gps_time, features.scanner
     while True:
-        moved = correction.increments(features.centre, features.gps_time)[0]
-        turned = turned_directions(features, _move(correction))
+        moved = increments_by_scanner(corrections, *seen)
+        turned = turned_directions(features, _move(corrections, features.scanner))
         pairs = pair_features(features, moved, sigma, radius, turned=turned)
         ties = agreeing_ties(pairs, moved)
         if len(ties) == 0:
             return calibration
-        correction = previewed_mounting(calibration, matched, ties)
-        moved = correction.increments(features.centre, features.gps_time)[0]
+        corrections = previewed_mounting(calibration, matched, ties)
+        moved = increments_by_scanner(corrections, *seen)
         limit = narrowest_gate(ties, moved)
         if radius <= limit:
             return calibration_with_ties(calibration, matched, ties)
         radius = max(radius / 2, limit)
 
 
-def _move(correction):
-    """What a correction makes of places at times."""
-    return lambda place, gps_time: place + correction.increments(place, gps_time)[0]
+def _move(corrections, scanner):
+    """What corrections make of places at times, each by that of its scanner."""
+    return lambda place, gps_time: (
+        place + increments_by_scanner(corrections, place, gps_time, scanner)
+    )

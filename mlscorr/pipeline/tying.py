@@ -153,8 +153,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
     limit = 0.0
     moved = _moved(correction, features)
-    mountings = [part.mounting for part in survey.by_scanner.values()]
-    mountings = [] if None in mountings else mountings
+    mountings = () if None in survey.mountings else survey.mountings
     moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
     while True:
         pairs = pair_features(features, moved, sigma, radius)

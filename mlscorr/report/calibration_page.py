@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mlscorr.estimate import SETTINGS
-from mlscorr.estimate.calibration import MOUNTING_COMPONENTS
+from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS
 from mlscorr.evaluate.rows import PointCounts, TargetRow
 from mlscorr.report.headline import (
     Statement,
@@ -47,6 +47,33 @@ def calibration_screen(content: dict[str, Any], rows: list[TargetRow]) -> dict[s
     facts.append(check_statement(PointCounts.of(rows, "check")))
     facts += [*_scanner(content), *_ties(content)]
     return statements_section([*facts, *warning_statements(content["warnings"])])
+
+
+def scanners_screen(content: dict[str, Any]) -> dict[str, object]:
+    """``rating`` and ``statements`` on what the scanners share.
+
+    Parameters
+    ----------
+    content : dict
+        The other content of calibration.json, of scanners that were calibrated together.
+    """
+    facts = [*_relative(content), *_ties(content), *warning_statements(content["warnings"])]
+    return statements_section(facts)
+
+
+def _relative(content) -> Iterator[Statement]:
+    """How well it is known how each further scanner stands beside the first."""
+    limit = SETTINGS.determined_sigma[0], float(np.degrees(SETTINGS.determined_sigma[1]))
+    for name, row in content["relative"].items():
+        arm, turn = (row[part]["sigma"] for part in PARTS)
+        sentence = (
+            f"Scanner {name} stands beside scanner {row['beside']} to "
+            f"{'/'.join(map(millimetres, arm))} mm right/forward/up and "
+            f"{'/'.join(f'{sigma:.3f}' for sigma in turn)} deg about them (one sigma). As much as "
+            "that, walls that both see may look double."
+        )
+        is_known = max(arm) < limit[0] and max(turn) < limit[1]
+        yield Statement("Both together", "green" if is_known else "amber", sentence)
 
 
 def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
@@ -161,13 +188,14 @@ def calibration_page(content: dict[str, Any]) -> Page:
         The whole document, of one scanner or of several.
     """
     scanners = content.get("scanners") or {"": content}
+    shared = content if "scanners" in content else None
     parts = {name: part | {"components": component_rows(part)} for name, part in scanners.items()}
     return Page(
         title=f"{content['name']}: calibration of the mounting",
         summary="calibration-summary.html",
         sections=SECTIONS,
-        content={"name": content["name"], "scanners": parts, "components": MOUNTING_COMPONENTS,
-                 "norm3": _norm},
+        content={"name": content["name"], "scanners": parts, "shared": shared,
+                 "components": MOUNTING_COMPONENTS, "norm3": _norm},
         prefix="calibration-",
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -173,6 +173,23 @@ class Survey(Summary):
         """
         parts = self.by_scanner.values()
         return next((part for part in parts if file in part.clouds), self)
+
+    @property
+    def mountings(self) -> tuple[Mounting | None, ...]:
+        """Of each scanner."""
+        return tuple(part.mounting for part in self.by_scanner.values())
+
+    def with_mountings(self, mountings: Iterable[Mounting]) -> Survey:
+        """The same with another mounting of each scanner.
+
+        Parameters
+        ----------
+        mountings : iterable of Mounting
+        """
+        if not self.scanners:
+            return replace(self, mounting=next(iter(mountings)))
+        pairs = zip(self.scanners, mountings, strict=True)
+        return replace(self, scanners=tuple(replace(part, mounting=m) for part, m in pairs))
 
     @cached_property
     def scanner_numbers(self) -> np.ndarray:

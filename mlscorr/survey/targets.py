@@ -102,10 +102,17 @@ class Matched(Columns):
     observations : TargetObservations
     surveyed : ControlPoints
         The point of each observation; one that was observed twice stands twice.
+    scanner : (n,) int array, optional
+        Number of the scanner of each observation, from 0; zero by default.
     """
 
     observations: TargetObservations
     surveyed: ControlPoints
+    scanner: np.ndarray = None
+
+    def __post_init__(self):
+        if self.scanner is None:
+            object.__setattr__(self, "scanner", np.zeros(len(self.observations), int))
 
     @classmethod
     def by_name(cls, observations: TargetObservations, points: ControlPoints) -> Matched:

@@ -1,12 +1,13 @@
 """How degrees of boresight are found before anything but a drawing is known of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
-from mlscorr.frames import georeference, mounting_partials, to_scanner
+from mlscorr.frames import georeferenced_anew, mounting_partials, partials_by_scanner
 from mlscorr.survey import PAINTED, Mounting, TieFeatures, Trajectory
 from mlscorr.ties.pairing import candidate_pairs
 from mlscorr.ties.settings import SETTINGS
@@ -16,42 +17,44 @@ from mlscorr.ties.thinning import some_blocks
 def coarse_mounting(
     features: TieFeatures,
     trajectory: Trajectory,
-    mounting: Mounting,
+    mountings: Sequence[Mounting],
     sigma: np.ndarray,
     radius: float,
-) -> Mounting:
-    """A mounting that puts the planes of several visits on each other.
+) -> tuple[Mounting, ...]:
+    """Mountings of k scanners that put the planes of all visits on each other.
 
-    One lever arm and one boresight for the whole survey, and a shift of each pass, are looked for
-    together: a shift of each stretch of time would take up what a boresight does, and leave it half
-    unexplained. All parallel planes within a radius pull, with weights (Geman-McClure) whose width
-    halves, and are paired anew each time. It is a start for pair_features, no more.
+    One lever arm and one boresight of each scanner for the whole survey, and a shift of each pass,
+    are looked for together: a shift of each stretch of time would take up what a boresight does,
+    and leave it half unexplained. A scanner that sees nothing twice is held by what others see. All
+    parallel planes within a radius pull, with weights (Geman-McClure) whose width halves, and are
+    paired anew each time. It is a start for pair_features, no more.
 
     Parameters
     ----------
     features : TieFeatures
-        As georeferenced with the recorded mounting.
+        As georeferenced with the recorded mountings.
     trajectory : Trajectory
-    mounting : Mounting
-        As recorded, with the covariance of what is known of it.
+    mountings : sequence of Mounting
+        As recorded, with the covariance of what is known of each.
     sigma : (n,) array
         One sigma of the features' places by the POS. Units: m.
     radius : float
         Of the search. Units: m.
     """
-    planes = some_blocks(features[features.kind == "plane"], SETTINGS.coarse_features)
+    count = len(mountings)
+    planes = some_blocks(features[features.kind == "plane"], count * SETTINGS.coarse_features)
     passes = np.unique(planes.pass_number)
     shift = float(np.median(sigma)) if len(sigma) else 0.0
-    prior = np.zeros((6 + 3 * len(passes),) * 2)
-    prior[:6, :6] = np.linalg.inv(mounting.covariance)
-    prior[range(6, len(prior)), range(6, len(prior))] = max(shift, SETTINGS.surface_sigma) ** -2.0
-    turn_sigma = np.sqrt(mounting.covariance[range(3, 6), range(3, 6)].max())
-    state, width, at = np.zeros(len(prior)), radius / 2, mounting
+    known = [mounting.covariance for mounting in mountings]
+    each = np.full(3 * len(passes), max(shift, SETTINGS.surface_sigma) ** -2.0)
+    prior = block_diag(*map(np.linalg.inv, known), np.diag(each))
+    turn_sigma = np.sqrt(max(np.diag(covariance)[3:].max() for covariance in known))
+    state, width, at = np.zeros(len(prior)), radius / 2, tuple(mountings)
     while width > SETTINGS.roughest:
         angle = SETTINGS.parallel + 2 * turn_sigma * 2 * width / radius
         for _ in range(3):
-            moved = remounted(planes, trajectory, mounting, at)
-            shifts = state[6:].reshape(-1, 3)[np.searchsorted(passes, planes.pass_number)]
+            moved = remounted(planes, trajectory, mountings, at)
+            shifts = state[6 * count :].reshape(-1, 3)[np.searchsorted(passes, planes.pass_number)]
             gates = np.full(len(planes), SETTINGS.gate_sigmas * width)
             pairs, _ = candidate_pairs(moved, shifts, gates, 2 * width, angle)
             normal = moved.direction[pairs].sum(axis=1)
@@ -63,27 +66,38 @@ def coarse_mounting(
             matrix = (design.T * weight) @ design + prior
             step = np.linalg.solve(matrix, design.T @ (weight * left) - prior @ state)
             state = state + step
-            at = Mounting(at.lever_arm + step[:3], Rotation.from_rotvec(step[3:6]) * at.boresight)
+            turns = step[: 6 * count].reshape(-1, 6)
+            at = tuple(
+                replace(
+                    mounting,
+                    lever_arm=mounting.lever_arm + turn[:3],
+                    boresight=Rotation.from_rotvec(turn[3:]) * mounting.boresight,
+                )
+                for mounting, turn in zip(at, turns, strict=True)
+            )
         width /= 2
-    return replace(at, covariance=mounting.covariance)
+    return at
 
 
 def remounted(
-    features: TieFeatures, trajectory: Trajectory, recorded: Mounting, mounting: Mounting
+    features: TieFeatures,
+    trajectory: Trajectory,
+    recorded: Sequence[Mounting],
+    mountings: Sequence[Mounting],
 ) -> TieFeatures:
-    """Features as another mounting gives them: their places and directions  (Eq. 1).
+    """Features as other mountings give them: their places and directions  (Eq. 1).
 
     Parameters
     ----------
     features : TieFeatures
     trajectory : Trajectory
-    recorded, mounting : Mounting
-        That of the features, and the other.
+    recorded, mountings : sequence of Mounting
+        Of each scanner: that of the features, and the other.
     """
 
     def move(place, gps_time):
-        in_scanner = to_scanner(trajectory, recorded, place, gps_time)
-        return georeference(trajectory, mounting, in_scanner, gps_time)
+        seen = place, gps_time, features.scanner
+        return georeferenced_anew(trajectory, recorded, mountings, *seen)
 
     centre = move(features.centre, features.gps_time)
     return replace(features, centre=centre, direction=turned_directions(features, move))
@@ -119,16 +133,16 @@ def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
     return turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
 
-def _design(features, trajectory, mounting, passes, pairs, normal):
-    """Rows (k, 6 + 3 p) of pairs: n (first - second) of the mounting and of each pass's shift."""
-    rows = np.zeros((len(pairs), len(passes) + 2, 3))
+def _design(features, trajectory, mountings, passes, pairs, normal):
+    """Rows of pairs: n (first - second) of the k mountings and of p passes' shifts (6 k + 3 p)."""
+    first = 2 * len(mountings)
+    numbered, rows = dict(enumerate(mountings)), np.zeros((len(pairs), first + len(passes), 3))
     number = np.searchsorted(passes, features.pass_number[pairs])
     for view, sign in ((0, 1.0), (1, -1.0)):
-        view_rows = pairs[:, view]
-        partials = mounting_partials(
-            trajectory, mounting, features.centre[view_rows], features.gps_time[view_rows]
-        )
-        along = np.einsum("ni,nij->nj", normal, partials).reshape(len(pairs), 2, 3)
-        rows[:, :2] += sign * along
-        rows[np.arange(len(pairs)), 2 + number[:, view]] += sign * normal
-    return rows.reshape(len(pairs), 3 * len(passes) + 6)
+        columns = features.centre, features.gps_time, features.scanner
+        seen = (column[pairs[:, view]] for column in columns)
+        partials = partials_by_scanner(mounting_partials, trajectory, numbered, *seen)
+        along = np.einsum("ni,nij->nj", normal, partials)
+        rows[:, :first] += sign * along.reshape(len(pairs), first, 3)
+        rows[np.arange(len(pairs)), first + number[:, view]] += sign * normal
+    return rows.reshape(len(pairs), 3 * rows.shape[1])

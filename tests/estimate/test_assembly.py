@@ -111,7 +111,7 @@ def mounting_case():
 def test_a_mounting_moves_targets_as_its_columns_say():
     "Lever arm by 1 mm and boresight by 1e-6 rad about body axes, to 1e-5 of the effect"
     case, position = mounting_case()
-    equations = mounting_equations(position, case.matched, MOUNTING, np.zeros(6), WEAK)
+    equations = mounting_equations(position, case.matched, [MOUNTING], np.zeros(6), WEAK)
     times = case.observations.gps_time
     scanned = to_scanner(case.recorded, MOUNTING, case.observations.position, times)
     before = georeference(case.recorded, MOUNTING, scanned, times)
@@ -127,7 +127,7 @@ def test_two_epochs_hold_the_mounting_weakly():
     "What was corrected already comes back as a misclosure with the sigmas of no measurement"
     case, position = mounting_case()
     corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
-    equations = mounting_equations(position, case.matched, MOUNTING, corrected, WEAK)
+    equations = mounting_equations(position, case.matched, [MOUNTING], corrected, WEAK)
     assert len(equations.gps_time) == 8 and equations.fallbacks == 0
     np.testing.assert_array_equal(equations.misclosure[-2:].ravel(), -corrected)
     np.testing.assert_allclose(np.diag(equations.noise.matrix)[-6:], WEAK**2)
@@ -142,6 +142,6 @@ def test_a_site_without_targets_leaves_the_mounting_as_it_was():
     vague = np.tile(1e6 * np.eye(3), (6, 1, 1))
     matched = replace(case.matched, observations=replace(case.observations, covariance=vague))
     corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
-    solved = mounting_equations(position, matched, MOUNTING, corrected, WEAK).solve(None)
+    solved = mounting_equations(position, matched, [MOUNTING], corrected, WEAK).solve(None)
     np.testing.assert_allclose(solved.trend, -corrected, atol=1e-3)
     np.testing.assert_allclose(np.sqrt(np.diag(solved.trend_covariance)), WEAK, rtol=1e-2)

@@ -10,7 +10,7 @@ from tests.beds.tied_site import RECORDED, tied_site
 @pytest.fixture(scope="module")
 def calibration():
     site = tied_site(1, number=1)
-    return estimate_mounting(site.trajectory, RECORDED, site.matched)
+    return estimate_mounting(site.trajectory, [RECORDED], site.matched)
 
 
 def test_correlations_and_sigmas_make_the_covariance(calibration):

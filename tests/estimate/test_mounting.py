@@ -14,9 +14,15 @@ from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.estimate import estimate_mounting
-from mlscorr.estimate.mounting import georeferenced_anew, prior_sigma
+from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.evaluate.scores import misclosures
-from mlscorr.frames import attitude_from_angles, georeference, mounting_partials, to_scanner
+from mlscorr.frames import (
+    attitude_from_angles,
+    georeference,
+    georeferenced_anew,
+    mounting_partials,
+    to_scanner,
+)
 from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.io.survey_file import read_survey_file
 from mlscorr.pipeline.calibration import warn_of_scanners
@@ -105,7 +111,7 @@ class Site:
         return Matched.by_name(self.observations, self.control)
 
     def calibrate(self):
-        return estimate_mounting(self.recorded, RECORDED, self.matched)
+        return estimate_mounting(self.recorded, [RECORDED], self.matched)
 
 
 def waves(rng, gps_time):
@@ -287,7 +293,7 @@ def test_targets_of_one_epoch_are_refused():
     site = Site(8)
     near = replace(site.observations[[0, 1, 2, 3]], gps_time=START + 9.0 + 0.1 * np.arange(4))
     with pytest.raises(ValueError, match=r"All 4 control points were seen within 0.30 s"):
-        estimate_mounting(site.recorded, RECORDED, Matched.by_name(near, site.control))
+        estimate_mounting(site.recorded, [RECORDED], Matched.by_name(near, site.control))
 
 
 SURVEY = """\
@@ -470,11 +476,10 @@ def test_a_measured_lever_arm_is_a_prior():
     tape = np.append(np.full(3, 1e-3), np.full(3, np.nan))
     measured = replace(RECORDED, lever_arm=true, measured=tape)
     assert np.array_equal(prior_sigma(measured)[3:], prior_sigma(RECORDED)[3:])
-    moved = georeferenced_anew(
-        site.recorded, (RECORDED, measured), site.observations.position, site.observations.gps_time
-    )
+    seen = site.observations.position, site.observations.gps_time, np.zeros(len(site.observations))
+    moved = georeferenced_anew(site.recorded, [RECORDED], [measured], *seen)
     matched = Matched.by_name(replace(site.observations, position=moved), site.control)
-    calibration = estimate_mounting(site.recorded, measured, matched)
+    calibration = estimate_mounting(site.recorded, [measured], matched)
     assert np.abs(calibration.lsc.correction[:3]).max() < 3e-3  # m
     assert (calibration.lsc.sigma[:3] <= 1.01e-3).all()
     assert (calibration.lsc.sigma < free.lsc.sigma).all()

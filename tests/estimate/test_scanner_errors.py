@@ -36,7 +36,7 @@ def calibrated(seed, ranges=0.0, scale=0.0):
     "Site, calibrations of 16 targets and 30 ties without and with the scanner's own errors"
     site = tied_site(seed, targets=16, number=30)
     matched, ties = distorted(site, ranges, scale)
-    alone = estimate_mounting(site.trajectory, RECORDED, matched)
+    alone = estimate_mounting(site.trajectory, [RECORDED], matched)
     tied = calibration_with_ties(alone, matched, ties)
     return site, tied, with_scanner_errors(tied, matched)
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import calibration_with_ties, estimate_mounting
-from mlscorr.estimate.mounting import corrected_mounting, linearized
+from mlscorr.estimate.mounting import linearized
+from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.estimate.tied_mounting import georeferenced_ties
 from tests.beds.tied_site import RECORDED, tied_site
 
@@ -19,7 +20,7 @@ def site():
 
 @pytest.fixture(scope="module")
 def alone(site):
-    return estimate_mounting(site.trajectory, RECORDED, site.matched)
+    return estimate_mounting(site.trajectory, [RECORDED], site.matched)
 
 
 @pytest.fixture(scope="module")
@@ -55,12 +56,13 @@ def test_ties_tell_nothing_of_a_difference_between_coordinates(alone, tied):
 def test_partials_are_what_a_changed_mounting_does_to_the_misclosure(site, alone):
     "Differences of georeferenced misclosures by each component agree with a tie's row of A"
     equations, step = alone.equations, 1e-4
-    about = georeferenced_ties(equations, (RECORDED, RECORDED), site.ties)
+    about = georeferenced_ties(equations, [RECORDED], [RECORDED], site.ties)
     for axis in range(6):
         ends = [
             georeferenced_ties(
                 equations,
-                (RECORDED, corrected_mounting(RECORDED, sign * step * np.eye(6)[axis])),
+                [RECORDED],
+                [corrected_mounting(RECORDED, sign * step * np.eye(6)[axis])],
                 site.ties,
             ).misclosure
             for sign in (1, -1)
@@ -71,8 +73,8 @@ def test_partials_are_what_a_changed_mounting_does_to_the_misclosure(site, alone
 
 def test_columns_beyond_the_mounting_are_zero_for_ties(site, alone):
     "With a difference between coordinates as trend, ties have rows of nine columns, three of zero"
-    equations = linearized(alone.equations, site.matched, RECORDED, np.zeros(6))[1]
-    ties = georeferenced_ties(equations, (RECORDED, RECORDED), site.ties)
+    equations = linearized(alone.equations, site.matched, [RECORDED], np.zeros(6))[1]
+    ties = georeferenced_ties(equations, [RECORDED], [RECORDED], site.ties)
     shift = np.tile(np.eye(3), (len(equations.gps_time), 1, 1))
     wider = replace(equations, mounting=np.concatenate([equations.mounting, shift], axis=2))
     rows = ties.rows(alone.parameters[0][0], wider.pose_design)

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.estimate import estimate_correction, place_control, scanner_warnings, with_ties
-from mlscorr.estimate.mounting import corrected_mounting, georeferenced_anew
+from mlscorr.estimate.mounting_estimate import corrected_mounting
+from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import Mounting
 from tests.beds.tied_passes import LENGTH, NOISE, ORIGIN, SPEED, START, drift, tied_passes
 
@@ -26,8 +27,9 @@ def seen_twice(survey, lacks):
     place = np.column_stack([SPEED * first, across, 5 * rng.random(NUMBER)])
     normal = np.eye(3)[rng.integers(3, size=NUMBER)]
     views = np.stack([ORIGIN + place - drift(t - START, SEED) for t in times.T], axis=1)
-    pair = corrected_mounting(RIGHT, lacks), RIGHT
-    views[:, 1] = georeferenced_anew(survey.trajectory, pair, views[:, 1], times[:, 1])
+    pair = [corrected_mounting(RIGHT, lacks)], [RIGHT]
+    seen = views[:, 1], times[:, 1], np.zeros(NUMBER)
+    views[:, 1] = georeferenced_anew(survey.trajectory, *pair, *seen)
     views[:, 1] += NOISE * rng.standard_normal((NUMBER, 1)) * normal
     return replace(
         survey.ties[np.arange(NUMBER) % len(survey.ties)],

@@ -12,7 +12,7 @@ import pytest
 
 import mlscorr
 from mlscorr.correction import Correction
-from mlscorr.estimate.mounting import corrected_mounting
+from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.io.las import count_sources, read_chunks
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.survey_copy import write_survey_copy

@@ -14,7 +14,7 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.correction import PointSigma
 from mlscorr.estimate import believed_correction
-from mlscorr.estimate.mounting import corrected_mounting
+from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.calibration import CalibratedScanners

@@ -35,7 +35,7 @@ def test_a_wall_that_is_passed_keeps_its_direction():
     "A heading wrong by 3 deg shifts a wall along the way, and turns none; corrected, none turns"
     features = scanned_wrong([0.0, 0.0, 3.0])
     is_wall = np.abs(features.direction[:, 1]) > 0.95
-    corrected = remounted(features, street.trajectory(), wrong([0.0, 0.0, 3.0]), TRUE)
+    corrected = remounted(features, street.trajectory(), [wrong([0.0, 0.0, 3.0])], [TRUE])
     for direction in (features.direction[is_wall], corrected.direction[is_wall]):
         assert np.degrees(np.abs(np.median(direction[:, 0]))) < 0.1
 
@@ -45,7 +45,7 @@ def test_paint_turns_with_the_mounting():
     survey, rng = road.survey(), np.random.default_rng(1)
     clouds = [road.cloud(number, rng) for number in (0, 1)]
     features = scanned_wrong([1.0, 4.0, 2.0], survey, clouds)
-    corrected = remounted(features, survey.trajectory, wrong([1.0, 4.0, 2.0]), TRUE)
+    corrected = remounted(features, survey.trajectory, [wrong([1.0, 4.0, 2.0])], [TRUE])
     way = road.turned(np.eye(3)[:1], 70.0)[0] - road.ORIGIN
     left = np.cross([0.0, 0.0, 1.0], way)
     for kind, axis in (("line", left), ("dash", way)):
@@ -63,7 +63,7 @@ def test_degrees_are_found_from_planes():
     lacks = [0.0, -3.0, 2.0]  # about up a scan plane straight across tells little
     features = scanned_wrong(lacks)
     sigma = np.full(len(features), 0.01)
-    found = coarse_mounting(features, street.trajectory(), wrong(lacks), sigma, 5.0)
+    (found,) = coarse_mounting(features, street.trajectory(), [wrong(lacks)], sigma, 5.0)
     left = np.degrees((TRUE.boresight * found.boresight.inv()).as_rotvec())
     assert np.abs(left[:2]).max() < 0.02
     assert found.covariance is KNOWN
@@ -74,7 +74,7 @@ def test_one_pass_leaves_the_mounting_as_it_was():
     features = street.features(1, 1)
     sigma = np.full(len(features), 0.01)
     start = wrong([1.0, 0.0, 0.0])
-    found = coarse_mounting(features, street.trajectory(1), start, sigma, 5.0)
+    (found,) = coarse_mounting(features, street.trajectory(1), [start], sigma, 5.0)
     assert np.allclose(found.boresight.as_rotvec(), start.boresight.as_rotvec(), atol=1e-9)
 
 
