@@ -13,6 +13,9 @@ from mlscorr.frames import (
     attitude_from_angles,
     from_polar,
     georeference,
+    georeferenced_anew,
+    mounting_partials,
+    partials_by_scanner,
     pose_partials,
     scanner_position,
     skew,
@@ -87,6 +90,30 @@ def test_the_inverse_returns_the_scanner_coordinates():
     gps_time, scanner = START + rng.uniform(0, 19.9, 5000), rng.uniform(-80, 80, (5000, 3))
     xyz = georeference(trajectory, MOUNTING, scanner, gps_time)
     assert np.abs(to_scanner(trajectory, MOUNTING, xyz, gps_time) - scanner).max() < 1e-6  # m
+
+
+def test_each_scanner_has_its_own_mounting():
+    "Points of two scanners are georeferenced anew, and differentiated, as those of each alone"
+    trajectory, rng = drive(), np.random.default_rng(6)
+    gps_time, xyz = START + rng.uniform(0, 19.9, 200), rng.uniform(-80, 80, (200, 3))
+    xyz += trajectory.position[0]
+    arm = np.array([0.2, 0.1, -0.3])  # m
+    other = Mounting(arm, Rotation.from_rotvec([0.0, 0.02, 0.0]) * MOUNTING.boresight)
+    recorded, mountings = [MOUNTING, other], [other, MOUNTING]
+    scanner = rng.integers(2, size=200)
+    moved = georeferenced_anew(trajectory, recorded, mountings, xyz, gps_time, scanner)
+    numbered = dict(enumerate(mountings))
+    partials = partials_by_scanner(mounting_partials, trajectory, numbered, xyz, gps_time, scanner)
+    assert partials.shape == (200, 3, 12)
+    for number in (0, 1):
+        rows = scanner == number
+        seen = to_scanner(trajectory, recorded[number], xyz[rows], gps_time[rows])
+        alone = georeference(trajectory, mountings[number], seen, gps_time[rows])
+        assert np.array_equal(moved[rows], alone)
+        its = mounting_partials(trajectory, mountings[number], xyz[rows], gps_time[rows])
+        columns = slice(6 * number, 6 * number + 6)
+        assert np.array_equal(partials[rows][:, :, columns], its)
+        assert not partials[~rows][:, :, columns].any()
 
 
 def test_skew_is_the_cross_product():

@@ -179,6 +179,26 @@ class Calibration(Summary):
         """That of the first scanner."""
         return self.corrections_with_drift[0]
 
+    def fit_sigma(self, number: int) -> float | None:
+        """How far apart the first scanner and another put what both saw on one pass. Units: m.
+
+        One sigma by what is open of both mountings: double walls of that size are to be expected.
+        None where nothing ties them. A boresight that no such wall shows takes no part.
+
+        Parameters
+        ----------
+        number : int
+            Of the other scanner, from 1.
+        """
+        if self.ties is None or self.equations.ties is None:
+            return None
+        ties = self.ties.ties[self.ties.used]
+        first, last = self.trajectory.segment(ties.gps_time.ravel()).reshape(-1, 2).T
+        is_both = (np.sort(ties.scanner) == [0, number]).all(axis=1) & (first == last)
+        rows = self.equations.ties.mounting[is_both]
+        variance = np.einsum("ni,ij,nj->n", rows, self.lsc.covariance, rows)
+        return float(np.sqrt(variance.mean())) if len(rows) else None
+
     def of(self, number: int, scanner: np.ndarray) -> Calibration:
         """The calibration of a scanner, with the POS error by all of them.
 

@@ -183,8 +183,12 @@ class CalibratedScanners(Summary):
             "name": self.survey.name,
             "scanners": {n: part.report(with_drift) for n, part in self.by_scanner.items()},
             "relative": {
-                name: {"beside": first} | estimate_section(*self.calibration.lsc.beside_first(i))
-                for i, name in enumerate(others, start=1)
+                name: {
+                    "beside": first,
+                    **estimate_section(*self.calibration.lsc.beside_first(number)),
+                    "fit_sigma": self.calibration.fit_sigma(number),
+                }
+                for number, name in enumerate(others, start=1)
             },
             "ties": misfit_section(self.calibration.ties),
             "warnings": list(self.calibration.shared_warnings),

@@ -63,17 +63,22 @@ def scanners_screen(content: dict[str, Any]) -> dict[str, object]:
 
 def _relative(content) -> Iterator[Statement]:
     """How well it is known how each further scanner stands beside the first."""
-    limit = SETTINGS.determined_sigma[0], float(np.degrees(SETTINGS.determined_sigma[1]))
     for name, row in content["relative"].items():
+        first, fit = row["beside"], row["fit_sigma"]
         arm, turn = (row[part]["sigma"] for part in PARTS)
+        both = f"No wall that scanners {first} and {name} both saw holds them."
+        if fit is not None:
+            both = (
+                f"Scanners {first} and {name} put a wall that both saw in one place to "
+                f"{millimetres(fit)} mm."
+            )
         sentence = (
-            f"Scanner {name} stands beside scanner {row['beside']} to "
-            f"{'/'.join(map(millimetres, arm))} mm right/forward/up and "
-            f"{'/'.join(f'{sigma:.3f}' for sigma in turn)} deg about them (one sigma). As much as "
-            "that, walls that both see may look double."
+            f"{both} Scanner {name} beside scanner {first}: lever arm to "
+            f"{'/'.join(map(millimetres, arm))} mm right/forward/up, boresight to "
+            f"{'/'.join(f'{sigma:.3f}' for sigma in turn)} deg about them (one sigma)."
         )
-        is_known = max(arm) < limit[0] and max(turn) < limit[1]
-        yield Statement("Both together", "green" if is_known else "amber", sentence)
+        is_held = fit is not None and fit < SETTINGS.determined_sigma[0]
+        yield Statement("Both together", "green" if is_held else "amber", sentence)
 
 
 def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:

@@ -39,7 +39,7 @@ def tied_site(seed, targets=6, number=100, wrong=0.0):
     both directions, a share of which is wrong by decimetres. The position drifts by millimetres.
     """
     rng = np.random.default_rng(seed)
-    true = _drive()
+    true = drive()
     phase = rng.uniform(0, 2 * np.pi, 3)
     turns = 2 * np.pi * (true.gps_time - START)[:, None] / [60.0, 85.0, 110.0] + phase
     recorded = Trajectory(
@@ -62,7 +62,7 @@ def tied_site(seed, targets=6, number=100, wrong=0.0):
     return TiedSite(recorded, matched, ties, LACKS, is_wrong)
 
 
-def _drive():
+def drive():
     "Along a gentle bend, and after a pause the same way back"
     time = np.arange(0.0, LENGTH + 0.05, 0.1)
     heading = 0.7 + 0.1 * np.sin(time / 9.0)
@@ -76,7 +76,7 @@ def _drive():
     )
 
 
-def _places(true, first, rng):
+def places(true, first, rng):
     "Places (n, 3) to both sides of the way, ahead or behind at times (n,), and when seen again"
     n = len(first)
     side = rng.choice([-1.0, 1.0], n) * rng.uniform(4.0, 25.0, n)
@@ -89,7 +89,7 @@ def _places(true, first, rng):
 
 def _matched(true, targets, look, rng):
     first = np.linspace(4.0, LENGTH - 4.0, targets)
-    place, second = _places(true, first, rng)
+    place, second = places(true, first, rng)
     n, times = 2 * targets, START + np.append(first, second)
     seen = look(times, np.vstack([place, place]), NOISE * rng.standard_normal((n, 3)))
     names = tuple(f"T{i}" for i in range(targets))
@@ -102,7 +102,7 @@ def _matched(true, targets, look, rng):
 def _ties(true, is_wrong, look, rng):
     number = len(is_wrong)
     first = rng.uniform(4.0, LENGTH - 4.0, number)
-    place, second = _places(true, first, rng)
+    place, second = places(true, first, rng)
     azimuth = rng.uniform(0, 2 * np.pi, number)
     normal = np.column_stack([np.sin(azimuth), np.cos(azimuth), 0 * azimuth])
     normal[::4] = [0.0, 0.0, 1.0]  # road and pavement

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.correction import Correction
+from mlscorr.correction import Correction, increments_by_scanner
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.survey import Mounting, PointCloud
 from tests.beds.drives import CORNER, MOUNTING, START, cloud_of, drive, with_errors
@@ -104,3 +104,16 @@ def test_trajectories_of_different_epochs_make_no_correction():
     "Recorded and corrected must pair epoch by epoch"
     with pytest.raises(ValueError, match="must have the same epochs"):
         Correction(drive(), drive(step=0.01))
+
+
+def test_points_of_two_scanners_move_by_the_mounting_of_theirs():
+    "Both views of things in one array: each point gets what its scanner's correction adds"
+    recorded, cloud = drive(), cloud_of(drive())
+    new, n = with_errors(recorded), len(cloud) // 2 * 2
+    corrections = [Correction(recorded, new), Correction(recorded, new, MOUNTING, OTHER)]
+    xyz, gps_time = cloud.xyz[:n].reshape(-1, 2, 3), cloud.gps_time[:n].reshape(-1, 2)
+    scanner = np.tile([0, 1], (n // 2, 1))
+    moved = increments_by_scanner(corrections, xyz, gps_time, scanner)
+    for number, correction in enumerate(corrections):
+        alone = correction.increments(xyz[:, number], gps_time[:, number])[0]
+        assert np.array_equal(moved[:, number], alone)

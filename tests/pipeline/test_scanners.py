@@ -1,6 +1,7 @@
 """A survey of two scanners with mountings of their own: files in, corrected and calibrated out."""
 
 import json
+import shutil
 import tomllib
 import warnings
 from dataclasses import replace
@@ -17,11 +18,11 @@ from mlscorr.estimate import believed_correction
 from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.las import read_chunks
-from mlscorr.pipeline.calibration import CalibratedScanners
 from mlscorr.pipeline.tying import tie_passes
 from mlscorr.report.provenance import systems
 from mlscorr.ties import TieCollector
 from tests.beds import scanner_pair
+from tests.beds.documents import undocumented
 
 LACKS = np.array(  # right, forward, up: m and deg, of each scanner's recorded mounting
     [[0.03, -0.02, 0.0, 0.3, -0.3, 0.4], [-0.02, 0.0, 0.0, -0.4, 0.2, -0.3]]
@@ -69,19 +70,87 @@ def corrected(commanded, tmp_path_factory):
     return result, out
 
 
-def test_each_scanner_is_calibrated_by_what_it_saw(commanded):
+@pytest.fixture(scope="module")
+def together(site, tmp_path_factory):
+    "With what two passes and two scanners both saw, and the drift: the folder, what is said"
+    out = tmp_path_factory.mktemp("together") / "out"
+    with warnings.catch_warnings(action="ignore"):
+        done = CliRunner().invoke(app, ["calibrate", str(site), "-o", str(out), "--with-drift"])
+    assert done.exit_code == 0, done.output
+    return out, done.output
+
+
+@pytest.mark.parametrize("name", ["commanded", "together"])
+def test_both_scanners_are_calibrated(name, request):
     "Two boresights and lever arms are found within 3 sigmas, each in a line and in the document"
-    out, said = commanded
+    out, said = request.getfixturevalue(name)
     content = json.loads((out / "calibration.json").read_text())
     assert list(content["scanners"]) == ["1", "2"]
-    for (name, part), lacks in zip(content["scanners"].items(), LACKS, strict=True):
+    assert undocumented(content) == {"1", "2"}  # the names of the scanners
+    for (scanner, part), lacks in zip(content["scanners"].items(), LACKS, strict=True):
         lsc = part["lsc"]
         for key, truth in (("lever_arm", lacks[:3]), ("boresight", lacks[3:])):
             error = np.array(lsc[key]["correction"]) - truth
             assert (np.abs(error) < 3 * np.array(lsc[key]["sigma"])).all()
             assert max(lsc[key]["sigma"]) < (0.05 if key == "lever_arm" else 0.5)  # m, deg
         assert {"lsc", "ls", "determined", "targets", "mounting"} <= set(part)
-        assert f"Scanner {name} lacks" in said
+        assert f"Scanner {scanner} lacks" in said
+
+
+def test_what_both_scanners_saw_tells_the_one_beside_the_other(together, commanded):
+    "Lever arm to 3 mm, better than by targets that both saw, and walls in one place to 3 mm"
+    rows = [
+        json.loads((out / "calibration.json").read_text()) for out in (together[0], commanded[0])
+    ]
+    tied, targets = (content["relative"]["2"] for content in rows)
+    assert tied["beside"] == "1" and targets["fit_sigma"] is None
+    error = np.array(tied["lever_arm"]["correction"]) - (LACKS[1] - LACKS[0])[:3]
+    assert np.abs(error).max() < 0.003  # m
+    for part in ("lever_arm", "boresight"):
+        assert max(tied[part]["sigma"]) < 0.8 * max(targets[part]["sigma"])
+    assert tied["fit_sigma"] < 0.003  # m
+    pairs = [row["scanners"] for row in rows[0]["ties"]["pairs"]]
+    assert [1, 1] in pairs and [2, 2] in pairs and [1, 2] in pairs
+    assert "Scanners 1 and 2 put a wall that both saw in one place to" in together[1]
+
+
+def test_one_trajectory_is_written_by_all_scanners(site, together):
+    "trajectory.csv with sigmas; both scanners' check points are scored with the same drift"
+    out, _ = together
+    recorded = mlscorr.read_survey(site).trajectory
+    columns = np.genfromtxt(out / "trajectory.csv", delimiter=",", names=True)
+    assert np.allclose(columns["gps_time"], recorded.gps_time)
+    assert 0 < columns["sigma_easting"].max() < 0.05  # m
+    content = json.loads((out / "calibration.json").read_text())
+    first, second = (part["with_drift"] for part in content["scanners"].values())
+    assert first["position_rms"] == second["position_rms"]
+    assert max(second["control"]["after"]["rmse"]) < 0.03  # m
+    written = mlscorr.read_survey(out)
+    for scanner, part in zip(written.scanners, content["scanners"].values(), strict=True):
+        calibrated = part["mounting"]["calibrated"]["lever_arm"]
+        assert np.allclose(scanner.mounting.lever_arm, calibrated, rtol=0, atol=1e-5)  # m
+
+
+@pytest.fixture
+def thinned(site, tmp_path):
+    "The street with a second scanner that has 200 points of it in all"
+    folder = shutil.copytree(site, tmp_path / "thin")
+    for name in ("pass-1-scanner-2.laz", "pass-2-scanner-2.laz"):
+        las = laspy.read(folder / name)
+        las.points = las.points[np.arange(0, len(las), len(las) // 100)]
+        las.write(folder / name)
+    return mlscorr.read_survey(folder)
+
+
+@pytest.mark.parametrize(
+    ("ties", "fault"), [(True, r"has nothing to calibrate with: 0 con"), (False, r"0 control poi")]
+)
+def test_a_scanner_that_nothing_tells_is_named(thinned, ties, fault):
+    "200 points show no target and no plane: the sentence has its name, and what to drive"
+    with warnings.catch_warnings(action="ignore"), pytest.raises(ValueError, match=fault) as raised:
+        mlscorr.calibrate(thinned, ties=ties)
+    assert str(raised.value).startswith("Scanner 2: ")
+    assert "both sides of the way, near and far" in str(raised.value)
 
 
 def test_the_written_survey_has_each_calibrated_mounting(survey, commanded, corrected):
@@ -157,15 +226,10 @@ def test_two_scanners_tie_a_pass_to_itself(commanded):
 
 
 def test_what_takes_one_scanner_says_so(survey):
-    "Diagnosis, plan and a drift for each scanner refuse several, with the way out"
+    "Diagnosis and plan refuse two scanners, with the way out"
     for command, verb in ((mlscorr.diagnose, "a diagnosis"), (mlscorr.plan, "a plan")):
         with pytest.raises(ValueError, match=rf"2 scanners \(1, 2\), and {verb} rests on one"):
             command(survey)
-    calibrated = CalibratedScanners(survey, {"1": None, "2": None})
-    with pytest.raises(
-        ValueError, match=r"Calibrate without --with-drift, and run mlscorr correct"
-    ):
-        calibrated.write("nowhere", with_drift=True)
 
 
 def test_a_scanner_without_a_mounting_is_named(survey):

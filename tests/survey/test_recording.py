@@ -61,3 +61,13 @@ def test_rows_are_parted_by_scanner():
     assert right.tolist() == [True, False, False]
     ((survey, rows),) = SURVEY.rows_by_scanner(scanner)
     assert survey is SURVEY and len(scanner[rows]) == 3
+
+
+def test_other_mountings_are_those_of_the_scanners_in_their_order():
+    "One survey keeps its one, two scanners get one each; all else stays"
+    survey, arms = with_scanners(), [replace(MOUNTING, lever_arm=np.full(3, i)) for i in (2.0, 3.0)]
+    changed = survey.with_mountings(arms)
+    assert changed.mountings == tuple(arms) and changed.scanners[0].clouds == CLOUDS[1:]
+    assert survey.mountings[1] is None
+    assert SURVEY.mountings == (MOUNTING,)
+    assert SURVEY.with_mountings(arms[:1]).mounting is arms[0]

@@ -86,3 +86,11 @@ def test_frozen_nouns_are_not_changed():
     points = surveyed("T1")
     moved = replace(points, position=points.position + 1.0)
     assert np.array_equal(points.position[0], CORNER) and moved.position[0, 2] == 41.0  # m
+
+
+def test_observations_are_of_the_first_scanner_unless_another_is_named():
+    "The number of the scanner follows its row"
+    matched = Matched.by_name(observed("T2", "T1"), surveyed("T1", "T2"))
+    assert matched.scanner.tolist() == [0, 0]
+    named = replace(matched, scanner=np.array([1, 2]))
+    assert named[[1, 0]].scanner.tolist() == [2, 1]
