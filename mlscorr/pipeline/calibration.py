@@ -215,6 +215,6 @@ def warn_of_scanners(survey: Survey) -> None:
                 f"{name} and {other} were measured at the same time for {overlap:.1f} s. If two "
                 "scanners did so, name them as [[scanner]], each with its files and its mounting: "
                 "these files are taken to be of one.",
-                stacklevel=4,
+                stacklevel=3,
             )
             return

@@ -177,8 +177,10 @@ def _ties(content) -> Iterator[Statement]:
     ties = content["ties"]
     if ties is not None and ties["used"]:
         before, after = (length_in_words(ties[state]["median"]) for state in ("before", "after"))
+        is_between = any(len(set(row["scanners"])) > 1 for row in ties["pairs"])
+        views = "two passes, or two scanners of one," if is_between else "two passes"
         sentence = (
-            f"{ties['used']} of {ties['n']} places that two passes both saw are used: {before} "
+            f"{ties['used']} of {ties['n']} places that {views} both saw are used: {before} "
             f"apart before, {after} after (median)."
         )
         yield Statement("Two passes", "green", sentence)

@@ -2,7 +2,11 @@
 
 from dataclasses import replace
 
-from mlscorr.report.calibration_page import calibration_page, calibration_screen
+from mlscorr.report.calibration_page import (
+    calibration_page,
+    calibration_screen,
+    scanners_screen,
+)
 from tests.beds.reports import drive, fabricate, score_of, words
 
 MOUNTING = {"lever_arm": [0.1, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0]}
@@ -67,9 +71,48 @@ def test_a_scanner_that_is_off_is_amber():
         assert (row["rating"], row["sentence"]) == (rating, sentence + end)
 
 
+def calibrated_together(fit=0.0018):
+    "Content of calibration.json of a left and a right scanner, which fit each other to as much (m)"
+    misfit = {"median": 0.02, "rms": 0.03}
+    pair = {"passes": [1, 2], "scanners": [1, 2], "n": 90, "used": 80, "before": misfit}
+    ties = {
+        "n": 90,
+        "used": 80,
+        "before": misfit,
+        "after": misfit,
+        "pairs": [pair | {"after": misfit}],
+    }
+    sigma = {"lever_arm": [0.0003, 0.0013, 0.0004], "boresight": [0.016, 0.008, 0.033]}
+    parts = {name: {"correction": [0.0, 0.0, 0.0], "sigma": sigma[name]} for name in sigma}
+    content = {
+        "scanners": {"left": calibrated() | {"ties": ties}, "right": calibrated() | {"ties": ties}},
+        "relative": {"right": {"beside": "left", **parts, "fit_sigma": fit}},
+        "ties": ties,
+        "warnings": [],
+    }
+    return content | scanners_screen(content)
+
+
 def test_each_scanner_has_its_part():
-    "Two scanners: two first screens, two rows of tables, under their names"
-    scanners = {"left": calibrated(), "right": calibrated()}
-    html = calibration_page({"name": "site", "scanners": scanners}).html()
-    assert html.count('class="verdict') == 2
-    assert html.count("Scanner left") == html.count("Scanner right") == 6
+    "Two scanners: their screens, rows of tables under their names, and first what they share"
+    html = calibration_page({"name": "site", **calibrated_together()}).html()
+    assert html.count('class="verdict') == 3
+    text = words(html)
+    assert text.count("Scanner left") == 6
+    assert "1 and 2, scanners left and right" in text
+    assert text.index("right beside left") > text.index("Scanner right beside scanner left")
+
+
+def test_how_well_scanners_fit_each_other_comes_first():
+    "Double walls in mm, then sigmas; amber where nothing that both saw holds them, or not to 2 cm"
+    content = calibrated_together()
+    sentence = (
+        "Scanners left and right put a wall that both saw in one place to 1.8 mm. Scanner right "
+        "beside scanner left: lever arm to 0.3/1.3/0.4 mm right/forward/up, boresight to "
+        "0.016/0.008/0.033 deg about them (one sigma)."
+    )
+    assert content["statements"][0]["sentence"] == sentence
+    assert [content["rating"], calibrated_together(0.03)["rating"]] == ["green", "amber"]
+    lonely = calibrated_together(None)["statements"][0]
+    assert lonely["rating"] == "amber"
+    assert lonely["sentence"].startswith("No wall that scanners left and right both saw holds them")

@@ -10,7 +10,7 @@ from mlscorr.report.gap import diagnosis_page, plan_page
 from tests.beds.browser import browse, need_browser
 from tests.beds.gap_documents import KINDS, plan_document
 from tests.beds.reports import drive, fabricate, page
-from tests.report.test_calibration_page import calibrated
+from tests.report.test_calibration_page import calibrated, calibrated_together
 from tests.report.test_comparison_page import fake
 
 PAPER = {"compare": 1031}  # px: A4 lying, without its margins; the others stand
@@ -106,6 +106,7 @@ def opened(tmp_path_factory):
     htmls = {
         "correct": page(folder, *fabricate(drive(), 24)),
         "calibrate": calibration_page({"name": "site", **content}).html(),
+        "scanners": calibration_page({"name": "site", **calibrated_together()}).html(),
         "diagnose": diagnosis_page(KINDS["effect"](), "street").html(),
         "plan": plan_page(plan_document(), "street").html(),
     }
