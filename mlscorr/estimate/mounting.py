@@ -214,10 +214,10 @@ def linearized(
         Lever arm and rotation of each. Units: m and rad.
     """
     mountings = corrected_mountings(recorded, correction)
-    seen = matched.observations
-    place = seen.position, matched.gps_time, matched.scanner
+    observed = matched.observations
+    place = observed.position, matched.gps_time, matched.scanner
     position = georeferenced_anew(equations.trajectory, recorded, mountings, *place)
-    moved = replace(matched, observations=replace(seen, position=position))
+    moved = replace(matched, observations=replace(observed, position=position))
     weak = _weak(recorded)
     return mountings, mounting_equations(equations, moved, mountings, correction, weak)
 

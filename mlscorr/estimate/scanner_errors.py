@@ -62,9 +62,9 @@ def _columns(calibration, targets):
     equations, mountings = calibration.equations, calibration.lsc.mountings
     trajectory, numbered = equations.trajectory, dict(enumerate(mountings))
 
-    def partials(place, *seen):
-        place = georeferenced_anew(trajectory, calibration.recorded, mountings, place, *seen)
-        return partials_by_scanner(scanner_partials, trajectory, numbered, place, *seen)
+    def partials(place, *sighting):
+        place = georeferenced_anew(trajectory, calibration.recorded, mountings, place, *sighting)
+        return partials_by_scanner(scanner_partials, trajectory, numbered, place, *sighting)
 
     number = len(SCANNER_COMPONENTS) * len(mountings)
     control = np.zeros((*equations.misclosure.shape, number))

@@ -136,16 +136,16 @@ def tie_mounting(
     corrections = mounted_corrections(drift, recorded, start)
     sigma = np.hypot(sigma, SETTINGS.roughest)
     radius = min(widest_gate(sigma), survey.search_radius)
-    seen = features.centre, features.gps_time, features.scanner
+    sightings = features.centre, features.gps_time, features.scanner
     while True:
-        moved = increments_by_scanner(corrections, *seen)
+        moved = increments_by_scanner(corrections, *sightings)
         turned = turned_directions(features, _move(corrections, features.scanner))
         pairs = pair_features(features, moved, sigma, radius, turned=turned)
         ties = agreeing_ties(pairs, moved)
         if len(ties) == 0:
             return calibration
         corrections = previewed_mounting(calibration, matched, ties)
-        moved = increments_by_scanner(corrections, *seen)
+        moved = increments_by_scanner(corrections, *sightings)
         limit = narrowest_gate(ties, moved)
         if radius <= limit:
             return calibration_with_ties(calibration, matched, ties)

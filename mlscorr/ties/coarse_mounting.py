@@ -96,8 +96,8 @@ def remounted(
     """
 
     def move(place, gps_time):
-        seen = place, gps_time, features.scanner
-        return georeferenced_anew(trajectory, recorded, mountings, *seen)
+        sightings = place, gps_time, features.scanner
+        return georeferenced_anew(trajectory, recorded, mountings, *sightings)
 
     centre = move(features.centre, features.gps_time)
     return replace(features, centre=centre, direction=turned_directions(features, move))
@@ -140,8 +140,8 @@ def _design(features, trajectory, mountings, passes, pairs, normal):
     number = np.searchsorted(passes, features.pass_number[pairs])
     for view, sign in ((0, 1.0), (1, -1.0)):
         columns = features.centre, features.gps_time, features.scanner
-        seen = (column[pairs[:, view]] for column in columns)
-        partials = partials_by_scanner(mounting_partials, trajectory, numbered, *seen)
+        sightings = (column[pairs[:, view]] for column in columns)
+        partials = partials_by_scanner(mounting_partials, trajectory, numbered, *sightings)
         along = np.einsum("ni,nij->nj", normal, partials)
         rows[:, :first] += sign * along.reshape(len(pairs), first, 3)
         rows[np.arange(len(pairs)), first + number[:, view]] += sign * normal
