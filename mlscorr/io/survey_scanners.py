@@ -148,5 +148,5 @@ def scanner_notes(scanners: tuple[MountedScanner, ...]) -> list[str]:
     )
     return [
         f"The survey has {len(scanners)} scanners: {wrote}. Whether ties tell of a wrong mounting "
-        "is tested for one scanner only: mlscorr calibrate takes each in turn."
+        "is tested for one scanner only: mlscorr calibrate estimates those of all."
     ]

@@ -191,3 +191,14 @@ def test_one_scanner_may_have_several_ids(merged, tmp_path):
     (folder / "survey.toml").write_text(text)
     survey = mlscorr.read_survey(folder)
     assert survey.scanners == () and survey.clouds[0].point_source_ids is None
+
+
+def test_scanners_of_one_file_are_calibrated_as_those_of_two(apart, merged):
+    "Targets, planes and poles of each scanner by its ids: both mountings to 1e-7 of m and rad"
+    with warnings.catch_warnings(action="ignore"):  # six seconds tell little
+        two, one = (mlscorr.calibrate(mlscorr.read_survey(folder)) for folder in (apart, merged))
+    assert one.calibration.ties.used.sum() > 50
+    for expected, part in zip(two.by_scanner.values(), one.by_scanner.values(), strict=True):
+        assert len(part.matched_control) == len(expected.matched_control) > 3
+        change = part.calibration.lsc.correction - expected.calibration.lsc.correction
+        assert np.abs(change).max() < 1e-7  # m, rad
