@@ -80,24 +80,18 @@ def estimate_site(
         replace(part, scanner=np.array([of_pass[n] for n in part.observations.pass_number], int))
         for part in (control, check)
     )
-    faults = {name: control_fault(control, i) for i, name in enumerate(survey.by_scanner)}
-    if not ties and any(faults.values()):
-        _refuse(next((name, fault) for name, fault in faults.items() if fault))
-    estimate = believed_mounting if all(faults.values()) else estimate_mounting
+    faults = [control_fault(control, number) for number in range(len(survey.mountings))]
+    estimate = believed_mounting if all(faults) else estimate_mounting
     calibration = estimate(survey.trajectory, survey.mountings, control, survey.pos)
     if ties:
         calibration = tie_mounting(survey, calibration, control, collector.features())
-    for number, name in enumerate(faults):
-        if faults[name] and not _is_tied(calibration, number):
-            count = len(set(np.array(control.name)[control.scanner == number]))
-            _refuse((name, " ".join([NOTHING_CALIBRATES.format(survey.path, count), *notes])))
+    for number, (name, fault) in enumerate(zip(survey.by_scanner, faults, strict=True)):
+        if fault and not _is_tied(calibration, number):
+            count = len(set(control[control.scanner == number].name))
+            untied = " ".join([NOTHING_CALIBRATES.format(survey.path, count), *notes])
+            sentence = untied if ties else fault
+            raise ValueError(f"Scanner {name}: {sentence}" if name else sentence)
     return control, check, finding, with_scanner_errors(calibration, control)
-
-
-def _refuse(fault):
-    """Raise a sentence on a scanner, with its name where there are several."""
-    name, sentence = fault
-    raise ValueError(f"Scanner {name}: {sentence}" if name else sentence)
 
 
 def _is_tied(calibration, number):

@@ -78,7 +78,7 @@ def _relative(content) -> Iterator[Statement]:
             f"{'/'.join(f'{sigma:.3f}' for sigma in turn)} deg about them (one sigma)."
         )
         is_held = fit is not None and fit < SETTINGS.determined_sigma[0]
-        yield Statement("Both together", "green" if is_held else "amber", sentence)
+        yield Statement("Together", "green" if is_held else "amber", sentence)
 
 
 def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
