@@ -25,7 +25,7 @@ def test_the_section_counts_and_measures_what_was_given():
     assert reason == {"n": 0, "used": 0, "reason": "Nothing was scanned twice."}
     section = tie_section(with_ties(alone, survey.ties))
     assert section["n"] == 300
-    assert section["kinds"] == {"plane": 300, "pole": 0}
+    assert section["kinds"] == {"plane": 300, "pole": 0, "line": 0, "dash": 0}
     (row,) = section["pairs"]
     assert row["passes"] == [1, 2]
     assert row["used"] == section["used"] <= row["n"] == 300
