@@ -23,7 +23,8 @@ def pair_features(
     A feature has at most one partner in each other pass of each scanner, and one in its own at
     another visit: the nearest whose direction is parallel, each the other's. Two passes have none
     in a direction in which more than half as many pair when they are displaced by two gates: those
-    would be by chance. Call it again with a better correction, smaller sigma, radius and angle.
+    would be by chance; and paint has none where the next lane's is near enough to be taken for it.
+    Call it again with a better correction, smaller sigma, radius and angle.
 
     Parameters
     ----------
