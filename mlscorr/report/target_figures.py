@@ -120,11 +120,11 @@ def _legend():
 
 def _draw(axes, target):
     """Points in the plane, outline, centre and its covariance; up is up, seen by the scanner."""
-    view = target.view
+    view, outline = target.view, target.view.outline
     turn = _upright(target) * 100.0  # cm
-    points = (view.points - view.centre) @ turn.T
+    points = (view.points - outline.centre) @ turn.T
     is_round = target.kind in ("circle", "hole")
-    half = 75.0 * view.outline * (1.0 if is_round else 1.15)  # cm: its board and what is beside it
+    half = 75.0 * outline.size * (1.0 if is_round else 1.15)  # cm: its board and what is beside it
     within = np.abs(points).max(axis=1) < half
     rows = np.flatnonzero(within)
     # so many make a figure of some 20 kB
@@ -134,7 +134,7 @@ def _draw(axes, target):
         axes.plot(*points[rows[names == name]].T, linestyle="", **MARKS[name])
     for patch in _outline(target, turn):
         axes.add_patch(patch)
-    axes.add_patch(_ellipse(turn @ view.covariance @ turn.T))
+    axes.add_patch(_ellipse(turn @ outline.covariance @ turn.T))
     axes.plot(0.0, 0.0, "+", color=BLUE, markersize=8)
     axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
     for axis in (axes.xaxis, axes.yaxis):
@@ -154,13 +154,13 @@ def _upright(target):
 
 def _outline(target, turn):
     """Patches of the fitted outline, (0, 0) its centre."""
-    view, style = target.view, {"fill": False, "edgecolor": BLUE, "linewidth": 1.1}
-    radius = 50.0 * view.outline  # cm
+    outline, style = target.view.outline, {"fill": False, "edgecolor": BLUE, "linewidth": 1.1}
+    radius = 50.0 * outline.size  # cm
     if target.kind in ("circle", "hole"):
-        inner = [Circle((0, 0), radius * view.inner, **style)] if view.inner > 0 else []
+        inner = [Circle((0, 0), radius * outline.inner, **style)] if outline.inner > 0 else []
         return [Circle((0, 0), radius, **style), *inner]
-    cos, sin = np.cos(view.turn), np.sin(view.turn)
-    edges = view.outline / 2 * np.array([[cos, sin], [-sin, cos]]) @ turn.T  # cm, half edges
+    cos, sin = np.cos(outline.turn), np.sin(outline.turn)
+    edges = outline.size / 2 * np.array([[cos, sin], [-sin, cos]]) @ turn.T  # cm, half edges
     corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) @ edges
     crossing = [Polygon([-edge, edge], closed=False, **style) for edge in edges]
     return [Polygon(corners, **style), *(crossing if target.kind == "checkerboard" else [])]

@@ -10,13 +10,14 @@ from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import PointCloud, Scanner
 from mlscorr.targets.echoes import Echoes
 from mlscorr.targets.intensity import why_useless
-from mlscorr.targets.plane import centre_of
+from mlscorr.targets.outline import Outline
+from mlscorr.targets.plane import Centre, centre_of
 from mlscorr.targets.regions import BrightRegion
 from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.seeds import bright_seeds, hole_seeds, plate_seeds, region_seeds
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shape_fit import ShapeFit, exact_fit, rough_fit
-from mlscorr.targets.shapes import BY_EDGES, sides
+from mlscorr.targets.shapes import BY_EDGES
 
 
 @dataclass(frozen=True)
@@ -29,46 +30,26 @@ class TargetView:
         Where the beams near the target crossed its plane.
     state : (k,) int array
         1 bright, 0 dark, -1 went by it.
-    bright : (k,) bool array
-        Whether each tells that it is inside: bright, or on a plate, or through a hole.
-    centre : (2,) array
-    covariance : (2, 2) array
-        Of the centre in the plane. Units: m^2.
-    turn : float
-        Of a square's edges against u. Units: rad.
-    inner : float
-        Diameter of a ring's inner disc over the outer one's, 0 for none.
-    outline : float
-        Fitted diameter or edge, larger than the size where the disc blooms. Units: m.
+    outline : Outline
+        As fitted, larger than the size where the disc blooms.
     axes : (2, 3) array
         Map directions of u and v.
     """
 
     points: np.ndarray
     state: np.ndarray
-    bright: np.ndarray
-    centre: np.ndarray
-    covariance: np.ndarray
-    turn: float
-    inner: float
-    outline: float
+    outline: Outline
     axes: np.ndarray
 
 
 @dataclass(frozen=True)
-class FittedTarget:
+class FittedTarget(Centre):
     """One target in one piece of cloud: what a row of TargetObservations holds, and more.
+
+    Its position is that in the map; its covariance is without the motion of the POS error.
 
     Parameters
     ----------
-    gps_time : float
-        When the scanner passed the centre. Units: s.
-    duration : float
-        Standard deviation of its points' times. Units: s.
-    position, normal : (3,) array
-        Centre (m), and unit normal towards the scanner.
-    covariance : (3, 3) array
-        Of the centre, without the motion of the POS error. Units: m^2.
     kind : str
     size, size_sigma : float
         As given (sigma 0), or estimated. Units: m.
@@ -81,11 +62,6 @@ class FittedTarget:
     view : TargetView
     """
 
-    gps_time: float
-    duration: float
-    position: np.ndarray
-    covariance: np.ndarray
-    normal: np.ndarray
     kind: str
     size: float
     size_sigma: float
@@ -214,29 +190,15 @@ def _as_target(echoes, fit, origin):
     plane, outline = fit.seed.plane, fit.outline
     met = rows[fit.on_target & (rows >= 0)]
     intensity = echoes.intensity[met].astype(float)
-    centre = centre_of(echoes, plane, outline, met)
+    centre = vars(centre_of(echoes, plane, outline, met))
     size, sigma = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)
     return FittedTarget(
-        gps_time=centre.gps_time,
-        duration=centre.duration,
-        position=centre.position + origin,
-        covariance=centre.covariance,
-        normal=centre.normal,
+        **centre | {"position": centre["position"] + origin},
         kind=fit.kind,
         size=float(size),
         size_sigma=float(sigma),
         points=len(met),
         score=fit.assessment.score,
         cloud=PointCloud(echoes.xyz[met] + origin, echoes.gps_time[met], intensity),
-        view=TargetView(
-            points,
-            state,
-            sides(state, fit.kind, fit.seed.by_edges) == 1,
-            outline.centre,
-            outline.covariance,
-            outline.turn,
-            outline.inner,
-            outline.size,
-            plane.axes[:2],
-        ),
+        view=TargetView(points, state, outline, plane.axes[:2]),
     )

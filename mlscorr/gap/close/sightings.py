@@ -116,9 +116,8 @@ def board_of(
     bright, dark, speckle : float
         Intensity of its paints, and their relative noise.
     """
-    view = target.view
-    u, v = view.axes
-    cos, sin = np.cos(view.turn), np.sin(view.turn)
+    outline, (u, v) = target.view.outline, target.view.axes
+    cos, sin = np.cos(outline.turn), np.sin(outline.turn)
     if target.kind == "circle":  # nobody knows how its board is turned: upright
         normal = np.cross(u, v)
         side = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
@@ -131,7 +130,7 @@ def board_of(
         axes=np.vstack([edges, np.cross(*edges)])[None],
         form=np.array([FORMS.index(target.kind)]),
         size=np.array([target.size]),
-        inner=np.array([view.inner]),
+        inner=np.array([outline.inner]),
         bright=np.array([bright]),
         dark=np.array([dark]),
         speckle=np.array([speckle]),

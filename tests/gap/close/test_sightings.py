@@ -10,6 +10,7 @@ from mlscorr.gap.close.sightings import SightedTarget, Sighting, board_of, sight
 from mlscorr.simulate.scan import FORMS, RecordedPulses
 from mlscorr.survey import PointCloud
 from mlscorr.targets.fit import FittedTarget, TargetView
+from mlscorr.targets.outline import Outline
 
 PLACE = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 START = 413_200.0  # s
@@ -22,21 +23,12 @@ SCANNER = PLACE + np.array([8.0, 0.0, 0.0])
 def fitted(kind, turn=TURN, inner=0.0, axes=AXES):
     "A target as the extraction gives it, seen from the east"
     none = np.zeros(0)
-    view = TargetView(
-        np.zeros((0, 2)),
-        none,
-        none.astype(bool),
-        np.zeros(2),
-        1e-6 * np.eye(2),
-        turn,
-        inner,
-        SIZE,
-        axes,
-    )
+    outline = Outline(np.zeros(2), 1e-6 * np.eye(2), turn, SIZE, inner, 0.0, 0.9)
+    view = TargetView(np.zeros((0, 2)), none, outline, axes)
     normal = np.cross(*axes)
     cloud = PointCloud(np.zeros((0, 3)), none, none)
     return FittedTarget(
-        START, 0.01, PLACE, 1e-6 * np.eye(3), normal, kind, SIZE, 0.0, 300, 0.9, cloud, view
+        PLACE, 1e-6 * np.eye(3), START, 0.01, normal, kind, SIZE, 0.0, 300, 0.9, cloud, view
     )
 
 
