@@ -15,8 +15,8 @@ from mlscorr.targets.shapes import (
     CHECKERED,
     MISS,
     ROUND,
+    WHITE,
     distance_inside,
-    distance_on_white,
     form_of,
     sides,
 )
@@ -143,7 +143,7 @@ def _spacing(within, outline, form, kind):
 def _share_of_right_colour(points, state, outline):
     """Share of the beams on a checkerboard whose colour is right, of the worse colour."""
     on_board = (distance_inside(points, outline.row, CHECKERED) > 0) & (state != MISS)
-    white = distance_on_white(points[on_board], outline.row) > 0
+    white = distance_inside(points[on_board], outline.row, WHITE) > 0
     bright = state[on_board] == BRIGHT
     if white.all() or not white.any():
         return 0.0

@@ -123,7 +123,7 @@ def fit_outline(
     inside, marked = shapes.distance_inside(points, mean, form) > 0, side == 1
     if form == shapes.CHECKERED:
         marked &= inside
-        inside &= shapes.distance_on_white(points, mean) > 0
+        inside &= shapes.distance_inside(points, mean, shapes.WHITE) > 0
     return Outline(
         mean[:2],
         covariance[:2, :2],
@@ -200,7 +200,7 @@ def _informative(points, mean, spread, form, width):
     play = np.hypot(spread[0], spread[1]) + turned + spread[3] / 2 + spread[4] + 6 * width
     distance = np.abs(shapes.distance_inside(points, mean, form))
     if form == shapes.CHECKERED:
-        distance = np.minimum(distance, np.abs(shapes.distance_on_white(points, mean)))
+        distance = np.minimum(distance, np.abs(shapes.distance_inside(points, mean, shapes.WHITE)))
     return np.flatnonzero(distance < play)
 
 

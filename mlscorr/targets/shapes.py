@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from mlscorr.targets.settings import SETTINGS
 
 MISS, DARK, BRIGHT = -1, 0, 1  # what a beam did at the plane: went by, met dark, met bright
-ROUND, SQUARE, CHECKERED = range(3)
+ROUND, SQUARE, CHECKERED, WHITE = range(4)  # WHITE: a checkerboard's, endless
 FORMS = {
     "circle": ROUND,
     "hole": ROUND,
@@ -76,16 +76,12 @@ def form_of(kind: str, by_edges: bool) -> int:
 @njit(cache=True)
 def _within(x, y, half, inner, form):
     """Distance (m) inside the outline of a place in the shape's own axes, negative outside."""
+    if form == WHITE:
+        return min(abs(x), abs(y)) if x * y > 0 else -min(abs(x), abs(y))
     if form != ROUND:
         return half - max(abs(x), abs(y))
     radius = np.sqrt(x * x + y * y)
     return min(half - radius, radius - inner * half) if inner > 0 else half - radius
-
-
-@njit(cache=True)
-def _on_white(x, y):
-    """Distance (m) from a checkerboard's crossing lines, positive on white."""
-    return min(abs(x), abs(y)) if x * y > 0 else -min(abs(x), abs(y))
 
 
 @njit(cache=True)
@@ -99,30 +95,13 @@ def distance_inside(points: np.ndarray, outline: np.ndarray, form: int) -> np.nd
     outline : (5,) array
         As a row of trial outlines.
     form : int
+        WHITE asks for the distance from a checkerboard's crossing lines, positive on white.
     """
     cos, sin, distance = np.cos(outline[2]), np.sin(outline[2]), np.empty(len(points))
     for i in range(len(points)):
         du, dv = points[i, 0] - outline[0], points[i, 1] - outline[1]
         x, y = cos * du + sin * dv, cos * dv - sin * du
         distance[i] = _within(x, y, outline[3] / 2, outline[4], form)
-    return distance
-
-
-@njit(cache=True)
-def distance_on_white(points: np.ndarray, outline: np.ndarray) -> np.ndarray:
-    """Distance (n,) of points from a checkerboard's crossing, positive on white. Units: m.
-
-    Parameters
-    ----------
-    points : (n, 2) array
-        Units: m.
-    outline : (5,) array
-        As a row of trial outlines.
-    """
-    cos, sin, distance = np.cos(outline[2]), np.sin(outline[2]), np.empty(len(points))
-    for i in range(len(points)):
-        du, dv = points[i, 0] - outline[0], points[i, 1] - outline[1]
-        distance[i] = _on_white(cos * du + sin * dv, cos * dv - sin * du)
     return distance
 
 
@@ -187,7 +166,7 @@ def _log_likelihood(points, side, outlines, form, width, share, log_share):
                 total += _from_table(log_share, -within, width)
                 continue
             on_board = _from_table(share, within, width)
-            white = _on_white(x, y) * (1 if side[i] == 1 else -1)
+            white = _within(x, y, size / 2, inner, WHITE) * (1 if side[i] == 1 else -1)
             right = _from_table(share, white, width)
             total += np.log(on_board * right + (1.0 - on_board) * 0.5)
         result[c] = total

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mlscorr.targets.outline import Size, fit_outline
-from mlscorr.targets.shapes import FORMS, distance_inside, distance_on_white
+from mlscorr.targets.shapes import FORMS, WHITE, distance_inside
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 42.0])  # m, UTM
 START = 413_200.0  # s of the GPS week
@@ -28,7 +28,7 @@ def beams(kind, seed, half=False, inner=0.0):
     inside = distance_inside(noisy, row, FORMS[kind]) > 0
     state = np.where(inside, 1, 0)
     if kind == "checkerboard":
-        state = np.where(inside, np.where(distance_on_white(noisy, row) > 0, 1, 0), -1)
+        state = np.where(inside, np.where(distance_inside(noisy, row, WHITE) > 0, 1, 0), -1)
     elif kind == "hole":
         state = np.where(inside, -1, 0)
     elif kind == "board":

@@ -7,9 +7,9 @@ from mlscorr.targets.shapes import (
     DARK,
     FORMS,
     MISS,
+    WHITE,
     diameter,
     distance_inside,
-    distance_on_white,
     log_likelihood,
     sides,
 )
@@ -46,7 +46,7 @@ def test_white_quadrants_change_across_the_crossing():
     "Positive where both coordinates have one sign, by the nearer line"
     board = np.array([0.0, 0.0, 0.0, 0.6, 0.0])
     points = np.array([[0.1, 0.2], [-0.1, 0.2], [-0.2, -0.1]])
-    assert distance_on_white(points, board) == pytest.approx([0.1, -0.1, 0.1])
+    assert distance_inside(points, board, WHITE) == pytest.approx([0.1, -0.1, 0.1])
 
 
 def test_sides_follow_the_kind():
