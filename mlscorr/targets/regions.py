@@ -16,7 +16,7 @@ from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.voxels import key_of, neighbours, number_voxels, sort_by_voxel
 
 OCTAVE = 2  # levels of intensity
-LEVELS = 17 * OCTAVE  # of 16 bits
+LEVELS = OCTAVE * np.iinfo(np.uint16).bits
 
 
 @dataclass(frozen=True)
