@@ -14,19 +14,18 @@ import numpy as np
 from mlscorr.io.las import read_chunks
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_extracted_csv
-from mlscorr.matching import Matches
 from mlscorr.pipeline.finding import (
     Finding,
-    by_pass_and_time,
     fit_while_reading,
     match_targets,
     silent,
+    unmatched,
 )
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, TargetObservations
 from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
-from mlscorr.targets import BY_EDGES, as_observations, distinct, search_targets, why_useless
+from mlscorr.targets import BY_EDGES, distinct, search_targets, why_useless
 
 if TYPE_CHECKING:
     import pandas
@@ -98,7 +97,11 @@ def extract(
     sentences = _sentences(survey, np.flatnonzero(present), result)
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=2)
-    return ExtractedSurvey(survey, _finding(result, candidates, survey), sentences)
+    if result and len(surveyed):
+        finding = match_targets(result, candidates, survey)
+    else:
+        finding = unmatched(result, candidates, NO_CONTROL)
+    return ExtractedSurvey(survey, finding, sentences)
 
 
 def _without_doubles(near, everywhere):
@@ -109,16 +112,6 @@ def _without_doubles(near, everywhere):
         if not any(number == n and target.overlaps(other) for n, other in near)
     ]
     return sorted(near + others, key=lambda pair: (pair[0], pair[1].gps_time))
-
-
-def _finding(targets, candidates, survey):
-    """The Finding, which has no match where nothing was surveyed or found."""
-    if targets and len(survey.surveyed):
-        return match_targets(targets, candidates, survey)
-    observations = as_observations(targets)
-    nothing, reasons = observations[np.zeros(len(targets), bool)], (NO_CONTROL,) * len(targets)
-    matches = Matches(nothing, observations, (), np.empty(0), reasons)
-    return Finding(matches, candidates, by_pass_and_time(targets))
 
 
 def _sentences(survey, intensities, targets):

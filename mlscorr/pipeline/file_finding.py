@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mlscorr.io.las import read_chunks
-from mlscorr.matching import Matches
-from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, read_into
+from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, read_into, unmatched
 from mlscorr.survey import PointCloud, Survey, TieFeatures
-from mlscorr.targets import NO_POINTS, Candidates, PassTarget, as_observations, number_passes
+from mlscorr.targets import NO_POINTS, Candidates, PassTarget, number_passes
 from mlscorr.ties import TieCollector
 
 
@@ -108,8 +107,11 @@ def join_findings(survey: Survey, files: Sequence[FileFinding]) -> DriveFinding:
     ]
     targets.sort(key=lambda pair: (pair[0], pair[1].gps_time))
     unplaced = PointCloud.concatenate([NO_POINTS, *(file.unplaced for file in files)])
-    candidates = Candidates(NO_POINTS, np.empty(0, int), unplaced, passes, starts)
-    finding = _matched(survey, targets, candidates)
+    candidates = Candidates(unplaced=unplaced, passes=passes, starts=starts)
+    if len(survey.surveyed):
+        finding = match_targets(targets, candidates, survey)
+    else:
+        finding = unmatched(targets, candidates)
     parts = [
         replace(
             file.features,
@@ -128,11 +130,3 @@ def join_findings(survey: Survey, files: Sequence[FileFinding]) -> DriveFinding:
         ),
         TieFeatures.concatenate(parts),
     )
-
-
-def _matched(survey, targets, candidates):
-    """The Finding of some targets; without a match where nothing was surveyed."""
-    if len(survey.surveyed):
-        return match_targets(targets, candidates, survey)
-    nothing = as_observations([])
-    return Finding(Matches(nothing, nothing, (), np.empty(0), ()), candidates, {})

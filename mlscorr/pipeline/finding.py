@@ -183,16 +183,27 @@ def match_targets(targets: list[PassTarget], candidates: Candidates, survey: Sur
     numbers = np.repeat([n for n, _ in targets], [len(t.cloud) for _, t in targets]).astype(int)
     cloud = PointCloud.concatenate([NO_POINTS, *(t.cloud for _, t in targets)])
     on_targets = replace(candidates, cloud=cloud, pass_number=numbers)
-    return Finding(matches, on_targets, by_pass_and_time(targets))
+    return Finding(matches, on_targets, _by_pass_and_time(targets))
 
 
-def by_pass_and_time(targets: list[PassTarget]) -> dict[tuple[int, float], FittedTarget]:
-    """Fitted targets by (pass number, gps_time).
+def unmatched(targets: list[PassTarget], candidates: Candidates, reason: str = "") -> Finding:
+    """The Finding of targets where there is nothing to match.
 
     Parameters
     ----------
     targets : list of (pass number, FittedTarget)
+    candidates : Candidates
+    reason : str
+        Why none has a name.
     """
+    observations = as_observations(targets)
+    nothing, reasons = observations[np.zeros(len(targets), bool)], (reason,) * len(targets)
+    matches = Matches(nothing, observations, (), np.empty(0), reasons)
+    return Finding(matches, candidates, _by_pass_and_time(targets))
+
+
+def _by_pass_and_time(targets):
+    """Fitted targets by (pass number, gps_time)."""
     return {(number, target.gps_time): target for number, target in targets}
 
 
@@ -260,8 +271,7 @@ def find_or_compare_surfaces(
             return _checked(survey, *fitted), ()
         except ValueError as error:
             note = f"{error} Only surfaces are compared."
-    nothing, empty = as_observations([]), Candidates(NO_POINTS, np.empty(0, int), NO_POINTS, {})
-    return Finding(Matches(nothing, nothing, (), np.empty(0), ()), empty, {}), (note,)
+    return unmatched([], Candidates()), (note,)
 
 
 def read_into(*adds: Callable) -> Callable:

@@ -32,10 +32,10 @@ class Candidates:
         When these begin, likewise. Units: s.
     """
 
-    cloud: PointCloud
-    pass_number: np.ndarray
-    unplaced: PointCloud
-    passes: dict[tuple[int, int], int]
+    cloud: PointCloud = NO_POINTS
+    pass_number: np.ndarray = field(default_factory=lambda: np.empty(0, int))
+    unplaced: PointCloud = NO_POINTS
+    passes: dict[tuple[int, int], int] = field(default_factory=dict)
     starts: dict[tuple[int, int], float] = field(default_factory=dict)
 
 
@@ -163,9 +163,8 @@ def collect(
             progress(len(chunk))
             del chunk, segment, rows, has_pose, placed  # large, and needed no more
         hand_on(number, held, np.inf, np.inf)
-    return Candidates(
-        NO_POINTS, np.empty(0, int), PointCloud.concatenate(unplaced), number_passes(starts), starts
-    )
+    cloud = PointCloud.concatenate(unplaced)
+    return Candidates(unplaced=cloud, passes=number_passes(starts), starts=starts)
 
 
 def number_passes(starts: dict[tuple[int, int], float]) -> dict[tuple[int, int], int]:
