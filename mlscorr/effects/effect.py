@@ -77,11 +77,6 @@ class Effect:
 
     # ---- how it changes the survey
 
-    @property
-    def is_nothing(self) -> bool:
-        """Whether the magnitude is zero."""
-        return not np.any(self.magnitude)
-
     def apply(
         self, value: Any, reference: Reference, rng: np.random.Generator | None = None
     ) -> Any:
@@ -95,7 +90,7 @@ class Effect:
         rng : numpy.random.Generator, optional
             Of a random effect.
         """
-        return value if self.is_nothing else self._change(value, reference, rng)
+        return self._change(value, reference, rng) if np.any(self.magnitude) else value
 
     def _change(self, value, reference, rng):
         """As apply, of a magnitude that is not zero."""

@@ -13,14 +13,9 @@ def pulse_number(returns: Returns) -> np.ndarray:
     returns : Returns
         n of them. Those of a pulse have one time and one angle; they need not stand side by side.
     """
-    order = np.lexsort((returns.angle, returns.gps_time))
-    time, angle = returns.gps_time[order], returns.angle[order]
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(time) != 0) | (np.diff(angle) != 0)
-    first = np.empty_like(order)
-    first[order] = order[new][np.cumsum(new) - 1]  # the sort is stable: the first one's row
-    appeared = np.cumsum(first == np.arange(len(first))) - 1
-    return appeared[first]
+    shot = returns.gps_time + 1j * returns.angle
+    _, first, number = np.unique(shot, return_index=True, return_inverse=True)
+    return first.argsort().argsort()[number]
 
 
 def noise_by_pulse(returns: Returns, rng: np.random.Generator) -> np.ndarray:
