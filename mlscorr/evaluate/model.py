@@ -23,7 +23,8 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
     warnings : tuple of str
         On what went into it, beside its own.
     """
-    section = {
+    guards = estimate.guards
+    return {
         "method": "lsc",
         "order": estimate.order,
         "covariance": _covariance(estimate.parameters),
@@ -36,16 +37,13 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
             for parameters, probability in estimate.families
         ],
         "warnings": [*warnings, *estimate.warnings],
-    }
-    return {
-        **section,
-        "global_test": _global_test(estimate.guards.global_test),
+        "global_test": _global_test(guards.global_test),
         "orders": [_order(alternative) for alternative in estimate.alternatives],
         "tests": [_test(test) for test in estimate.tests],
-        "determined": _by_component(estimate.guards.determined),
-        "variance_ratio": _by_component(estimate.guards.variance_ratio),
-        "longest_gap": list(estimate.guards.gap),
-        "passes_without_control": [list(span) for span in estimate.guards.passes_without_control],
+        "determined": _by_component(guards.determined),
+        "variance_ratio": _by_component(guards.variance_ratio),
+        "longest_gap": list(guards.gap),
+        "passes_without_control": [list(span) for span in guards.passes_without_control],
     }
 
 

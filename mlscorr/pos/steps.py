@@ -8,12 +8,13 @@ import numpy as np
 
 from mlscorr.pos.settings import SETTINGS
 from mlscorr.survey import Trajectory
+from mlscorr.survey.columns import Columns
 
 SECOND = 1.0  # s
 
 
-@dataclass(frozen=True)
-class Steps:
+@dataclass(frozen=True, eq=False, repr=False)
+class Steps(Columns):
     """Where GNSS came back and the POS with it.
 
     Parameters
@@ -31,16 +32,10 @@ class Steps:
     size: np.ndarray
     sigma: np.ndarray
 
-    def __len__(self):
-        return len(self.before)
-
     @property
     def middle(self) -> np.ndarray:
         """Times (k,) between before and after. Units: s."""
         return (self.before + self.after) / 2
-
-    def __getitem__(self, rows):
-        return Steps(self.before[rows], self.after[rows], self.size[rows], self.sigma[rows])
 
 
 def find_steps(trajectory: Trajectory) -> Steps:
