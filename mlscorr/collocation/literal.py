@@ -46,7 +46,7 @@ class LiteralSignal:
 
 @dataclass(frozen=True)
 class LiteralCollocation:
-    """A solved literal collocation, to be asked as a Collocation.
+    """A solved literal collocation.
 
     Covariances of predictions are None. The paper gives none, and its own covariances can't: as
     they are no joint covariance, the error variance that follows from them may be negative.
@@ -71,26 +71,6 @@ class LiteralCollocation:
         """The trend's parameters (p,): x of Eq. 13."""
         return self.least_squares.trend
 
-    @property
-    def trend_covariance(self) -> np.ndarray:
-        """Covariance (p, p) of the trend."""
-        return self.least_squares.trend_covariance
-
-    @property
-    def weights(self) -> np.ndarray:
-        """V^-1 (l - A x): (n r,)."""
-        return self.least_squares.weights
-
-    @property
-    def log_likelihood(self) -> float:
-        """Restricted log-likelihood of the misclosures."""
-        return self.least_squares.log_likelihood
-
-    @property
-    def sigma0(self) -> float:
-        """Sigma of weight one."""
-        return self.least_squares.sigma0
-
     def predict(
         self, gps_time: np.ndarray, design: np.ndarray, partials: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, None]:
@@ -104,7 +84,7 @@ class LiteralCollocation:
         partials : sequence of (q, r, k) arrays
             By which each signal's Lambda' enters.
         """
-        weights = self.weights.reshape(self.misclosure.shape)
+        weights = self.least_squares.weights.reshape(self.misclosure.shape)  # V^-1 (l - A x)
         mean = design @ self.trend
         step = max(CHUNK // max(len(self.gps_time), 1), 1)
         for signal, partial in zip(self.signals, partials, strict=True):
@@ -116,10 +96,6 @@ class LiteralCollocation:
                 predicted = signal.base * (correlation(lag) @ weighted)  # Eq. 20 in Eq. 15
                 mean[part] += np.einsum("qrk,qk->qr", partial[part], predicted)
         return mean, None
-
-    def determined_without(self, rows: np.ndarray) -> bool:
-        """Whether the observations other than these determine the trend."""
-        return self.least_squares.determined_without(rows)
 
     def leave_out(self, rows: np.ndarray) -> tuple[np.ndarray, None]:
         """What the other epochs say of some: residuals (l - prediction), and None.
