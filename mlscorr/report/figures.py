@@ -1,5 +1,6 @@
 """All figures of a correction, by name, as SVG for the page and as PNG files."""
 
+from functools import partial
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -13,8 +14,6 @@ from mlscorr.report.target_map import map_figure
 from mlscorr.report.tie_map import tie_figure
 from mlscorr.report.timeline import attitude_figure, correction_figure
 
-FIGURES = ("correction", "attitude", "map", "residuals", "ties")  # the last where there are ties
-
 
 def draw_figure(
     name: str, correction: Correction, report: CorrectionReport, ties: TieResiduals | None = None
@@ -24,7 +23,7 @@ def draw_figure(
     Parameters
     ----------
     name : str
-        Of FIGURES.
+        ``correction``, ``attitude``, ``map``, ``residuals``, and ``ties`` where there are some.
     correction : Correction
         Its corrected trajectory may hold the sigmas after the estimate.
     report : CorrectionReport
@@ -35,14 +34,7 @@ def draw_figure(
     ValueError
         Where there is no such figure.
     """
-    figures = {
-        "correction": lambda: correction_figure(correction, report),
-        "attitude": lambda: attitude_figure(correction, report),
-        "map": lambda: map_figure(correction, report),
-        "residuals": lambda: residual_figure(report),
-    }
-    if ties is not None:
-        figures["ties"] = lambda: tie_figure(correction, ties)
+    figures = _figures(correction, report, ties)
     if name not in figures:
         raise ValueError(f"There is no figure '{name}' of this correction: {', '.join(figures)}.")
     return figures[name]()
@@ -59,8 +51,7 @@ def drawings(
     report : CorrectionReport
     ties : TieResiduals, optional
     """
-    names = FIGURES if ties is not None else FIGURES[:-1]
-    return {name: svg(draw_figure(name, correction, report, ties)) for name in names}
+    return {name: svg(draw()) for name, draw in _figures(correction, report, ties).items()}
 
 
 def write_pictures(
@@ -83,9 +74,20 @@ def write_pictures(
     -------
     list of Path
     """
-    names = ["correction", "map", "residuals", *(["ties"] if ties is not None else [])]
-    paths = []
-    for name in names:
-        paths.append(Path(folder) / f"{name}.png")
-        paths[-1].write_bytes(png(draw_figure(name, correction, report, ties)))
+    figures = _figures(correction, report, ties)
+    del figures["attitude"]
+    paths = [Path(folder) / f"{name}.png" for name in figures]
+    for path, draw in zip(paths, figures.values(), strict=True):
+        path.write_bytes(png(draw()))
     return paths
+
+
+def _figures(correction, report, ties):
+    """Functions that draw the figures, by name."""
+    figures = {
+        "correction": partial(correction_figure, correction, report),
+        "attitude": partial(attitude_figure, correction, report),
+        "map": partial(map_figure, correction, report),
+        "residuals": partial(residual_figure, report),
+    }
+    return figures if ties is None else figures | {"ties": partial(tie_figure, correction, ties)}

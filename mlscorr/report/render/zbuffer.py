@@ -11,7 +11,7 @@ from mlscorr.report.render.camera import Camera
 
 DEEPEST = 20_000.0  # m before and behind the focus
 DEPTH_STEP = 1e-5  # m: 2 * DEEPEST / DEPTH_STEP fits 32 bits
-EMPTY = np.uint64(0xFFFFFFFFFFFFFFFF)
+EMPTY = np.uint64(np.iinfo(np.uint64).max)
 
 
 @dataclass(frozen=True)
