@@ -9,7 +9,7 @@ from numpy.random import Generator
 
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.observe.settings import SETTINGS
-from mlscorr.gap.train.features import RANGE_NOISE
+from mlscorr.survey import Scanner
 
 ODD_SHARE = 0.12  # at most, estimated: of 5 surveys by ray casting 2 have more than a twentieth
 ODD_DEPTH = 0.02  # m from the plane, mode, estimated: a kerb of 10 cm along the edge of a patch
@@ -77,6 +77,6 @@ def odd_patches(rows: Rows, rng: Generator) -> np.ndarray:
     rng : Generator
     """
     is_odd = (rng.random(rows.item.max() + 1) < rng.uniform(0.0, ODD_SHARE))[rows.item]
-    depth = rng.rayleigh(ODD_DEPTH / RANGE_NOISE, len(rows))
+    depth = rng.rayleigh(ODD_DEPTH / Scanner().range_noise, len(rows))
     rough = np.log1p(depth**2) * (rows.channel == "roughness")
     return is_odd * (rough - 0.5 * rng.random(len(rows)) * (rows.channel == "return_rate"))

@@ -17,7 +17,6 @@ from mlscorr.survey import ControlPoints, Mounting, Pos, Scanner, Survey, Trajec
 
 START, ORIGIN = 413200.0, np.array([523000.0, 3378000.0, 20.0])
 STEP = 0.1  # s between epochs
-RANGE_NOISE, ANGLE_NOISE = 0.005, np.radians(0.002)
 
 
 def drive(rng: Generator, passes: int = 2, duration: float = 75.0) -> Trajectory:
@@ -145,8 +144,7 @@ def geometry(
     turn = Rotation.from_euler("ZX", [35.0, 90.0], degrees=True)
     survey = Survey(
         "study", Path("study"), None, (), trajectory, Mounting(arm, turn), control, none,
-        Scanner(RANGE_NOISE, ANGLE_NOISE, 100.0),
-        Pos(0.02, np.radians([0.004, 0.004, 0.01]), 30.0),
+        Scanner(), Pos(0.02, np.radians([0.004, 0.004, 0.01]), 30.0),
     )  # fmt: skip
     which, time, pass_number = _sightings(survey, place)
     counts = 10 ** rng.uniform(3.0, 4.6, k)
@@ -193,34 +191,22 @@ def _patch_parts(survey, place, normal, counts, which, time, pass_number, rough,
     variance = 0.002**2 + 0.005**2 / 80
     parts = [_shared_part(survey, place, normal, which[p], time[p], pass_number[p], pulses,
                           variance)] if shared else []  # fmt: skip
-    common = (np.arange(len(p)), time[p], place[which[p]])
-    points = np.full(len(p), 80)
-    if not shared:
-        parts.append(
-            assemble(
-                survey, "surface", *common, normal[which[p]], np.zeros(len(p)),
-                np.full(len(p), variance), points, pulses, pass_number[p],
-            )
-        )  # fmt: skip
+    channels = [] if shared else [("surface", normal[which[p]], variance, None)]
     if rough:
         away, slant = np.linalg.norm(pulses.scanner_xyz, axis=1), pulses.incidence
-        believed = (RANGE_NOISE * slant) ** 2 + 1e-7
-        believed += (ANGLE_NOISE * away) ** 2 * (1 - slant**2) / 2
-        parts.append(
-            assemble(
-                survey, "roughness", *common, np.zeros((len(p), 3)), np.zeros(len(p)),
-                np.full(len(p), 2 / 77), points, pulses, pass_number[p], believed=believed,
-            )
-        )  # fmt: skip
-        lost = SETTINGS.least_loss
-        parts.append(
-            assemble(
-                survey, "return_rate", *common, np.zeros((len(p), 3)), np.zeros(len(p)),
-                np.full(len(p), lost * (1 - lost) / 80), points, pulses, pass_number[p],
-                believed=np.ones(len(p)),
-            )
-        )  # fmt: skip
-    return parts
+        believed = (survey.scanner.range_noise * slant) ** 2 + 1e-7
+        believed += (survey.scanner.angle_noise * away) ** 2 * (1 - slant**2) / 2
+        none, lost = np.zeros((len(p), 3)), SETTINGS.least_loss
+        channels.append(("roughness", none, 2 / 77, believed))
+        channels.append(("return_rate", none, lost * (1 - lost) / 80, np.ones(len(p))))
+    return parts + [
+        assemble(
+            survey, name, np.arange(len(p)), time[p], place[which[p]], direction,
+            np.zeros(len(p)), np.full(len(p), spread), np.full(len(p), 80), pulses,
+            pass_number[p], believed=expected,
+        )
+        for name, direction, spread, expected in channels
+    ]  # fmt: skip
 
 
 def _shared_part(survey, place, normal, which, time, pass_number, pulses, variance):
