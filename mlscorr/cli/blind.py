@@ -33,7 +33,7 @@ def make(
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline.blind import make_blind
 
-        made = make_blind(out, cases, seed, mechanisms, workers, progress)
+        made = make_blind(out, cases, seed, workers, mechanisms, progress)
     say(f"{made} surveys are in {out / 'cases'}, their seals in {out / 'seals.json'}.")
 
 

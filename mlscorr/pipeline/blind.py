@@ -25,7 +25,6 @@ from mlscorr.io.output import document, write_json
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.finding import find_targets, silent
 
-WORKERS = 2  # processes: each wants a core and a gigabyte
 SECRET = ("truth*", "key*")  # names of files that no diagnosis may see
 
 
@@ -33,8 +32,8 @@ def make_blind(
     out: Path,
     cases: int,
     seed: int,
+    workers: int,
     mechanisms: Path | None = None,
-    workers: int = WORKERS,
     progress: Callable | None = None,
 ) -> int:
     """Make the surveys of a blind check: OUT/cases, seals.json (public) and key.json (labels).
@@ -46,9 +45,10 @@ def make_blind(
     out : Path
     cases : int
     seed : int
+    workers : int
+        Processes: each wants a core and a gigabyte.
     mechanisms : Path, optional
         File with mechanisms that no library knows; by default the half of the grammar that grades.
-    workers : int
     progress : function, optional
         progress(title, total) returns a function of the number of cases just done.
 
@@ -77,9 +77,7 @@ def make_blind(
     return len(seals)
 
 
-def run_blind(
-    out: Path, workers: int = WORKERS, progress: Callable | None = None
-) -> tuple[int, int]:
+def run_blind(out: Path, workers: int, progress: Callable | None = None) -> tuple[int, int]:
     """Diagnose each survey of a blind check that has no answer yet: OUT/answers.
 
     Each diagnosis sees a copy of its survey's folder in a process of its own; the key can't be
