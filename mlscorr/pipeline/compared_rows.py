@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.effects import Effect
+from mlscorr.estimate import COMPONENTS
 from mlscorr.gap.close import Beams, BeamSimulator, Surroundings, collect_beams
 from mlscorr.gap.contrast import (
     Contrast,
@@ -39,7 +40,6 @@ from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_int
 from mlscorr.pipeline.planning import too_little
 from mlscorr.survey import Survey, TargetObservations
 
-LEAST_VIEWS = 6  # with a residual in m: fewer than the pose has parameters say nothing
 LINEAR = (
     "How far the gap would shrink is told to the first order: run your simulator with the effect, "
     "and give its clouds as a second --simulated."
@@ -158,7 +158,7 @@ def compare_with_clouds(
         notes = (*notes, sentence)
     first, *following = without_unpaired(compared)
     views = len(np.unique(first.item[first.metric]))
-    if views < LEAST_VIEWS:
+    if views < len(COMPONENTS):  # of the pose: with fewer, nothing is said
         raise ValueError(too_little(survey, first, views, library, notes))
     if not first.residual.any():
         raise ValueError(
@@ -245,7 +245,7 @@ def _observed(
     finding = _with_moved(finding, believed)
     pairing = build_rows(believed, finding.matches.matched, finding.candidates, patches)
     views = len(np.unique(pairing.rows.item[pairing.rows.metric]))
-    if views < LEAST_VIEWS:
+    if views < len(COMPONENTS):  # of the pose: with fewer, nothing is said
         raise ValueError(too_little(survey, pairing.rows, views, library, notes))
     pairing = replace(pairing, notes=(*notes, *pairing.notes))
     rows = Rows.concatenate([pairing.rows, pairing.check])
