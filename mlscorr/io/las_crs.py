@@ -18,7 +18,6 @@ OWNER, WKT, GEO_KEYS = b"LASF_Projection", 2112, 34735  # LAS 1.4 R15, section 3
 PROJECTED, GEOGRAPHIC, VERTICAL = 3072, 2048, 4096  # keys of GeoTIFF 1.1
 UNITS_OF_LENGTH = (3076, 4099)  # keys, in plan and of heights
 FEET = {9002: "feet", 9003: "US survey feet"}  # their values
-STATED_BY_WKT = 16  # bit of the global encoding
 
 
 def stated_crs(layout: LasLayout) -> CRS | None:
@@ -40,17 +39,13 @@ def stated_crs(layout: LasLayout) -> CRS | None:
         data.split(b"\0")[0].decode("utf-8", "replace") for data in layout.vlr_data(OWNER, WKT)
     ]
     code = _code(_geo_keys(layout))
-    for text in filter(None, [*words, code] if _is_wkt(layout) else [code, *words]):
+    for text in filter(None, [*words, code] if layout.states_wkt else [code, *words]):
         try:
             with warnings.catch_warnings(action="ignore"):  # of codes that PROJ replaces
                 return CRS.from_user_input(text)
         except CRSError:
             continue
     return None
-
-
-def _is_wkt(layout):
-    return bool(layout.head[6] & STATED_BY_WKT)
 
 
 def _geo_keys(layout):
@@ -124,7 +119,7 @@ def crs_conflict(layout: LasLayout, crs: str) -> str:
 
 def _other_units(layout, stated):
     """Words on coordinates that are not in metres, whatever the unit that their CRS has."""
-    keys = {} if _is_wkt(layout) else _geo_keys(layout)
+    keys = {} if layout.states_wkt else _geo_keys(layout)
     units = [FEET[keys[key]] for key in UNITS_OF_LENGTH if keys.get(key) in FEET]
     units += [axis.unit_name for axis in stated.axis_info if axis.unit_name != "metre"]
     return f"the cloud is in {units[0]}, and a correction needs metres" if units else ""

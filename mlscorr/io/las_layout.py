@@ -82,6 +82,11 @@ class LasLayout:
         return bool(self.head[6] & 1)
 
     @property
+    def states_wkt(self) -> bool:
+        """Whether the CRS is stated as WKT, not by GeoKeys."""
+        return bool(self.head[6] & 16)
+
+    @property
     def has_time_offset(self) -> bool:
         """Whether gps_time is standard GPS time less an offset that the header states."""
         return self.version >= (1, 5) and bool(self.head[6] & 64)
