@@ -12,16 +12,9 @@ from mlscorr.io.cloud_sources import CloudSource, SourceBlock, check_precision, 
 from mlscorr.io.column_names import plain
 from mlscorr.io.text_files import shown
 
-KINDS = {  # types of properties by their names
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-}
+TYPES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")  # of properties
+OLDER = ("char", "uchar", "short", "ushort", "int", "uint", "float", "double")  # their names
+KINDS = {np.dtype(kind).name: kind for kind in TYPES} | dict(zip(OLDER, TYPES, strict=True))
 ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 AXES = ("x", "y", "z")
 TIMES = ("gpstime", "time", "timestamp", "t")  # plain names, the surest first

@@ -3,7 +3,7 @@
 import csv
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from mlscorr.io.column_names import AXES
@@ -31,7 +31,7 @@ def write_targets_csv(path: str | Path, targets: Sequence[dict]) -> None:
         time = "" if target["gps_time"] is None else f"{target['gps_time']:.6f}"
         first = (target["name"], target["pass"] or "", time, target["role"])
         rows.append((*first, *numbers, str(target["used"]).lower(), target["reason"] or ""))
-    _write_csv(path, rows)
+    write_csv(path, rows)
 
 
 def write_extracted_csv(path: str | Path, targets: Sequence[dict]) -> None:
@@ -55,7 +55,7 @@ def write_extracted_csv(path: str | Path, targets: Sequence[dict]) -> None:
         last = (target["points"], f"{target['score']:.3f}", str(target["matched"]).lower())
         numbers = [f"{value:.4f}" for value in vectors]
         rows.append((*first, *numbers, *last, target["reason"] or ""))
-    _write_csv(path, rows)
+    write_csv(path, rows)
 
 
 def write_ties_csv(path: str | Path, ties: Ties) -> None:
@@ -76,10 +76,18 @@ def write_ties_csv(path: str | Path, ties: Ties) -> None:
         numbers += [f"{value:.6f}" for value in ties.direction[i]]
         last = (f"{ties.misclosure[i]:.5f}", f"{ties.sigma[i]:.5f}")
         rows.append((*ties.pass_number[i], *times, ties.kind[i], *numbers, *last))
-    _write_csv(path, rows)
+    write_csv(path, rows)
 
 
-def _write_csv(path, rows):
+def write_csv(path: str | Path, rows: Iterable[Sequence]) -> None:
+    """Write rows of cells, none of which a spreadsheet runs.
+
+    Parameters
+    ----------
+    path : path
+    rows : iterable of sequences
+        The first holds the names of the columns.
+    """
     with open(path, "w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([_inert(cell) for cell in row] for row in rows)
 

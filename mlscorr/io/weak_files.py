@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from mlscorr.io.column_names import AXES
 from mlscorr.io.projection import check_crs
+from mlscorr.io.result_tables import write_csv
 from mlscorr.survey import Trajectory
 
 
@@ -42,8 +42,7 @@ def write_weak(
         cells = [f"{value:.3f}" for value in times] + [f"{value:.1f}" for value in lengths]
         ends = [f"{value:.3f}" for value in trajectory.at(times).position.ravel()]
         rows.append((*cells, f"{row['sigma']:.4f}", *ends, row["why"]))
-    with open(folder / "weak.csv", "w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows(rows)
+    write_csv(folder / "weak.csv", rows)
     if crs is None:
         return ["weak.csv"]
     text = json.dumps(_features(stretches, trajectory, crs), allow_nan=False)
