@@ -39,6 +39,22 @@ def track(trajectory: Trajectory) -> np.ndarray:
     return break_at_gaps(trajectory.gps_time[rows], trajectory.gaps, plan[rows])[1]
 
 
+def corners(points: np.ndarray, thinnest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lower left and upper right corner (2,) of a map of points, with a margin. Units: m.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        NaN where none is known. Units: m.
+    thinnest : float
+        Least half width of the map over its length: none is a thin line.
+    """
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    extent = max(float((high - low).max()), 1.0)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, thinnest * extent) + 0.04 * extent
+    return middle - half, middle + half
+
+
 def frame(axes: Axes, low: np.ndarray, high: np.ndarray, ticks: int = 5) -> None:
     """Limits, equal scale on both axes, and whole metres as tick labels.
 

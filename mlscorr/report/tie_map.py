@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
-from mlscorr.report.map_frame import frame, map_panels, track
+from mlscorr.report.map_frame import corners, frame, map_panels, track
 from mlscorr.report.render.quantities import colour_table
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import MARKS, TRACK, legend_above, styled
@@ -28,7 +28,7 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
     way, used = track(correction.corrected), residuals.used
     places = residuals.ties.place.mean(axis=1)[:, :2]
     misfits = [1000 * np.abs(v) for v in (residuals.ties.misclosure, residuals.after)]  # mm
-    low, high = _bounds(np.vstack([way[np.isfinite(way).all(axis=1)], places]))
+    low, high = corners(np.vstack([way, places]), 0.1)
     figure, panels = map_panels(2, (high - low)[1] / (high - low)[0])
     figure.set_dpi(SETTINGS.dots_per_inch)
     largest = max(np.max(misfit[used], initial=10.0) for misfit in misfits)
@@ -48,14 +48,6 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
     bar.set_label("How far apart the two passes lie (mm)")
     legend_above(figure, _legend(used))
     return figure
-
-
-def _bounds(points):
-    """Corners of all that is drawn, with a margin; no map is a thin line. Units: m."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    extent = max(float((high - low).max()), 1.0)
-    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.1 * extent) + 0.04 * extent
-    return middle - half, middle + half
 
 
 def _legend(used):

@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.settings import SETTINGS
-from mlscorr.report.map_frame import frame, map_panels
+from mlscorr.report.map_frame import corners, frame, map_panels
 from mlscorr.report.style import GREY, MARKS, TRACK, label, legend_above, mark_handle, styled
 from mlscorr.report.target_map import NEXT, NEXT_WORDS, mark_places
 
@@ -26,7 +26,10 @@ def site_map(document: dict) -> Figure:
     site = document["map"]
     rows = site.get("rows") or []
     states = ("before", "after") if rows else (None,)
-    low, high = _bounds(site, rows)
+    places = [place[:2] for place in site["trajectory"]]
+    places += [row["position"][:2] for row in (*site["targets"], *rows)]
+    points = [numbers(place) for place in places] or [np.zeros(2), np.ones(2)]
+    low, high = corners(np.array(points), 0.12)
     share = np.clip((high - low)[1] / (high - low)[0], 0.25, 1.6)
     figure, panels = map_panels(len(states), share)
     figure.set_dpi(180)
@@ -40,17 +43,6 @@ def site_map(document: dict) -> Figure:
         bar.set_label("Innovation (sigma)")
     legend_above(figure, _legend(site, rows))
     return figure
-
-
-def _bounds(site, rows):
-    """Lower left and upper right corner of all that is drawn, with a margin. Units: m."""
-    places = [place[:2] for place in site["trajectory"]]
-    places += [row["position"][:2] for row in (*site["targets"], *rows)]
-    points = np.array([numbers(place) for place in places] or [[0.0, 0.0], [1.0, 1.0]])
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
-    extent = max(float((high - low).max()), 1.0)
-    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.12 * extent)
-    return middle - half - 0.04 * extent, middle + half + 0.04 * extent
 
 
 def _draw(panel, site, rows, state):
