@@ -211,7 +211,9 @@ def _source_block(scan, block, marks, start):
     for name in marks:
         is_valid &= block[name] == 0
     block = {name: values[is_valid] for name, values in block.items()}
-    xyz = _cartesian(places[is_valid], scan.axes)
+    xyz = places[is_valid]
+    if scan.axes != CARTESIAN:  # but range, azimuth, elevation
+        xyz = from_polar(*xyz.T)
     check_precision(scan.path, scan.singles, xyz, block[TIME])
     rotation, shift = scan.pose
     return SourceBlock(
@@ -221,8 +223,3 @@ def _source_block(scan, block, marks, start):
         np.column_stack([block[name] for name in COLOURS]) if scan.colours else None,
         int(np.count_nonzero(~is_valid)),
     )
-
-
-def _cartesian(places, axes):
-    """Places (n, 3) in x, y, z of those in range, azimuth, elevation."""
-    return places if axes == CARTESIAN else from_polar(*places.T)

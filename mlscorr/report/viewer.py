@@ -72,8 +72,7 @@ def thin_evenly(
 
 def _first_in_cells(local, edge):
     cell = (local / edge).astype(np.int64)
-    size = cell.max(axis=0) + 1
-    number = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
+    number = np.ravel_multi_index(cell.T, cell.max(axis=0) + 1)
     return np.sort(np.unique(number, return_index=True)[1])
 
 

@@ -79,11 +79,12 @@ def diagnosis_page(document: dict, name: str) -> Page:
     ablation = document.get("ablation") or {"rounds": [], "alone": []}
     is_empty |= {"rounds": not ablation["rounds"], "distances": not document.get("distances")}
     is_empty["channels"] = not document.get("contrasts")
+    others = (*accuracy(document), *channel_statements(document), *unjudged(document))
     content = {
         "figures": figures,
         "verdict": verdict(document),
         "facts": facts(document),
-        "others": [fact.document() for fact in _statements(document)],
+        "others": [fact.document() for fact in others],
         "smallest": smallest(detectable) if is_clean else [],
         "splits_in_words": joined(lowered(split_title(split)) for split in document["where"]),
         "bin_rows": bin_rows(document),
@@ -161,11 +162,6 @@ def _page(document, name, headline, summary, sections, separability, content):
 def _drawn(figures):
     """Figures by name, each as the address of an image."""
     return {name: data_uri(svg(draw())) for name, draw in figures.items()}
-
-
-def _statements(document):
-    """What stands on the first screen beside the verdict."""
-    return *accuracy(document), *channel_statements(document), *unjudged(document)
 
 
 def _channels(document):
