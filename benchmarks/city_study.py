@@ -27,7 +27,6 @@ from threadpoolctl import threadpool_limits
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.control import NO_POINTS
 from mlscorr.matching import Matches
-from mlscorr.pipeline.file_finding import DriveFinding
 from mlscorr.pipeline.finding import Finding
 from mlscorr.pipeline.project.city import project_drives
 from mlscorr.pipeline.project.corrected import motion_of
@@ -133,7 +132,7 @@ class City:
         control = self.control(way, passed, error, number)
         nothing = TargetObservations.concatenate([control.observations])[[]]
         finding = Finding(Matches(nothing, nothing, (), np.empty(0), ()), candidates, {})
-        return FoundDrive(survey, DriveFinding(finding, features), control, control[[]])
+        return FoundDrive(survey, finding, features, control, control[[]])
 
     def left(self, name, correction):
         "What a correction leaves (n, 3) of a drive's error. Units: m"
@@ -194,7 +193,7 @@ def run(number, tiles, limit, seed):
             places.append(correction.recorded.position[rows])
             left.append(remains[rows])
     joined = process_time() - begin - made
-    features = sum(len(drive.contents.features) for drive in city.drives)
+    features = sum(len(drive.features) for drive in city.drives)
     held = sum(state in ("controlled", "tied") for state in states)
     size = [np.sqrt((part**2).sum(axis=1).mean()) for part in left]
     print(

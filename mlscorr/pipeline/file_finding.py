@@ -70,23 +70,8 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
     )
 
 
-@dataclass(frozen=True)
-class DriveFinding:
-    """What the files of a drive hold together.
-
-    Parameters
-    ----------
-    finding : Finding
-    features : TieFeatures
-        With the numbers of the drive's passes.
-    """
-
-    finding: Finding
-    features: TieFeatures
-
-
-def join_findings(survey: Survey, files: Sequence[FileFinding]) -> DriveFinding:
-    """The finding of a survey by those of its files.
+def join_findings(survey: Survey, files: Sequence[FileFinding]) -> tuple[Finding, TieFeatures]:
+    """The finding of a survey by those of its files, and all planes and poles with its passes.
 
     Parameters
     ----------
@@ -122,11 +107,9 @@ def join_findings(survey: Survey, files: Sequence[FileFinding]) -> DriveFinding:
         )
         for number, file in enumerate(files)
     ]
-    return DriveFinding(
-        replace(
-            finding,
-            scanned=frozenset().union(*(file.scanned for file in files)),
-            warnings=tuple(sentence for file in files for sentence in file.warnings),
-        ),
-        TieFeatures.concatenate(parts),
+    finding = replace(
+        finding,
+        scanned=frozenset().union(*(file.scanned for file in files)),
+        warnings=tuple(sentence for file in files for sentence in file.warnings),
     )
+    return finding, TieFeatures.concatenate(parts)

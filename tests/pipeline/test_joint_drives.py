@@ -48,7 +48,7 @@ def together(drives):
 
 def elsewhere(drive, seconds=0.0, way=bed.SHIFT * 0):
     "A FoundDrive without control, at another time and place"
-    trajectory, features = drive.survey.trajectory, drive.contents.features
+    trajectory, features = drive.survey.trajectory, drive.features
     survey = replace(
         drive.survey,
         trajectory=replace(
@@ -58,7 +58,7 @@ def elsewhere(drive, seconds=0.0, way=bed.SHIFT * 0):
         ),
     )
     moved = replace(features, gps_time=features.gps_time + seconds, centre=features.centre + way)
-    return replace(drive, survey=survey, contents=replace(drive.contents, features=moved))
+    return replace(drive, survey=survey, features=moved)
 
 
 def added(corrected):
@@ -124,7 +124,7 @@ def by_areas(drives):
 
 def cut(drives):
     "Two areas with margins of 4 m"
-    places = np.vstack([drive.contents.features.centre for drive in drives])
+    places = np.vstack([drive.features.centre for drive in drives])
     assert 20.0 < margin_of(drives) < 200.0  # m, of 10 s of driving: wider than half of this street
     areas = areas_of(places, int(0.8 * len(places)), 4.0)
     assert len(areas) == 2
@@ -197,8 +197,8 @@ def test_pieces_hold_what_lies_in_their_area(drives):
     for drive in drives:
         pieces = [piece for area in areas for piece in pieces_of([drive], area)]
         assert np.sum([piece.rows for piece in pieces], axis=0).min() >= 1
-        held = sum(len(piece.drive.contents.features) for piece in pieces)
-        assert len(drive.contents.features) <= held < 2 * len(drive.contents.features)
+        held = sum(len(piece.drive.features) for piece in pieces)
+        assert len(drive.features) <= held < 2 * len(drive.features)
         for area, piece in zip(areas, pieces, strict=True):
             weight = area.weight(piece.drive.survey.trajectory.position)
             assert (weight[1:-1] > 0).all() and piece.rows.sum() == len(weight)
@@ -208,8 +208,7 @@ def test_pieces_hold_what_lies_in_their_area(drives):
 def test_an_area_where_nothing_was_seen_corrects_nothing(drives):
     "Without planes and control a drive through two areas stays as it is, and that is said"
     drive = drives[1]
-    contents = replace(drive.contents, features=drive.contents.features[[]])
-    areas, bare = cut(drives), replace(drive, contents=contents)
+    areas, bare = cut(drives), replace(drive, features=drive.features[[]])
     ((corrected, state),) = drives_by_areas([bare], areas, 1, ORIGIN)
     assert state.state == "uncorrected" and np.abs(added(corrected)).max() < 1e-9
     assert {stretch.why for stretch in corrected.held[1].weak} == {"its pass has no control point"}

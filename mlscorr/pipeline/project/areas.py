@@ -160,7 +160,7 @@ def _epochs_in(drive, area):
 
 def _piece(drive, rows):
     """The Piece of some epochs of a drive."""
-    recorded, contents = drive.survey.trajectory, drive.contents
+    recorded, features = drive.survey.trajectory, drive.features
     last = len(recorded) - 1
 
     def within(gps_time):
@@ -170,7 +170,8 @@ def _piece(drive, rows):
     control = within(drive.control.gps_time)
     part = FoundDrive(
         replace(drive.survey, trajectory=recorded.select(rows)),
-        replace(contents, features=contents.features[within(contents.features.gps_time)]),
+        drive.finding,
+        features[within(features.gps_time)],
         drive.control[control],
         drive.check[within(drive.check.gps_time)],
     )

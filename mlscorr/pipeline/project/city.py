@@ -40,7 +40,7 @@ class AreaInput:
     @property
     def features(self) -> int:
         """Number of its planes and poles."""
-        return sum(len(piece.drive.contents.features) for piece in self.pieces)
+        return sum(len(piece.drive.features) for piece in self.pieces)
 
     def results(self) -> list[AreaResult]:
         """What it tells of each drive."""
@@ -104,7 +104,7 @@ def project_drives(
     """
     groups = near_drives(drives) if with_ties else [[drive] for drive in drives]
     for group in groups:
-        places = np.vstack([drive.contents.features.centre for drive in group])
+        places = np.vstack([drive.features.centre for drive in group])
         areas = areas_of(places, limit, margin_of(group))
         if with_ties and len(areas) > 1:
             yield from drives_by_areas(group, areas, order, origin, work)

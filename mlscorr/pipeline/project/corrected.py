@@ -56,8 +56,8 @@ def found_drive(survey: Survey, files: Sequence[FileFinding]) -> FoundDrive:
     files : sequence of FileFinding
         Of each of its clouds.
     """
-    contents = join_findings(survey, files)
-    return FoundDrive(survey, contents, *contents.finding.matches.by_role(survey))
+    finding, features = join_findings(survey, files)
+    return FoundDrive(survey, finding, features, *finding.matches.by_role(survey))
 
 
 def corrected_drives(
@@ -108,8 +108,7 @@ def drive_fields(drive: FoundDrive, estimate: Estimate) -> dict[str, Any]:
     estimate : Estimate
         Of its own control points and epochs.
     """
-    finding = drive.contents.finding
-    return corrected_fields(drive.survey, drive.control, drive.check, finding, estimate)
+    return corrected_fields(drive.survey, drive.control, drive.check, drive.finding, estimate)
 
 
 def _state(part, number, area):

@@ -10,7 +10,7 @@ import numpy as np
 from mlscorr.io.task_store import digest
 from mlscorr.io.time_systems import WEEK
 from mlscorr.io.trajectory_sessions import join_sessions, with_sigmas
-from mlscorr.pipeline.file_finding import DriveFinding
+from mlscorr.pipeline.finding import Finding
 from mlscorr.survey import (
     ControlPoints,
     Matched,
@@ -32,19 +32,22 @@ class FoundDrive:
     ----------
     survey : Survey
         With the surveyed points near its clouds.
-    contents : DriveFinding
+    finding : Finding
+    features : TieFeatures
+        With the numbers of its passes.
     control, check : Matched
     """
 
     survey: Survey
-    contents: DriveFinding
+    finding: Finding
+    features: TieFeatures
     control: Matched
     check: Matched
 
     @property
     def passes(self) -> int:
         """Number of its passes."""
-        return len(self.contents.finding.candidates.passes)
+        return len(self.finding.candidates.passes)
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ class JointDrives:
         names = list(self.survey.by_scanner)
         parts = []
         for drive, shift, base in zip(self.drives, self.shifts, self.bases, strict=True):
-            part, own = drive.contents.features, list(drive.survey.by_scanner)
+            part, own = drive.features, list(drive.survey.by_scanner)
             number = np.array([names.index(n) if n in names else 0 for n in own])
             parts.append(
                 replace(

@@ -73,9 +73,7 @@ def near_drives(drives: Sequence[FoundDrive]) -> list[list[FoundDrive]]:
     radius = max(drive.survey.search_radius for drive in drives)
     rows, cells = [np.empty(0, int)], [np.empty((0, 2), int)]
     for number, drive in enumerate(drives):
-        own = np.unique(
-            np.floor(drive.contents.features.centre[:, :2] / radius).astype(int), axis=0
-        )
+        own = np.unique(np.floor(drive.features.centre[:, :2] / radius).astype(int), axis=0)
         wide = np.concatenate([own + np.array([i, j]) for i in (0, 1) for j in (0, 1)])
         rows.append(np.full(len(wide), number))
         cells.append(wide)
