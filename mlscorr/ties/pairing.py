@@ -267,7 +267,7 @@ def _distance(features, apart, sigma, radius, pairs):
     is_pair |= features.scanner[first] != features.scanner[second]
     is_pair &= (features.kind[first] == features.kind[second]) & (misfit <= gate)
     is_pair &= beside <= SETTINGS.cell
-    # a dash as long as the other: else one of them was hidden in part
+    # a dash as long as the other, to twice the sigma of its middle: else one was hidden in part
     longer = np.sqrt(12) * np.abs(np.diff(features.extent[pairs])[:, 0])
     unlike = longer > SETTINGS.gate_sigmas * 2 * np.sqrt(features.variance[pairs].sum(axis=1))
     is_pair &= ~unlike | (features.kind[first] != "dash")
