@@ -1,14 +1,12 @@
 """A painted road, any way round, that a line scanner crosses askew, there and back."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.control import NO_POINTS
-from mlscorr.survey import CloudFile, PointCloud, Scanner, Survey, Trajectory
-from mlscorr.ties import TieCollector
+from mlscorr.survey import PointCloud, Trajectory
+from tests.beds import tie_streets
 
 ORIGIN = np.array([447_000.3, 5_410_000.6, 120.2])  # m
 START = 413_200.25  # s
@@ -62,29 +60,18 @@ def survey(azimuth=70.0, passes=2):
         heading.append(np.full(len(x), np.radians(azimuth + 180.0 * back)))
     zero = np.zeros(passes * len(times))
     attitude = attitude_from_angles(zero, zero, np.concatenate(heading))
-    files = (CloudFile(Path(f"pass-{i + 1}.laz"), 1, 0.0, "week") for i in range(passes))
-    return Survey(
-        name="road",
-        path=Path("survey.toml"),
-        crs=None,
-        clouds=tuple(files),
-        trajectory=Trajectory(np.concatenate(time), np.concatenate(place), attitude),
-        mounting=None,
-        control=NO_POINTS,
-        check=NO_POINTS,
-        scanner=Scanner(range_noise=0.004),
-    )
+    way = Trajectory(np.concatenate(time), np.concatenate(place), attitude)
+    return replace(tie_streets.survey(passes), name="road", trajectory=way)
 
 
 def features(azimuth=70.0, seed=1, shift=(0.0, 0.0, 0.0), passes=2):
     "TieFeatures of the road, its second pass displaced by a shift (m)"
-    rng, recorded = np.random.default_rng(seed), survey(azimuth, passes)
-    collector = TieCollector(recorded)
-    for number, file in enumerate(recorded.clouds):
+    rng, parts = np.random.default_rng(seed), []
+    for number in range(passes):
         part = cloud(number, rng, azimuth)
         moved = part.xyz + np.where(number == 1, 1.0, 0.0) * np.array(shift)
-        collector.add(file, replace(part, xyz=moved))
-    return collector.features()
+        parts.append(replace(part, xyz=moved))
+    return tie_streets.collect(survey(azimuth, passes), parts)
 
 
 def along_and_left(places, azimuth=70.0):
