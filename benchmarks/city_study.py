@@ -153,7 +153,7 @@ class City:
         tile = np.minimum((times - passed[0]) / DURATION * self.tiles, self.tiles - 1).astype(int)
         features = TieFeatures(
             tile + 1, np.zeros(n, int), kind, times, centre, direction, np.full(n, NOISE**2),
-            np.full(n, 1e-5), np.full(n, 0.3), np.full(n, 100), np.zeros(n), np.zeros((n, 3)),
+            np.full(n, 1e-5), np.full(n, 0.3), np.full(n, 100), np.zeros((n, 3)),
         )  # fmt: skip
         return features[np.argsort(times)]
 
