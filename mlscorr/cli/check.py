@@ -1,6 +1,7 @@
 """The command that tells what is wrong with a survey before it is corrected."""
 
 from collections.abc import Sequence
+from shlex import quote
 
 import typer
 
@@ -33,7 +34,8 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
     if checked.faults:
         warn(_count(checked.faults, "fault"))
         raise typer.Exit(CODES[checked.faults[0].where])
-    say(f"No fault, {_count(checked.warnings, 'warning')}. Next: mlscorr correct {survey} -o OUT")
+    following = f"mlscorr correct {quote(str(survey))} -o OUT"
+    say(f"No fault, {_count(checked.warnings, 'warning')}. Next: {following}")
 
 
 def _list(title: str, lines: Sequence[str]) -> None:

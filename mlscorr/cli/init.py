@@ -3,6 +3,7 @@
 import json
 import tomllib
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -32,7 +33,7 @@ def init(
         say(f"{NAMES.get(role.role, role.role)}: {role.path.relative_to(folder)} ({role.reason})")
     for note in started.notes:
         say(note)
-    say(f"Written: {started.path}. Next: mlscorr check {started.path}")
+    say(f"Written: {started.path}. Next: mlscorr check {quote(str(started.path))}")
 
 
 def _document(given):

@@ -179,13 +179,13 @@ def _looked(
     survey: Survey, faults: Faults, needs_control: bool
 ) -> tuple[QuickLook | None, list[str], tuple[str, ...]]:
     """What a look at some targets shows, sentences on it, and on what was not looked at."""
+    if needs_control:
+        faults.of("data", check_control, survey)
     if not len(survey.surveyed):
         return None, [], ("Targets in the cloud: the survey has no control.",)
     if parts := [file.path.name for file in survey.clouds if read_in_part(file.path)]:
         reason = f"Targets in the cloud: {', '.join(parts)} was read by its first points only."
         return None, [], (reason,)
-    if needs_control:
-        faults.of("data", check_control, survey)
     problems = Faults()
     probe = problems.of("data", look_near_control, survey)
     if probe is None:

@@ -114,6 +114,18 @@ def test_a_quick_look_tells_heights_and_radii(column, change, words, survey):
     assert re.search(words, sentences(checked)[0])
 
 
+@pytest.mark.parametrize("lines", [0, 1], ids=["empty", "header"])
+def test_a_survey_without_control_points_has_a_fault(lines, survey):
+    "What stops a correction is said before it, in the same sentence"
+    text = (survey / "control.csv").read_text().splitlines(keepends=True)
+    (survey / "control.csv").write_text("".join(text[:lines]))
+    checked = mlscorr.check(survey)
+    assert len(checked.faults) == 1 and checked.faults[0].where == "data"
+    with pytest.raises(ValueError, match="gives no control points") as refused:
+        mlscorr.correct(mlscorr.read_survey(survey))
+    assert sentences(checked) == [str(refused.value)]
+
+
 def test_a_small_difference_of_heights_is_a_warning_as_in_a_correction(survey):
     "Within the search radius targets are found, and the datum is doubted in the same sentence"
     change_control(survey, 3, lambda height: height + 3.0)
@@ -173,6 +185,10 @@ def test_the_command_says_what_the_function_returns(survey):
     for title in ("Read", "Written", "Needed", "Worked out"):
         assert title in good.stderr.splitlines()
     assert good.stderr.splitlines()[-1].startswith("No fault, 0 warnings. Next: mlscorr correct")
+    spaced = survey.rename(survey.parent / "second drive")
+    again = CliRunner().invoke(app, ["check", str(spaced)])
+    assert again.stderr.splitlines()[-1].endswith(f"mlscorr correct '{spaced}' -o OUT")
+    survey = spaced.rename(survey)
     (survey / "control.csv").unlink()
     bad = CliRunner().invoke(app, ["check", str(survey), "--quiet"])
     assert bad.exit_code == 2
