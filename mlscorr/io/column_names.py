@@ -39,8 +39,8 @@ CONTROL_NAMES = PLACE_NAMES | {
     "horizontalprecision horizontalaccuracy lagegenauigkeit 平面精度 平面中误差",
     "sigma_vertical": "sigmaz sigmahöhe cq1d 1dcq vrms vprec vacc elevationrms verticalprecision "
     "verticalaccuracy höhengenauigkeit 高程精度 高程中误差",
-    "kind": "shape targetkind targettype zielart forme forma 形状 标靶类型",
-    "size": "diameter größe groesse durchmesser kantenlänge taille diamètre tamaño diámetro "
+    "kind": "shape targetkind targettype art zielart forme forma 形状 标靶类型",
+    "size": "diameter grösse groesse durchmesser kantenlänge taille diamètre tamaño diámetro "
     "尺寸 大小 直径 边长",
     "role": "rolle rôle rol 角色",
     **dict.fromkeys(("normal_e", "normal_n", "normal_h"), ""),

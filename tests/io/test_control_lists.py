@@ -7,6 +7,7 @@ import openpyxl
 import pytest
 
 from mlscorr.frames import attitude_from_angles
+from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, plain
 from mlscorr.io.control import holds_points, read_control
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.toml_file import read_toml
@@ -114,6 +115,22 @@ def test_columns_of_the_list_go_before_what_is_said_of_all(drive, tmp_path):
     assert "of all points" not in points.layout
 
 
+def test_german_columns_of_kind_size_and_role_are_known(drive, tmp_path):
+    "Letters that fold, as ß does into ss, hide no column: sizes and roles are those of the table"
+    header = "Punktnummer;Rechtswert;Hochwert;Höhe;Art;Größe;Rolle\n"
+    content = header + "P1;532012,49;3373991,48;44,48;square;0,5;check\n"
+    points = read(tmp_path, content, drive, kind=None, size=None)
+    assert points.check.kind == ("square",) and points.check.size.tolist() == [0.5]
+
+
+@pytest.mark.parametrize("names", [CONTROL_NAMES, TRAJECTORY_NAMES])
+def test_known_names_of_columns_are_written_as_they_are_compared(names):
+    "A header is compared without case and marks, so a known name that has any would never be met"
+    assert [
+        name for others in names.values() for name in others.split() if plain(name) != name
+    ] == []
+
+
 def test_a_workbook_is_read_from_the_sheet_that_holds_the_table(drive, tmp_path):
     "Title rows above, numbers as names, an empty sheet beside it; two tables are refused"
     book = openpyxl.Workbook()
@@ -168,6 +185,7 @@ P1 = "P1;532012,49;3373991,48;44,48\n"
         ("time,temperature\n1,2\n", "no column name, .* holds no coordinates: is another file"),
         ("name,lat,lon,h\nP1,30.4,114.4,20\n", "Latitude and longitude must be projected first"),
         ("X;Y;Z\n1;2;3\n", "no column name; it has X, Y, Z"),
+        ("Punkt;Est;Nord;Quota\n" + P1, r"no column height; .* as columns\.height = 'Quota'\."),
         ("Punkt;E;N;H\nP1;532012,49;3373991,48\n", "Line 2 .* 3 columns where 4 belong"),
         ("Punkt,E,N,H\nP1,532012,49,3373991,48,44,48\n", "7 columns .* decimals must be"),
         ("Gate 1 532012,49 3373991,48 44,48\n" + P1.replace(";", " "), "Line 2 .*parted by blanks"),
