@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mlscorr.io.column_names import AXES, CONTROL_NAMES
 from mlscorr.io.control_lists import (
@@ -81,7 +82,7 @@ def read_control(
     Warns
     -----
     UserWarning
-        Of a sigma with which a point hardly counts.
+        Of sigmas with which points hardly count, and of points at one place.
     """
     rules = CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns, HINTS
     layout = read_layout(path, COLUMNS, (NORMAL,), *rules)
@@ -97,6 +98,8 @@ def read_control(
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
     _refuse(path, [fault for row in rows for fault in _faults(path, row)])
+    for doubt in _doubts(path, rows):
+        warnings.warn(doubt, stacklevel=2)
     control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
@@ -221,17 +224,31 @@ def _faults(path, row):
                 f"{who} has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
                 "no map reaches that far (millimetres?)."
             )
-    for key in ("sigma_horizontal", "sigma_vertical"):
+    for key in SIGMAS:
         if row[key] <= 0:
             yield f"{who} has the {key} {row[key]:g} m; it must be greater than zero."
-        if row[key] > SETTINGS.coarse_sigma:
-            warnings.warn(
-                f"{who} has the {key} {row[key]:g} m and will hardly count (millimetres?).",
-                stacklevel=3,
-            )
     normal = [row.get(name, np.nan) for name in NORMAL]
     if np.isfinite(normal).any() and not (np.isfinite(normal).all() and np.any(normal)):
         yield f"{who} has the normal {normal}; give three numbers, not all zero, or none."
+
+
+def _doubts(path, rows):
+    """A sentence on sigmas with which points hardly count, and one on points at one place."""
+    coarse = [(row, key) for row in rows for key in SIGMAS if row[key] > SETTINGS.coarse_sigma]
+    for row, key in coarse[:1]:
+        yield (
+            f"{shown(row['name'])} of {path} has the {key} {row[key]:g} m and will hardly count "
+            f"(millimetres?){f', nor will {len(coarse) - 1} more sigmas' * (len(coarse) > 1)}."
+        )
+    smallest = SETTINGS.target_size[0]  # m: nearer to one another two targets can't be
+    near = cKDTree([[row[axis] for axis in AXES] for row in rows]).query_pairs(smallest)
+    pairs = [[rows[i] for i in pair] for pair in sorted(near)]
+    twice = [f"{a['name']} and {b['name']}" for a, b in pairs if a["kind"] == b["kind"]]
+    if twice:
+        yield (
+            f"{path} gives one place two names: {shown(', '.join(twice))}. No observation tells "
+            "them apart, so neither counts: leave one of the two out."
+        )
 
 
 def _likely_unit(size):

@@ -49,17 +49,14 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
             while width and len(cells) > width and not cells[-1]:
                 del cells[-1]
         line = f"Line {number} of {layout.path}"
+        if layout.separator != " " and (exact or not layout.is_own) and 0 < width < len(cells):
+            raise ValueError(_too_wide(line, len(cells), width))
         if len(cells) <= last or (exact and len(cells) != width):
             raise ValueError(
-                f"{line} has {len(cells)} columns where the header has {width or last + 1}: "
-                "the file may have been cut off, or a comma may be missing."
-                if layout.separator == ","
-                else f"{line} has {len(cells)} columns where {width or last + 1} belong: the file "
+                f"{line} has {len(cells)} columns where {width or last + 1} belong: the file "
                 "may have been cut off, a separator may be missing, or a name may hold one "
                 f"(columns are parted by {SEPARATORS[layout.separator]})."
             )
-        if not layout.is_own and width and len(cells) > width:
-            raise ValueError(_too_wide(line, len(cells), width))
         yield line, cells
 
 
@@ -153,7 +150,7 @@ def _check_width(path, lines, width):
 def _too_wide(line, cells, width):
     return (
         f"{line} has {cells} columns where the header has {width}: decimals must be separated by "
-        "points, not by commas."
+        "points, not by commas, and a name with a comma stands in quotation marks."
     )
 
 

@@ -49,11 +49,14 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
         document = tomllib.loads(read_bytes(path).decode(ENCODING))
     except UnicodeDecodeError:
         raise ValueError(
-            f"{path} is not a text file in UTF-8; {kind} is a TOML file. `mlscorr init FOLDER` "
+            f"{path} is not a text file in UTF-8; a TOML file is expected. `mlscorr init FOLDER` "
             "writes that of a survey."
         ) from None
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path} is not valid TOML: {error}.") from None
+        raise ValueError(
+            f"{path} is not valid TOML: {error}. Text and paths stand in quotation marks, paths "
+            "with / for each backslash, and decimals have points."
+        ) from None
     except (RecursionError, ValueError):
         raise ValueError(
             f"{path} can't be read: brackets are nested too deep, or a number has too many digits."
@@ -117,7 +120,7 @@ def _sentence(item, model):
         return f"{key}: {message}." if key else f"{message}."
     if item["type"] in ("tuple_type", "list_type") and isinstance(item["input"], dict):
         return f"{key} is a list of sections; write [[{key}]], not [{key}]."
-    message = item["msg"]
+    message = item["msg"].replace("valid string", "valid string in quotation marks")
     for kind in ("Input", "List", "Tuple"):
         message = message.replace(f"{kind} should", "it should")
     return f"{key} = {shown(repr(item['input']))} can't be used: {message[0].lower()}{message[1:]}."

@@ -1,5 +1,6 @@
 """A survey folder in: survey.toml, control.csv, and what must fit together."""
 
+import re
 import shutil
 import warnings
 
@@ -155,6 +156,7 @@ def test_degrees_become_radians_and_the_mounting_a_rotation(folder):
         ("[control]", "[matching]\nradius = 3\n[control]", r"matching\.radius is an unknown key"),
         ("[control]", "[matching]\nsearch_radius = 0\n[control]", r"search_radius = 0 .*greater"),
         ("[control]", "[scanner]\nrange_noise = inf\n[control]", "finite number"),
+        ('crs = "EPSG:32650"', "crs = 32650", "crs = 32650 .*string in quotation marks"),
         ("[control]", "[mounting]\nlever_arm = [100.5, 0.0, 0.0]\n[control]", "less than or equal"),
     ],
 )
@@ -193,6 +195,7 @@ def test_all_wrong_keys_come_in_one_error(folder):
     ("content", "message"),
     [
         (b'name = "street\n', "not valid TOML: .*at line 1"),
+        (b"crs = EPSG:32650\n", "at line 1, .*Text and paths stand in quotation marks"),
         (TOML.replace("[cloud]", "[cloud").encode(), "not valid TOML: .*at line 5"),
         (b"name = 'a'\nname = 'b'\n", "not valid TOML"),
         (b"name = '\xff\xfe'\n", "not a text file in UTF-8; .*mlscorr init"),
@@ -294,9 +297,9 @@ def test_the_asked_time_system_is_obeyed(folder):
 
 @pytest.mark.parametrize("content", [b"", b"LASF" + bytes(100)])
 def test_a_broken_cloud_is_refused(folder, content):
-    "Empty or cut off within the header"
+    "Empty or cut off within the header: its size is told beside that of a header"
     (folder / "pass-1.las").write_bytes(content)
-    with pytest.raises(ValueError, match=r"pass-1\.las"):
+    with pytest.raises(ValueError, match=rf"pass-1\.las .*cut off: it has {len(content)} bytes"):
         read_survey(folder)
 
 
@@ -421,7 +424,8 @@ def test_normals_are_optional_by_point(tmp_path):
         ("circle,0.6", "circle,0", "T01 .* size 0 m.* positive"),
         ("0.003,0.004", "0,0.004", "T01 .* sigma_horizontal 0 m; it must be greater"),
         ("0.003,0.004", "0.003,-1", "T01 .* sigma_vertical -1 m"),
-        (",circle,0.6,control", "", "Line 2 .* has 6 columns where the header has 9: .* cut off"),
+        ("44.4800", "44,4800", "Line 2 .* has 10 columns where the header has 9: decimals must"),
+        (",circle,0.6,control", "", "Line 2 .* has 6 columns where 9 belong: .* cut off"),
         (CONTROL, "", "is empty"),
         (CONTROL, "\n \n", "is empty"),
         (CONTROL, CONTROL.splitlines()[0], "header but no points"),
@@ -432,6 +436,25 @@ def test_bad_control_is_refused(tmp_path, old, new, message):
     "Bad cells are named with line or point, value, and what is expected; lacking content too"
     with pytest.raises(ValueError, match=message):
         read_control(control(tmp_path, old, new))
+
+
+def test_sigmas_in_millimetres_are_one_warning(tmp_path):
+    "A list in another unit is told once, not twice a point, so that other warnings can be read"
+    text = CONTROL.replace(",0.003,", ",3,").replace(",0.004,", ",4,")
+    with pytest.warns(UserWarning) as told:
+        read_control(control(tmp_path, text=text))
+    assert len(told) == 1
+    sentence = str(told[0].message)
+    assert re.search(r"T01 .* 3 m .*\(millimetres\?\), nor will 3 more sigmas\.", sentence)
+
+
+def test_a_place_under_two_names_is_warned_of(tmp_path):
+    "Who lists control points as check points once more hears that neither of the two counts"
+    again = CONTROL.strip().splitlines()[1].replace("T01", "K01").replace("control", "check")
+    with pytest.warns(
+        UserWarning, match="one place two names: T01 and K01. .* leave one of the two"
+    ):
+        read_control(control(tmp_path, text=CONTROL.strip() + f"\n{again}\n"))
 
 
 def test_a_sigma_in_millimetres_is_warned_of(tmp_path):
