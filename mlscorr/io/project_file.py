@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.io.control import NOTHING_SURVEYED, read_surveyed
 from mlscorr.io.inputs import input_file
+from mlscorr.io.opening import read_bytes
 from mlscorr.io.project_sections import ProjectFile
 from mlscorr.io.projection import check_crs
 from mlscorr.io.storage import as_path, beside, is_folder, is_there, resolved
@@ -86,7 +87,8 @@ class ProjectParts:
 
 
 def is_project(path: str | Path) -> bool:
-    """Whether a path is that of a project.toml, or of a folder that holds one and no survey.toml.
+    """Whether a path is that of a project.toml or another TOML file with drives, or of a folder
+    that holds a project.toml and no survey.toml.
 
     Parameters
     ----------
@@ -95,7 +97,9 @@ def is_project(path: str | Path) -> bool:
     path = as_path(path)
     if is_folder(path):
         return is_there(path / FILE_NAME) and not is_there(path / "survey.toml")
-    return path.name == FILE_NAME or path.name.endswith(f".{FILE_NAME}")
+    is_named = path.name == FILE_NAME or path.name.endswith(f".{FILE_NAME}")
+    is_table = path.suffix == ".toml" and is_there(path)
+    return is_named or (is_table and b"[[drive" in read_bytes(path))
 
 
 def read_project(path: str | Path) -> ProjectParts:

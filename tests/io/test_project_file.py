@@ -50,6 +50,15 @@ def test_drives_are_read_by_their_files(city):
     assert not is_project(city / "survey.toml")
 
 
+def test_a_project_may_have_any_name(city):
+    "A TOML file with drives is one; a survey under another name, a cloud and nothing are none"
+    project = write(city, DRIVE.format("a"), DRIVE.format("b"))
+    project.rename(city / "old-town.toml")
+    (city / "street.toml").write_text('name = "street"\n')
+    names = ("old-town.toml", "street.toml", "tile-a.laz", "nothing.toml")
+    assert [is_project(city / name) for name in names] == [True, False, False, False]
+
+
 @pytest.mark.parametrize(
     ("parts", "words"),
     [
