@@ -74,6 +74,6 @@ class BeamCheck:
                     f"The points of {file.name} lie {length:.0f} m beside the trajectory and "
                     f"{off:.0f} deg off the scan plane (median of {len(sample)} samples; limits "
                     f"{IO.near:.0f} m and {SETTINGS.off_plane:.0f} deg): the file may be of "
-                    "another survey with the same times, its gps_time wrong, or [mounting] that of "
-                    "another scanner. Take out what doesn't belong here."
+                    "another survey with the same times, its gps_time wrong (UTC is 18 s late), or "
+                    "[mounting] another scanner's or not in m and deg. Take out what doesn't fit."
                 )

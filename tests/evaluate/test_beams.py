@@ -50,8 +50,9 @@ def test_times_that_run_backwards_are_named(survey):
 
 
 def test_a_tile_of_another_survey_is_named(survey):
-    "The same times, another street: its points lie beside the scan plane"
+    "The same times, another street: points lie beside the scan plane; UTC is a likely cause, too"
     (sentence,) = said(survey, turned)
+    assert "UTC is 18 s late" in sentence and "not in m and deg" in sentence
     assert "off the scan plane" in sentence and "another survey with the same times" in sentence
 
 
