@@ -11,7 +11,8 @@ from matplotlib.ticker import FormatStrFormatter
 
 from mlscorr.report.map_frame import frame
 from mlscorr.report.pages import Page, data_uri
-from mlscorr.report.style import label, new_figure, nice, styled, svg
+from mlscorr.report.style import new_figure, nice, styled, svg
+from mlscorr.report.target_map import write_names
 
 SECTIONS = {"drives": "Drives", "map": "Map"}
 
@@ -62,13 +63,14 @@ def project_map(tracks: dict[str, np.ndarray]) -> Figure:
     axes = figure.add_subplot()
     millimetres = 1000 * places[:, 2]
     colours = LogNorm(max(millimetres.min(), 0.1), max(millimetres.max(), 0.2))
-    for name, track in tracks.items():
+    for track in tracks.values():
         ends = np.stack([track[:-1], track[1:]], axis=1)
         ends = ends[np.isfinite(ends).all(axis=(1, 2))]
         size = 1000 * ends[:, :, 2].mean(axis=1)
         lines = LineCollection(ends[:, :, :2], array=size, norm=colours, cmap="viridis", lw=2.2)
         axes.add_collection(lines)
-        axes.annotate(label(name), tuple(track[0, :2]), xytext=(4, 4), textcoords="offset points")
+    known = {name: track[np.isfinite(track[:, 0]), :2] for name, track in tracks.items()}
+    write_names(axes, {name: (way[len(way) // 2], 1) for name, way in known.items()}, 1.2 * width)
     ends = nice(colours.vmin), nice(colours.vmax)
     powers = 10.0 ** np.arange(np.floor(np.log10(ends[0])), np.ceil(np.log10(ends[1])) + 1)
     bar = figure.colorbar(lines, ax=axes, location="bottom", shrink=0.8, aspect=50)

@@ -1,6 +1,6 @@
 """The map: trajectory, targets and their horizontal residuals as arrows."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,13 +15,8 @@ from mlscorr.report.map_frame import frame, track
 from mlscorr.report.settings import SETTINGS
 
 WORDS = {"control": "Control point", "check": "Check point", "unused": "Not used"}
-NEXT: dict[str, Any] = {
-    "color": "#009e73",
-    "marker": "*",
-    "markersize": 11.0,
-    "linestyle": "none",
-    "zorder": 6,
-}
+NEXT: dict[str, Any] = {"color": "#009e73", "marker": "*", "markersize": 11.0}
+NEXT |= {"linestyle": "none", "zorder": 6}
 NEXT_WORDS = "Where another control point helps most"
 
 
@@ -50,7 +45,8 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     for group in GROUPS[::-1]:
         places = array(ordered(rows, group), "surveyed")
         axes.plot(*places[:, :2].T, linestyle="none", **style.MARKS[group])
-    _names(axes, rows, width)
+    names = {row.name: (row.surveyed[:2], -1 if row.before[0] > 0 else 1) for row in rows[::-1]}
+    write_names(axes, names, width)
     mark_places(axes, [(place.easting, place.northing) for place in report.next_control])
     frame(axes, low, high)
     axes.set_title("Where the targets lie, and their horizontal residuals")
@@ -117,29 +113,32 @@ def _quiver(axes, place, vector, color, width):
     axes.quiver(*place.T, *vector.T, color=color, width=width, **symbol, **heads)
 
 
-def _names(axes, rows, width):
-    """Each target's name once, beside its arrow; left out where it would cover another name."""
+def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) -> None:
+    """Each target's name beside its mark; left out where it would cover another name.
+
+    Parameters
+    ----------
+    axes : Axes
+        Of a map.
+    names : mapping
+        To easting and northing (m), and to 1 for a name right of the mark, -1 for one left of it.
+    width : float
+        Of a figure's whole width on the map. Units: m.
+    """
     taken, letter = np.empty((0, 4)), np.array([0.0105, 0.018]) * width  # m on the map
-    for name, row in {row.name: row for row in rows[::-1]}.items():
+    for name, (place, side) in names.items():
         text = style.label(name)
-        side = -1 if row.before[0] > 0 else 1
         half = letter * [len(text) / 2, 0.5]
-        middle = np.add(row.surveyed[:2], [side * (half[0] + letter[0]), 0.0])
+        middle = np.add(place, [side * (half[0] + letter[0]), 0.0])
         apart = np.abs(taken[:, :2] - middle) >= taken[:, 2:] + half
         if not apart.any(axis=1).all():
             continue
         taken = np.vstack([taken, [*middle, *half]])
         axes.annotate(
-            text,
-            row.surveyed[:2],
-            xytext=(5 * side, 0),
-            textcoords="offset points",
-            horizontalalignment="left" if side > 0 else "right",
-            verticalalignment="center",
-            fontsize=7,
-            parse_math=False,
-            zorder=5,
-        )
+            text, place, xytext=(6 * side, 0), textcoords="offset points",
+            horizontalalignment="left" if side > 0 else "right", verticalalignment="center",
+            fontsize=7, parse_math=False, zorder=5,
+        )  # fmt: skip
 
 
 def _key(axes, low, high, strip, times):

@@ -26,8 +26,6 @@ class Settings:
         Least and largest end of the axis of innovations. Units: sigma.
     map_sigmas : float
         At the ends of the map's colours. Units: sigma.
-    map_names : int
-        Targets with a name on the map, at most: more hide each other.
     pause, pause_steps : float
         Without a row, from which on two passes are parted: so long, and so many times the usual
         step. Units: s, 1.
@@ -43,7 +41,6 @@ class Settings:
     stripe_sigmas: float = 2.0
     drawn_sigmas: tuple[float, float] = (3.0, 6.0)
     map_sigmas: float = 4.0
-    map_names: int = 40
     pause: float = 15.0
     pause_steps: float = 20.0
     panels: int = 6

@@ -8,10 +8,8 @@ from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.settings import SETTINGS
 from mlscorr.report.map_frame import corners, frame, map_panels
-from mlscorr.report.style import GREY, MARKS, TRACK, label, legend_above, mark_handle, styled
-from mlscorr.report.target_map import NEXT, NEXT_WORDS, mark_places
-
-ROLES = {"control": "Control point", "check": "Check point"}
+from mlscorr.report.style import GREY, MARKS, TRACK, legend_above, mark_handle, styled
+from mlscorr.report.target_map import NEXT, NEXT_WORDS, WORDS, mark_places, write_names
 
 
 @styled
@@ -35,20 +33,22 @@ def site_map(document: dict) -> Figure:
     figure.set_dpi(180)
     for panel, state in zip(panels, states, strict=True):
         colours = _draw(panel, site, rows, state)
+        names = {target["name"]: (target["position"][:2], 1) for target in site["targets"]}
+        write_names(panel, names, (high - low)[0] / panel.get_position().width)
         frame(panel, low, high, 4)
         panel.tick_params(labelsize=7.5)
         panel.label_outer()
     if rows:
         bar = figure.colorbar(colours, ax=panels, shrink=0.8, pad=0.01, extend="both")
         bar.set_label("Innovation (sigma)")
-    legend_above(figure, _legend(site, rows))
+    legend_above(figure, _legend(panels[0], site, rows))
     return figure
 
 
 def _draw(panel, site, rows, state):
     """Draw one state; returns what the colours are of, if there are any."""
     track = np.array([numbers(place[:2]) for place in site["trajectory"]]).reshape(-1, 2)
-    panel.plot(*_parted(track).T, **TRACK, zorder=1)
+    panel.plot(*_parted(track).T, **TRACK, zorder=1, label="Trajectory")
     colours, limit = None, SETTINGS.map_sigmas
     for channel in dict.fromkeys(row["channel"] for row in rows):
         part = [row for row in rows if row["channel"] == channel]
@@ -77,27 +77,15 @@ def _parted(track):
 
 
 def _draw_targets(panel, targets):
-    for role in ROLES:
+    for role, words in WORDS.items():
         places = [target["position"][:2] for target in targets if target["role"] == role]
         if places:
             symbol = MARKS[role] | {"markerfacecolor": "none", "markersize": 8}
-            panel.plot(*np.array(places).T, linestyle="none", zorder=4, **symbol)
-    for target in targets[: SETTINGS.map_names]:
-        panel.annotate(
-            label(target["name"]), target["position"][:2], xytext=(5, 4), fontsize=6.5,
-            textcoords="offset points", parse_math=False, zorder=5, annotation_clip=True,
-        )  # fmt: skip
+            panel.plot(*np.array(places).T, linestyle="none", zorder=4, label=words, **symbol)
 
 
-def _legend(site, rows):
-    handles = [Line2D([], [], label="Trajectory", **TRACK)]
-    for role, words in ROLES.items():
-        if any(target["role"] == role for target in site["targets"]):
-            symbol = MARKS[role] | {"markerfacecolor": "none", "markersize": 7}
-            handles.append(Line2D([], [], linestyle="none", label=words, **symbol))
-    if site.get("next_control"):
-        handles.append(Line2D([], [], label=NEXT_WORDS, **NEXT))
-    for channel in dict.fromkeys(row["channel"] for row in rows):
-        drawn = channel_style(channel)
-        handles.append(mark_handle(drawn.mark, GREY, drawn.words, size=4))
-    return handles
+def _legend(panel, site, rows):
+    handles = panel.get_legend_handles_labels()[0]
+    handles += [Line2D([], [], label=NEXT_WORDS, **NEXT)] * bool(site.get("next_control"))
+    kinds = map(channel_style, dict.fromkeys(row["channel"] for row in rows))
+    return handles + [mark_handle(kind.mark, GREY, kind.words, size=4) for kind in kinds]
