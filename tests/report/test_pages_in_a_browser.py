@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 
 from tests.beds.browser import browse, need_browser
@@ -86,10 +87,20 @@ async function examine(frame) {
   stage.dispatchEvent(new view.KeyboardEvent("keydown", { key: "+" }));
   await look();
   found.looks = new Set(looks).size;
+  stage.dispatchEvent(new view.KeyboardEvent("keydown", { key: "Home" }));
+  await look();
   const pen = stage.querySelector(".points").getContext("2d");
   if (pen) { // the points that our own z-buffer drew
-    const { data } = pen.getImageData(0, 0, pen.canvas.width, pen.canvas.height);
+    const { width, height } = pen.canvas, { data } = pen.getImageData(0, 0, width, height);
     found.dark = data.filter((value, k) => k % 4 === 0 && value < 250).length;
+    const dark = (k) => data[4 * k] < 250;
+    const count = (length, isIn) => { // of points in each row or column
+      const number = new Array(length).fill(0);
+      for (let k = 0; k < width * height; k++) if (dark(k)) number[isIn(k)]++;
+      return number;
+    };
+    found.rows = count(height, k => Math.floor(k / width));
+    found.columns = count(width, k => k % width);
   }
   found.requests = view.performance.getEntriesByType("resource").map(entry => entry.name);
   return found;
@@ -177,3 +188,10 @@ def test_the_cloud_can_be_turned_with_and_without_webgl(opened):
         assert found["looks"] == 5
         assert found["choices"] == 1 + len({row["name"] for row in opened[2]["targets"]})
     assert opened[0]["wide"]["dark"] > 500  # pixels of points
+
+
+def test_the_whole_survey_is_whole_in_the_picture(opened):
+    "The Home key shows the cloud: hardly a point touches an edge, and it fills height or width"
+    rows, columns = (np.array(opened[0]["wide"][name]) for name in ("rows", "columns"))
+    assert rows[0] + rows[-1] + columns[0] + columns[-1] < 1e-4 * rows.sum()
+    assert max(np.mean(rows > 0), np.mean(columns > 0)) > 0.7

@@ -32,12 +32,21 @@
     return sorted[Math.floor(part * (scene.even - 1))];
   }
   function goTo(target) {
-    const size = low.map((v, k) => high[k] - v);
     centre = target ? [...target.surveyed] : low.map((v, k) => (v + high[k]) / 2);
-    distance = target ? 4 : 0.6 * Math.max(size[0] * stage.clientHeight / stage.clientWidth, 0.8 * size[1], 5) / Math.tan(FIELD / 2);
     elevation = target ? 0.5 : 0.9;
     azimuth = target ? facing(target) : 0;
+    look();
+    distance = target ? 4 : farEnough();
     redraw();
+  }
+  function farEnough() { // to see the cloud, but for one point in a thousand, as the camera looks now
+    const shape = stage.clientHeight / stage.clientWidth, needed = new Float32Array(scene.even);
+    for (let k = 0; k < scene.even; k++) {
+      const d = centre.map((v, c) => after[3 * k + c] - v);
+      const beside = Math.max(shape * Math.abs(dot(camera.right, d)), Math.abs(dot(camera.up, d)));
+      needed[k] = beside / Math.tan(FIELD / 2) - dot(camera.away, d);
+    }
+    return 1.05 * Math.max(needed.sort()[Math.floor(0.999 * (scene.even - 1))], 5);
   }
   function facing(target) { // look at a target from the nearest place of the trajectory
     let best = Infinity, found = 0;
