@@ -55,14 +55,12 @@ def accuracy(document: dict) -> Iterator[Statement]:
         return
     is_worse = [part["rms_mm"] > SETTINGS.quantile * part["stated_mm"] for part in parts]
     answer = "less accurate than" if any(is_worse) else "as accurate as"
-    sizes = [
-        (
-            THINGS[part["channel"]],
-            f"off by {length_in_words(part['rms_mm'] / 1e3)} (RMS per axis), "
-            f"{length_in_words(part['stated_mm'] / 1e3)} by what POS, survey and extraction state",
-        )
-        for part in parts
-    ]
+    sizes = []
+    for part in parts:
+        lengths = part["rms_mm"], part["stated_mm"], SETTINGS.quantile * part["stated_mm"]
+        residual, stated, limit = (length_in_words(length / 1e3) for length in lengths)
+        states = f"{stated} by what POS, survey and extraction state (worse from {limit} on)"
+        sizes.append((THINGS[part["channel"]], f"off by {residual} (RMS per axis), {states}"))
     rating, items = "amber" if any(is_worse) else "green", (*sizes, *_moved(document))
     less = ", less what the simulator has in it," if document["simulator"]["effects"] else ""
     yield Statement("Accuracy", rating, f"The recorded cloud{less} is {answer} stated.", items)

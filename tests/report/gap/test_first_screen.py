@@ -19,6 +19,7 @@ def test_two_answers_stand_apart():
     assert "less accurate than stated" in rows["Accuracy"]["sentence"]
     items = {item["name"]: item["text"] for item in rows["Accuracy"]["items"]}
     assert items["Surveyed targets"].startswith("off by 4.1 cm (RMS per axis), 1.2 cm")
+    assert items["Surveyed targets"].endswith("(worse from 2.4 cm on)")
     assert items["Scanner clock offset"] == "moves what was compared by 1.2 cm (RMS)"
 
 
