@@ -12,7 +12,7 @@ from mlscorr.cli.work import work
 
 def demo(
     out: Out = Path("demo"),
-    seed: Annotated[int, typer.Option(help="Of the simulated survey.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated survey.")] = 1,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -18,11 +18,11 @@ def plan(
     from mlscorr.report.gap import accuracy_sentence
 
     print_json(content, as_json)
-    say(f"{'Smallest effect that shows':34s}{'':>12s}  unit      usual size")
+    say(f"{'Smallest effect that shows':39s}{'':>9s}  {'unit':12s}  usual size")
     for parts in content["detectable"].values():
         for part in parts:
             usual = "" if part["typical"] is None else f"{part['typical']:.3g}"
-            say(f"{part['name']:34s}{part['detectable']:12.3g}  {part['unit']:8s}  {usual}")
+            say(f"{part['name']:39s}{part['detectable']:9.3g}  {part['unit']:12s}  {usual}")
     for members in content["classes"]:
         say(f"Can't be told apart: {', '.join(members)}.")
     if content["accuracy"] is not None:

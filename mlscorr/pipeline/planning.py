@@ -168,7 +168,7 @@ class PlannedSurvey(Summary):
         if self.accuracy is not None and self.accuracy.next_control:
             place = self.accuracy.next_control[0]
             advice.append(
-                f"Put one more control point near {place.easting:.0f} {place.northing:.0f}. "
+                f"Put one more control point near {place.easting:.0f} E, {place.northing:.0f} N. "
                 f"{place.why}"
             )
         if hidden:

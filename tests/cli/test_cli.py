@@ -364,6 +364,7 @@ def test_an_output_folder_that_cannot_be_is_refused(out, arguments, code, words,
         ("correct", "survey.toml", "-o", "out", "--fast"),
         ("corect", "survey.toml", "-o", "out"),
         ("correct", "no such folder", "-o", "out"),
+        ("demo", "-o", "out", "--seed", "-1"),
     ],
     ids=" ".join,
 )

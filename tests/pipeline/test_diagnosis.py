@@ -211,6 +211,10 @@ def test_a_survey_is_planned_without_a_cloud(late, tmp_path):
     (offset,) = plan["detectable"]["time_offset"]
     assert 1e-4 < offset["detectable"] < 0.02
     assert any({"lever_arm", "vertical_datum"} <= set(members) for members in plan["classes"])
+    header, *lines = done.stderr[done.stderr.index("Smallest effect that shows") :].splitlines()
+    unit, usual = header.index("unit"), header.index("usual size")
+    for line in lines[: sum(map(len, plan["detectable"].values()))]:  # columns below their heads
+        assert line[unit - 1] == line[usual - 1] == " " != line[unit]
     refused = CliRunner().invoke(app, ["diagnose", str(folder), "-o", str(tmp_path / "other")])
     assert refused.exit_code == 2
     assert "cloud is missing" in refused.output
