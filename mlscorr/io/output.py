@@ -89,16 +89,16 @@ def _place(out):
         if out.is_dir():
             probe.rename(inside)
     except OSError as error:
-        if error.errno == errno.EXDEV or (out.is_dir() and os.access(out, os.W_OK)):
+        if out.is_dir() and os.access(out, os.W_OK):
             return out.resolve()
-        refusing = out if probe.exists() else above
+        refusing, cause = (out, "not writable") if probe.exists() else (above, error.strerror)
         raise OSError(
-            f"the output folder {out} can't be made, as {refusing} takes no folder "
-            f"({error.strerror}). Choose another place."
+            f"the output folder {out} can't be used: {refusing} takes no folder ({cause}). Choose "
+            "another place."
         ) from None
     finally:  # wherever an interruption left it
         for folder in (probe, inside):
-            with suppress(FileNotFoundError, NotADirectoryError):
+            with suppress(OSError):  # not there, or on a disk that can only be read
                 folder.rmdir()
     return out.resolve().parent
 
