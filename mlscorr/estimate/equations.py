@@ -63,6 +63,8 @@ class Equations(Summary):
         Of what two passes both saw.
     trend_span : (float, float), optional
         First and last time of the trend's polynomial; those of the observed targets by default.
+    tolerance : float
+        Of knots, as of collocate_rows, where there are ties.
     """
 
     names: np.ndarray
@@ -79,6 +81,7 @@ class Equations(Summary):
     fallbacks: int = 0
     ties: TieEquations | None = None
     trend_span: tuple[float, float] | None = None
+    tolerance: float = SETTINGS.knot_tolerance
 
     @cached_property
     def stated_epochs(self) -> StatedSigma:
@@ -207,7 +210,7 @@ class Equations(Summary):
             return collocate(self.gps_time, self.misclosure, self.noise, self.design, signals)
         rows = self.rows(parameters)
         near = None if like is None else like.solver
-        return collocate_rows(rows, near, SETTINGS.knot_tolerance)
+        return collocate_rows(rows, near, self.tolerance)
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
         """As solve, for the likelihood alone: few rows with ties by their covariance matrix.

@@ -220,6 +220,7 @@ def previewed_correction(
         Of the corrected trajectory: they need the inverse of the normal equations.
     """
     before, rows = _tie_equations(estimate.equations, ties, mountings)
+    before = replace(before, tolerance=SETTINGS.coarse_tolerance)
     weighed = robust_ties(before, estimate.parameters, rows)
     asked, solved = pose_rows(weighed.equations, weighed.parameters), weighed.solved
     pose = solved.predict(*asked) if with_sigmas else (solved.predict_mean(*asked),)

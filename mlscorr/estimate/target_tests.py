@@ -101,6 +101,7 @@ def _tests(equations, names, posterior, targets, visit=None):
                 left_out[name].append((weight, *solved.leave_out(rows)))
         if visit is not None:
             visit(chosen, solved)
+        del solved  # before the next one takes as much
     return [_test(equations, name, parts, targets) for name, parts in left_out.items()]
 
 

@@ -31,6 +31,7 @@ from mlscorr.ties import (
     coarse_correction,
     pair_features,
     residuals,
+    thinned_ties,
     unheld_directions,
     unheld_sentence,
 )
@@ -165,7 +166,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
         if radius <= limit:
             unheld = _unheld(estimate, features, ties)
             return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
-        moved = _moved(previewed_correction(estimate, ties, mountings), features)
+        moved = _moved(previewed_correction(estimate, thinned_ties(ties, 1), mountings), features)
         limit = narrowest_gate(ties, moved)
         radius = max(min(radius / 2, np.sqrt(radius * limit)), limit)
 

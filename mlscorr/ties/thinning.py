@@ -66,7 +66,7 @@ def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
     return features[chance <= np.partition(chance, number)[number]]
 
 
-def thinned_ties(ties: Ties) -> Ties:
+def thinned_ties(ties: Ties, number: int = SETTINGS.ties) -> Ties:
     """As many ties of each second of a pass, direction and other scanner as can tell anything.
 
     A second of them is believed to SETTINGS.best_second only (``weigh_by_time``): more of them
@@ -78,6 +78,8 @@ def thinned_ties(ties: Ties) -> Ties:
     Parameters
     ----------
     ties : Ties
+    number : int
+        Of each second of a pass, direction and other scanner.
     """
     ties = ties[np.argsort(ties.gps_time[:, 0], kind="stable")]
     moment = np.floor(ties.gps_time[:, 0] / SETTINGS.moment).astype(np.int64)
@@ -86,7 +88,7 @@ def thinned_ties(ties: Ties) -> Ties:
     group = np.column_stack([earlier, ties.scanner[:, 1], moment, np.minimum(bins, 26 - bins)])
     cell = np.floor(ties.place[:, 0] / SETTINGS.cell).astype(np.int64)
     chance = integer_hash(np.column_stack([cell, later]))
-    return ties[_least(group, [ties.gps_time[:, 0], chance], SETTINGS.ties)]
+    return ties[_least(group, [ties.gps_time[:, 0], chance], number)]
 
 
 def _least(group, order, number):
