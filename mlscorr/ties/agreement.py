@@ -44,24 +44,32 @@ def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
     """
     if len(ties) == 0:
         return np.zeros(0, bool)
-    left = residuals(ties, correction)
+    order = np.argsort(ties.gps_time[:, 0])  # whose neighbours lie side by side in memory too
+    left, variance = residuals(ties, correction)[order], ties.variance[order]
     # a direction and its opposite are the same, with the other sign; pass pairs are apart in time
-    points = np.column_stack([ties.gps_time / SETTINGS.window, 2 * ties.direction])
+    points = np.column_stack([ties.gps_time / SETTINGS.window, 2 * ties.direction])[order]
     opposite = points * np.repeat([1.0, -1.0], [2, 3])
     values = np.append(np.append(left, -left), np.nan)
     count = min(SETTINGS.neighbours + 1, 2 * len(ties))
-    _, rows = cKDTree(np.concatenate([points, opposite])).query(
+    _, rows = cKDTree(np.concatenate([points, opposite]), balanced_tree=False).query(
         points, range(1, count + 1), distance_upper_bound=1.0
     )
     votes = values[rows]
     votes[rows == np.arange(len(ties))[:, None]] = np.nan  # its own
     judged = np.isfinite(votes).sum(axis=1) >= 5
     agree = np.ones(len(ties), bool)
-    middle = np.nanmedian(votes[judged], axis=1)
-    scatter = NORMAL_SCATTER * np.nanmedian(np.abs(votes[judged] - middle[:, None]), axis=1)
-    limit = SETTINGS.gate_sigmas * np.sqrt(scatter**2 + ties.variance[judged])
-    agree[judged] = np.abs(left[judged] - middle) <= limit
+    middle = _median(votes[judged])
+    scatter = NORMAL_SCATTER * _median(np.abs(votes[judged] - middle[:, None]))
+    limit = SETTINGS.gate_sigmas * np.sqrt(scatter**2 + variance[judged])
+    agree[order[judged]] = np.abs(left[judged] - middle) <= limit
     return agree
+
+
+def _median(values):
+    """Medians (n,) of the finite values (n, k) of each row."""
+    values, count = np.sort(values, axis=1), np.isfinite(values).sum(axis=1)
+    middle = np.column_stack([(count - 1) // 2, count // 2])
+    return np.take_along_axis(values, middle, axis=1).sum(axis=1) / 2
 
 
 def information(ties: Ties, group: np.ndarray) -> np.ndarray:
