@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import georeferenced_anew, mounting_partials, partials_by_scanner
 from mlscorr.survey import PAINTED, Mounting, TieFeatures, Trajectory
-from mlscorr.ties.pairing import candidate_pairs
+from mlscorr.ties.candidates import candidate_pairs
 from mlscorr.ties.settings import SETTINGS
 from mlscorr.ties.thinning import some_blocks
 
