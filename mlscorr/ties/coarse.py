@@ -54,9 +54,14 @@ def coarse_correction(
     """
     correction = np.zeros((len(features), 3))
     is_plane = features.kind == "plane"
-    for number in np.unique(features.pass_number)[1:]:
-        before = np.flatnonzero((features.pass_number < number) & is_plane)
-        rows = np.flatnonzero(features.pass_number == number)
+    order = np.argsort(features.pass_number, kind="stable")
+    passes = np.split(order, np.flatnonzero(np.diff(features.pass_number[order])) + 1)
+    low, high = np.empty((2, len(passes), 3))
+    for number, rows in enumerate(passes):
+        lowest, highest = _edges(features.centre[rows], np.hypot(radius, SETTINGS.cell))
+        near = ((low[:number] <= highest) & (high[:number] >= lowest)).all(axis=1)
+        before = np.concatenate([order[:0], *(passes[i] for i in np.flatnonzero(near))])
+        before = before[is_plane[before]]
         tree = cKDTree(features.centre[before] + correction[before])
         stretch = np.floor(features.gps_time[rows] / SETTINGS.pause)
         times, motions, middles = [], [], []
@@ -76,7 +81,13 @@ def coarse_correction(
             )
             arm = features.centre[rows] - middle
             correction[rows] = motion[:, :3] + np.cross(motion[:, 3:], arm)
+        low[number], high[number] = _edges(features.centre[rows] + correction[rows])
     return correction
+
+
+def _edges(place, margin=0.0):
+    """Lowest and highest coordinates (3,) of places (n, 3), and a margin around them."""
+    return place.min(axis=0, initial=np.inf) - margin, place.max(axis=0, initial=-np.inf) + margin
 
 
 def _votes(features, inside, before, tree, radius, angle):
