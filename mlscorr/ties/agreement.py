@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -100,8 +101,10 @@ def unheld_directions(ties: Ties) -> Iterator[tuple[Ties, np.ndarray]]:
     ----------
     ties : Ties
     """
-    for passes in np.unique(ties.pass_number, axis=0):
-        part = ties[(ties.pass_number == passes).all(axis=1)]
+    ties = ties[np.lexsort(ties.pass_number.T[::-1])]
+    begins = np.flatnonzero(np.diff(ties.pass_number, axis=0, prepend=-1).any(axis=1))
+    for begin, end in pairwise([*begins, len(ties)]):
+        part = ties[begin:end]
         axis = np.linalg.eigh(information(part, np.zeros(len(part), int))[0])[1][:, 0]
         along = part.direction @ axis
         along = np.where(np.abs(along) > np.sin(SETTINGS.parallel), along, 0.0)
