@@ -45,7 +45,7 @@ class Settings:
     # a tenth of their sigma, in three quarters of the time that 0.1 takes
     knot_tolerance: float = 0.5
     coarse_tolerance: float = 4.0  # the same, to see which ties hold: by half of it, in a quarter
-    tie_sample: int = 100  # ties that choose parameters: a scale to a tenth
+    tie_sample: int = 100  # least ties that choose parameters: a scale to a tenth
     dense_rows: int = 500  # with ties: for more of them knots are faster than their covariances
     sufficient_ratio: float = 1.1  # of a median sigma: a difference that no check point shows
     tie_points: int = 12  # as points below, each with a solution of all ties

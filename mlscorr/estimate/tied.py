@@ -130,8 +130,7 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
     factor = float(np.clip(np.median(ratio) / MEDIAN, 1.0, SETTINGS.tie_cut))
     used = ratio <= SETTINGS.tie_cut * factor
     kept = replace(rows, variance=factor**2 * rows.variance, weight=np.ones(len(rows)))
-    kept = kept.select(used)
-    tied = replace(tied, ties=kept)
+    tied = replace(tied, ties=kept.select(used))
     return Tied(tied, choose_parameters(sample(tied), (parameters,), SETTINGS.tie_points), used)
 
 
@@ -200,10 +199,17 @@ def _most_probable(tied, parameters):
 def sample(tied: Equations) -> Equations:
     """The equations with as many of the ties as are needed to choose parameters.
 
+    Three for each two of the believed intervals that any view falls into: then each has a view
+    along every axis. Fewer tell nothing of times as short, which stay as they are believed; more
+    cost the cube of their number, and tell what neighbours share rather than how the drift goes.
+
     Parameters
     ----------
     tied : Equations
         With ties.
     """
-    step = -(-len(tied.ties) // SETTINGS.tie_sample)
+    since = tied.ties.gps_time - tied.ties.gps_time.min(initial=np.inf)
+    intervals = len(np.unique(np.floor(since / tied.interval)))
+    number = min(3 * intervals // 2, SETTINGS.dense_rows - tied.misclosure.size)
+    step = -(-len(tied.ties) // max(number, SETTINGS.tie_sample))
     return replace(tied, ties=tied.ties.select(slice(None, None, step)))

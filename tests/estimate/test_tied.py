@@ -1,5 +1,7 @@
 """Ties beside control points: what they add, which of them hold, and what they can't tell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,9 @@ from mlscorr.estimate import (
     previewed_correction,
     with_ties,
 )
-from mlscorr.estimate.tied import TieResiduals
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.estimate.tied import TieResiduals, sample
 from mlscorr.ties import weigh_by_time
 from tests.beds.tied_passes import tied_passes
 
@@ -138,3 +142,34 @@ def test_order_of_ties_does_not_matter(clean):
     shuffled = survey.ties[np.random.default_rng(0).permutation(len(survey.ties))]
     other = with_ties(alone, shuffled).correction.corrected.position
     assert np.abs(other - tied.correction.corrected.position).max() < 2e-3  # m
+
+
+def test_ties_that_choose_parameters_follow_the_time_in_which_they_were_seen():
+    "A hundred of a street; of a city's drives a view along each axis of each interval; few rows"
+    survey = tied_passes(1, number=6000)
+    equations = estimate_correction(survey.trajectory, survey.matched).equations
+    ties = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
+    chosen, views = [], []
+    for longer in (1, 10, 100):
+        slower = replace(ties, gps_time=longer * ties.gps_time)
+        few = sample(replace(equations, ties=slower))
+        intervals = longer * 2 * 58.0 / few.interval  # ties are 1 s from the ends of both passes
+        chosen.append(len(few.ties))
+        views.append(2 * len(few.ties) / 3 / intervals)
+    assert chosen[0] == SETTINGS.tie_sample
+    assert views[1] == pytest.approx(1.0, rel=0.1)
+    rows = chosen[2] + equations.misclosure.size
+    assert rows == pytest.approx(SETTINGS.dense_rows, rel=0.1) and rows <= SETTINGS.dense_rows
+
+
+def test_a_sample_of_ties_does_not_depend_on_the_origin_of_time():
+    "The same ties are taken in week 2 300 of GPS as in the first"
+    survey = tied_passes(1, number=6000)
+    equations = estimate_correction(survey.trajectory, survey.matched).equations
+    ties = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
+    slower = 10 * (ties.gps_time - ties.gps_time.min())
+    taken = [
+        sample(replace(equations, ties=replace(ties, gps_time=slower + start))).ties.misclosure
+        for start in (0.0, 2300 * 604_800.0)
+    ]
+    np.testing.assert_array_equal(*taken)
