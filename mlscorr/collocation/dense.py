@@ -28,6 +28,8 @@ from mlscorr.collocation.sparse_rows import SparseRows
 from mlscorr.collocation.states import Layout
 
 CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
+# Time lag in units of 1 / rate at which rounding leaves no correlation, of exp(-x / 2) neither
+UNCORRELATED_LAG = float(-2 * np.log(np.finfo(float).eps))
 
 
 def collocate_dense(
@@ -187,11 +189,13 @@ def _add_signals(layout, clocks, mixing, row, total):
             if row[j] > row[i]:
                 break
             for s in range(layout.states.size):
+                lag = layout.rates[s] * (clocks[i, s] - clocks[j, s])
+                if abs(lag) > UNCORRELATED_LAG:
+                    continue
                 weight = 0.0
                 for k in range(processes[s], processes[s + 1]):
                     weight += mixing[i, k] * mixing[j, k]
                 if weight != 0.0:
-                    lag = layout.rates[s] * (clocks[i, s] - clocks[j, s])
                     total[row[i], row[j]] += weight * correlation(layout.kinds[s], lag)
 
 

@@ -7,6 +7,8 @@ likelihood. A step that contradicts the control points is no fall-back, only a r
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.stats import chi2
 
@@ -71,7 +73,11 @@ def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameter
 
 
 def _about(equations, first, last):
-    """The equations; of large surveys those of targets about a segment, which feel its start."""
+    """The equations; of large surveys those of targets and ties about a segment: they feel it."""
+    ties = equations.ties
+    if ties is not None and len(ties) > SETTINGS.tie_sample:
+        inside = ((ties.gps_time >= first) & (ties.gps_time <= last)).any(axis=1)
+        equations = replace(equations, ties=ties.select(inside) if inside.any() else None)
     if len(equations.names) <= SETTINGS.block:
         return equations
     times = equations.observed

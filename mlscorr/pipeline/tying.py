@@ -166,7 +166,8 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
         if radius <= limit:
             unheld = _unheld(estimate, features, ties)
             return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
-        moved = _moved(previewed_correction(estimate, thinned_ties(ties, 1), mountings), features)
+        half = thinned_ties(ties, SETTINGS.ties // 2)  # shows as well how near partners are
+        moved = _moved(previewed_correction(estimate, half, mountings), features)
         limit = narrowest_gate(ties, moved)
         radius = max(min(radius / 2, np.sqrt(radius * limit)), limit)
 
