@@ -159,7 +159,6 @@ def _beams(survey, rows, platform, origin, patches, targets):
     if reference is not None:
         on = np.isin(item, rows.item[rows.channel == "surface"])[view]
         facet[on] = reference.cast(start[on], direction[on])
-    boards = [about.board for _, about in targets]
     return Beams(
         pulses=pulses,
         view=view,
@@ -169,7 +168,7 @@ def _beams(survey, rows, platform, origin, patches, targets):
         target=np.append(np.full(len(patches), -1), np.arange(len(targets))).astype(int),
         point=point,
         normal=normal,
-        boards=scan.Boards.concatenate(boards),
+        boards=scan.Boards.concatenate([about.board for _, about in targets]),
         beyond=np.concatenate([nothing, *(about.beyond for _, about in targets)]),
         behind=np.concatenate([nothing, *(about.behind for _, about in targets)]),
         reference=reference,
@@ -199,5 +198,4 @@ def _reference(survey, rows, origin):
     """The reference surface about the origin, where there are rows on it."""
     if survey.reference is None or not (rows.channel == "surface").any():
         return None
-    scene = SceneScenario(kind="mesh", file=survey.reference)
-    return scan.MeshWorld(read_mesh(scene, origin))
+    return scan.MeshWorld(read_mesh(SceneScenario(kind="mesh", file=survey.reference), origin))

@@ -157,8 +157,7 @@ class _Ruler:
         observations = Observations.of(rows, background(rows, case.survey))
         unknown = unknown_blocks(rows, case.survey)
         table = column_table(rows, case.signatures, unknown, observations.sigma)
-        steady = steady_columns(observations, table)
-        observations, _ = without_tails(observations, rows, steady)
+        observations, _ = without_tails(observations, rows, steady_columns(observations, table))
         model = case.evidence.likely_model(case.cause.effect)
         scale = model.scale if noise.scale == 1.0 else noise.scale
         model = replace(model, scale=scale, fixes=noise.fixes, windows=noise.windows)
@@ -169,8 +168,7 @@ class _Ruler:
         among = np.ones(len(self.rows), bool) if among is None else among
         if self.kind == "systematic":
             given = self.observations, self.model, self.table, self.rows.residual
-            systematic = SystematicGap.of(*given, folds, self.used, among)
-            return systematic.measure(rng, self.probability)
+            return SystematicGap.of(*given, folds, self.used, among).measure(rng, self.probability)
         before, after, chance, place = self._terms(folds, rng)
         keep = among[place]
         before, after, chance, place = (v[keep] for v in (before, after, chance, place))

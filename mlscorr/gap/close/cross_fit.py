@@ -75,5 +75,4 @@ def cross_fitted(
     scale[scale == 0] = 1.0
     both = np.column_stack([columns / scale, residual])
     white = observations.whitener(model).innovations(both)[0]
-    sizes = CrossFit(white[:, :-1], fold, number).sizes(white[:, -1:])
-    return sizes[:, :, 0] / scale
+    return CrossFit(white[:, :-1], fold, number).sizes(white[:, -1:])[:, :, 0] / scale

@@ -208,8 +208,7 @@ def _trained(case, observations, model, used, rng):
     survey, evidence, cause = case.survey, case.evidence, case.cause
     if cause.model.windows:
         part = observations[used[observations.row]]
-        residual = part.columns(case.rows.residual[:, None])
-        windows = _with_factor(part, model, residual)
+        windows = _with_factor(part, model, part.columns(case.rows.residual[:, None]))
         return replace(cause, model=replace(cause.model, windows=windows))
     names, part = cause.effect.split("+"), case.rows.select(used)
     of_part = select([sign for sign in case.signatures if sign.name in names], used)
@@ -277,8 +276,7 @@ def _predict(rows, survey, cause, simulated):
     except ValueError:  # larger than any survey can have: no simulator takes it
         return Predicted.nothing(rows)
     own = [effect for effect in effects if not effect.is_of_pose()]
-    noise = [effect for effect in own if effect.random]
-    change = expected(rows, survey, noise)
+    change = expected(rows, survey, [effect for effect in own if effect.random])
     rough = (rows.channel == "roughness").any()  # then the stated noise, from the points, holds it
     extra = np.zeros(len(rows)) if rough else change.variance
     shift = simulated(tuple(own)) if own else np.zeros(len(rows))

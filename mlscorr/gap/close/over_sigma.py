@@ -61,8 +61,7 @@ def errors_over_sigma(
         o.columns(values) / _sigma(o, predicted)[:, None]
         for values, predicted in ((residual, nothing), (residual - shift, after))
     ]
-    drawn = o.whitener(after.model).draw(rng, SETTINGS.replicas)
-    scaled.append(drawn / _sigma(o, after)[:, None])
+    scaled.append(o.whitener(after.model).draw(rng, SETTINGS.replicas) / _sigma(o, after)[:, None])
     axis = rows.covariates["axis"][o.row]
     inside = window_growth(after.model.windows, o.errors.gps_time)[:, 0] > 0
     here = o.second & (inside | (not after.model.windows))

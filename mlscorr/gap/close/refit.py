@@ -38,8 +38,7 @@ def refit_targets(
     """
     xyz, kept, met, (start, direction), boards = simulated
     seed, fitted = rng.integers(2**63), {}
-    on = np.flatnonzero((rows.channel == "target") & (views[:, 0] >= 0))
-    for row in on:
+    for row in np.flatnonzero((rows.channel == "target") & (views[:, 0] >= 0)):
         view = views[row, 0]
         if view not in fitted:
             first, last = np.searchsorted(beams.view, [view, view + 1])

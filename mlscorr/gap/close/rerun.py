@@ -118,8 +118,7 @@ class BeamSimulator:
         return self._run(self.effects)
 
     def _run(self, effects):
-        rng = np.random.default_rng(self.seed)
-        return rerun(self.rows, self.survey, self.beams, effects, rng)
+        return rerun(self.rows, self.survey, self.beams, effects, np.random.default_rng(self.seed))
 
 
 def _drawn(rows, survey, beams, effects, rng):
@@ -185,8 +184,7 @@ def _meet(rows, beams, shot, boards, speckle):
         )
     ]
     number = beams.target[beams.view[on_target]]
-    behind = beams.beyond[on_target], beams.behind[on_target]
-    world = TargetWorld(boards, number, *behind, speckle)
+    world = TargetWorld(boards, number, beams.beyond[on_target], beams.behind[on_target], speckle)
     parts.append(world.meet(start[on_target], direction[on_target]))
     # patches stand before targets
     return Met.concatenate(parts)

@@ -131,8 +131,7 @@ def _about_target(platform, cloud, target, origin, span, extent):
     pulses = _first_returns(recorded_pulses(platform, cloud, origin, target.normal))
     pulses = RecordedPulses.concatenate([pulses, unreturned(pulses, span, extent / nearest)])
     beams = aim(platform, pulses.gps_time, pulses.angle, pulses.elevation)
-    board = board_of(target, origin)
-    distance, slant, place = board.crossings(np.zeros(len(pulses), int), *beams)
+    distance, slant, place = board_of(target, origin).crossings(np.zeros(len(pulses), int), *beams)
     with np.errstate(invalid="ignore"):
         near = np.isfinite(distance) & (np.hypot(*place.T) <= extent)
     return [(pulses[near], distance[near], slant[near], place[near])] if near.any() else []

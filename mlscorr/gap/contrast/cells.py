@@ -84,8 +84,7 @@ class Cells(Columns):
 
     def merged(self) -> Cells:
         """The same with one row each cell."""
-        order = np.argsort(self.key, kind="stable")
-        cells = self[order]
+        cells = self[np.argsort(self.key, kind="stable")]
         first = np.flatnonzero(np.append(True, np.diff(cells.key) != 0)[: len(cells)])
         sums = np.add.reduceat(cells.sums, first) if len(cells) else cells.sums
         return Cells(cells.key[first], cells.chance[first], cells.corner[first],
@@ -112,8 +111,7 @@ class CellCollector:
     def add(self, chunk: PointCloud) -> None:
         """Take the cells of a chunk."""
         inside = chunk[self._survey.trajectory.segment(chunk.gps_time) >= 0]
-        parts = [self._cells, cells_of(inside, self.share)]
-        self._cells = Cells.concatenate(parts).merged()
+        self._cells = Cells.concatenate([self._cells, cells_of(inside, self.share)]).merged()
         while len(self._cells) > self._limit:
             self.share /= 2
             self._cells = self._cells[self._cells.chance < self.share]
@@ -144,8 +142,7 @@ def sampled(cloud: PointCloud, share: float) -> PointCloud:
     cloud : PointCloud
     share : float
     """
-    key = place_key(cloud.xyz, cloud.gps_time)
-    return cloud if share >= 1 else cloud[chance(key) < share]
+    return cloud if share >= 1 else cloud[chance(place_key(cloud.xyz, cloud.gps_time)) < share]
 
 
 def cells_of(cloud: PointCloud, share: float) -> Cells:

@@ -200,8 +200,7 @@ class _Sample:
     def half(self, salt, is_first, rng):
         """Values of one half in random order."""
         in_first = chance(self.identity, np.full(len(self.values), salt)) < 0.5
-        rows = np.flatnonzero(in_first == is_first)
-        return self.values[rng.permutation(rows)]
+        return self.values[rng.permutation(np.flatnonzero(in_first == is_first))]
 
 
 def _of_samples(channel, samples, rng, figures=None):

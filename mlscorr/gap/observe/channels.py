@@ -27,10 +27,8 @@ def _believed_variance(survey, patches):
     time, xyz = patches.time.ravel(), patches.xyz.reshape(-1, 3)
     normal = np.repeat(patches.normal, samples, axis=0)
     sight = xyz - scanner_origin(survey, time)
-    away = np.linalg.norm(sight, axis=1)
-    slant = np.einsum("ni,ni->n", sight, normal) / away
-    across = _sweep(survey, sight, time)
-    tilt = np.einsum("ni,ni->n", across, normal)
+    slant = np.einsum("ni,ni->n", sight, normal) / np.linalg.norm(sight, axis=1)
+    tilt = np.einsum("ni,ni->n", _sweep(survey, sight, time), normal)
     variance = (survey.scanner.range_noise * slant) ** 2 + rounding_sigma() ** 2
     variance += (survey.scanner.angle_noise * tilt) ** 2
     return variance.reshape(p, samples).mean(axis=1)
@@ -41,8 +39,7 @@ def _sweep(survey, sight, time):
     the driving direction where the mounting is not known.
     """
     if survey.mounting is None:
-        forward = survey.trajectory.at(time).attitude.apply([0.0, 1.0, 0.0])
-        return np.cross(forward, sight)
+        return np.cross(survey.trajectory.at(time).attitude.apply([0.0, 1.0, 0.0]), sight)
     axis = survey.trajectory.at(time).attitude.apply(
         survey.mounting.boresight.apply([0.0, 0.0, 1.0])
     )

@@ -254,7 +254,6 @@ def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = N
     first = [] if surface is None else surface.residual
     first_noise = [] if surface is None else surface.noise
     points = [patches.points[on], patches.points[flat], patches.fired[counted]]
-    beliefs = [np.full(len(on), np.nan), believed[flat], np.ones(len(counted))]
     return assemble(
         survey,
         channel,
@@ -267,5 +266,5 @@ def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = N
         np.concatenate(points),
         patch_pulses(survey, patches, np.arange(p)),
         patches.pass_number[item],
-        believed=np.concatenate(beliefs),
+        believed=np.concatenate([np.full(len(on), np.nan), believed[flat], np.ones(len(counted))]),
     )

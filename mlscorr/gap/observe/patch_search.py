@@ -35,8 +35,7 @@ class PatchCollector:
         segment = self._survey.trajectory.segment(chunk.gps_time)
         for number in np.unique(segment[segment >= 0]):
             inside, key = segment == number, (file, int(number))
-            start = chunk.gps_time[inside].min()
-            self._starts[key] = min(self._starts.get(key, np.inf), start)
+            self._starts[key] = min(self._starts.get(key, np.inf), chunk.gps_time[inside].min())
             patches = fit_patches(self._survey, chunk, inside, self._share)
             if patches is not None:
                 self._parts.append((key, patches))

@@ -217,8 +217,7 @@ def _nearest(patches, simulated):
         later = np.abs(simulated.gps_time[j] - patches.gps_time[i])
         j = j[(cosine >= np.cos(SETTINGS.parallel / 2)) & (later <= SETTINGS.pair_pause)]
         if len(j):
-            apart = np.linalg.norm(simulated.centre[j] - patches.centre[i], axis=1)
-            other[i] = j[np.argmin(apart)]
+            other[i] = j[np.argmin(np.linalg.norm(simulated.centre[j] - patches.centre[i], axis=1))]
     return other
 
 

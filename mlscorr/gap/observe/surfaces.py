@@ -79,8 +79,7 @@ def _compare(survey, patches, mesh, origin):
     cosine = np.einsum("ni,ni->n", normal, own)
     facing = normal * np.sign(cosine)[:, None]
     off = np.einsum("ni,ni->n", own, end - np.repeat(patches.centre - origin, samples, axis=0))
-    on_plane = end - own * off[:, None]
-    distance = np.einsum("ni,ni->n", normal, on_plane) - offset
+    distance = np.einsum("ni,ni->n", normal, end - own * off[:, None]) - offset
     distance *= np.sign(cosine)
     limit = np.repeat(gate(survey, patches.gps_time), samples)
     used = hit & (np.abs(cosine) >= np.cos(SETTINGS.parallel)) & (np.abs(distance) <= limit)
@@ -96,8 +95,7 @@ def _compare(survey, patches, mesh, origin):
 def _elsewhere(survey, patches, mesh, origin):
     """The sentence for a reference surface that lies where the cloud is not."""
     centre = (patches.centre - origin).astype(np.float32)
-    closest = mesh.caster.compute_closest_points(centre)["points"].numpy()
-    apart = closest - centre
+    apart = mesh.caster.compute_closest_points(centre)["points"].numpy() - centre
     distance, up = np.median(np.linalg.norm(apart, axis=1)), np.median(apart[:, 2])
     what = "in another height datum" if abs(up) > 0.9 * distance else "in another CRS or place"
     limit = float(np.median(gate(survey, patches.gps_time)))

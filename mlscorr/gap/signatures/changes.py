@@ -128,8 +128,7 @@ class Bench:
 
     def _scanner_xyz(self, returns):
         """X_L (k, 3) of changed returns: the elevation out of the scan plane stays. Units: m."""
-        level = self._pulses.scanner_xyz
-        sine = level[:, 2] / self.returns.range
+        sine = self._pulses.scanner_xyz[:, 2] / self.returns.range
         flat = returns.range * np.sqrt(1.0 - sine**2)
         return np.column_stack(
             [flat * np.cos(returns.angle), flat * np.sin(returns.angle), returns.range * sine]
@@ -190,8 +189,7 @@ class Bench:
         variance, along_normal = np.zeros(m), np.zeros(m)
         for name, total in sums.items():
             moved = self._speeds[name] * np.sqrt(total / SETTINGS.replicas)[pulse, None]
-            away = np.einsum("ki,ki->k", moved, self._pulses.normal)
-            along_normal += self._mean(away**2)
+            along_normal += self._mean(np.einsum("ki,ki->k", moved, self._pulses.normal) ** 2)
             for i in range(3):
                 for j in range(3):
                     both = rows.direction[:, i] * rows.direction[:, j]
@@ -207,8 +205,7 @@ class Bench:
             effect.apply(self.returns, self.rows.reference, rng).kept for _ in range(replicas)
         )
         share = self._mean(kept / replicas)
-        rate = self.rows.channel == "return_rate"
-        return np.where(rate, self.rows.believed * (share - 1.0), 0.0)
+        return np.where(self.rows.channel == "return_rate", self.rows.believed * (share - 1.0), 0.0)
 
     @cached_property
     def _trajectory(self):

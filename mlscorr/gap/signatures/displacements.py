@@ -42,8 +42,7 @@ def displacements(rows: Rows, survey: Survey) -> Displacements:
     survey : Survey
     """
     pulses = rows.pulses[np.isin(rows.pulses.item, rows.item[rows.metric])]
-    key = 2 * pulses.item + (pulses.weight < 0)
-    known, number = np.unique(key, return_inverse=True)
+    known, number = np.unique(2 * pulses.item + (pulses.weight < 0), return_inverse=True)
     count = np.bincount(number)
 
     def mean(values):

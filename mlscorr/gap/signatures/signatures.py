@@ -231,13 +231,11 @@ def _times(rows, survey, spacing):
         return []
     known = np.append(known, rows.gps_time_2[rows.two_times])
     low, high = known.min(), known.max()
-    gaps = survey.trajectory.gaps
-    inside = np.clip(gaps, low, high)
+    inside = np.clip(survey.trajectory.gaps, low, high)
     lost = float((inside[:, 1] - inside[:, 0]).sum())
     number = int(np.clip((high - low - lost) / spacing, 1, SETTINGS.events))
     # evenly over the time without gaps
-    elapsed = (np.arange(number) + 0.5) / number * (high - low - lost)
-    times = low + elapsed
+    times = low + (np.arange(number) + 0.5) / number * (high - low - lost)
     for start, end in inside:
         times = np.where(times >= start, times + (end - start), times)
     times = times[survey.trajectory.segment(times) >= 0]

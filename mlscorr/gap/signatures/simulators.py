@@ -76,8 +76,7 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     effects = list(simulator.effects)
     for new in cause.effects:
         effects = _with(effects, new)
-    believed = simulator.mounting
-    if believed is not None:  # differences of the mounting have become effects
+    if simulator.mounting is not None:  # differences of the mounting have become effects
         _, effects_now = as_believed(survey, replace(simulator, effects=()))
         for effect in effects_now:
             effects = _with(effects, effect)
