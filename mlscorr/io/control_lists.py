@@ -176,8 +176,7 @@ def placed(
     """
     columns, sources = dict(layout.columns), {}
     if "x" in columns:
-        order = _axes_east_and_north(layout, rows, trajectory)
-        sources = dict(zip(AXES, order, strict=False))
+        sources = dict(zip(AXES, _axes_east_and_north(layout, rows, trajectory), strict=False))
         columns |= {name: columns.pop(axis) for name, axis in sources.items()}
     if "sigma" in columns:
         sources |= dict.fromkeys(SIGMAS, "sigma")

@@ -68,8 +68,7 @@ class CopcWriter:
         lazrs.write_chunk_table(table, self._chunks, self._vlr)
         table_start = self._output.tell()
         self._output.write(table.getvalue())
-        page = self._write_evlrs(file)
-        self._set_info(octree, page)
+        self._set_info(octree, self._write_evlrs(file))
         self._output.seek(start)
         self._output.write(struct.pack("<Q", table_start))
 
@@ -107,8 +106,7 @@ class CopcWriter:
         entries["points"], entries["size"] = np.array(self._chunks, np.int64).T
         sizes = entries["size"].astype(np.int64)
         entries["start"] = len(self.head) + 8 + np.cumsum(sizes) - sizes
-        header = EVLR_HEADER.pack(*HIERARCHY, entries.nbytes, b"EPT hierarchy")
-        self._output.write(header)
+        self._output.write(EVLR_HEADER.pack(*HIERARCHY, entries.nbytes, b"EPT hierarchy"))
         page = self._output.tell()
         self._output.write(entries[np.lexsort(entries["key"].T[::-1])])  # level by level
         struct.pack_into("<QI", self.head, 235, start, kept + 1)
@@ -119,8 +117,7 @@ class CopcWriter:
         cube = octree.cube
         half = cube.edge / 2
         times = self._times if np.isfinite(self._times).all() else np.zeros(2)
-        spacing = cube.edge / (1 << GRID_BITS)
-        info = INFO.pack(*(cube.corner + half), half, spacing, *page, *times)
+        info = INFO.pack(*(cube.corner + half), half, cube.edge / (1 << GRID_BITS), *page, *times)
         start = self._layout.vlrs[0][0] + VLR_HEADER.size
         self.head[start : start + INFO.size] = info
 

@@ -39,8 +39,7 @@ def add_sigma_fields(layout: LasLayout) -> LasLayout:
         ExtraBytesStruct.from_buffer_copy(described, start)
         for start in range(0, len(described), size)
     ]
-    present = {field.name.decode(errors="replace") for field in fields}
-    if twice := sorted(present & set(NAMES)):
+    if twice := sorted({field.name.decode(errors="replace") for field in fields} & set(NAMES)):
         raise ValueError(
             f"The points of {layout.path} have the field {twice[0]} already. Correct the file as "
             "it was recorded, or do so without sigmas."

@@ -219,8 +219,7 @@ def _check_laszip(layout):
 def _items(laszip):
     """Number of items in a LASzip VLR, and kind and length of each; their versions left out."""
     count, rows = laszip[32:34], laszip[34:]
-    whole = rows[: len(rows) // 6 * 6]
-    return count, [row[:2] for row in struct.iter_unpack("<HHH", whole)]
+    return count, [row[:2] for row in struct.iter_unpack("<HHH", rows[: len(rows) // 6 * 6])]
 
 
 def _check_tail(layout, file, points_end):

@@ -132,8 +132,7 @@ class PlainWriter:
         file.seek(layout.tail)
         shutil.copyfileobj(file, self._output, SETTINGS.copied_bytes)
         # of waveforms, since 1.3, and EVLRs
-        positions = (227, 235)[: max(0, layout.version[1] - 2)]
-        for position in positions:
+        for position in (227, 235)[: max(0, layout.version[1] - 2)]:
             value = layout.field("Q", position)[0]
             if value >= layout.tail:
                 struct.pack_into("<Q", self.head, position, value + moved)

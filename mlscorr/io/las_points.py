@@ -137,8 +137,7 @@ class ChunkedPoints:
         if self._next == len(self._chunks):
             raise lazrs.LazrsError("the file ends")
         end = self._next + 1
-        reached = self._firsts[self._next] + points
-        end = max(end, int(np.searchsorted(self._firsts, reached)))
+        end = max(end, int(np.searchsorted(self._firsts, self._firsts[self._next] + points)))
         run = self._chunks[self._next : end]
         self._file.seek(int(self._starts[self._next]))
         data = self._file.read(sum(size for _, size in run))

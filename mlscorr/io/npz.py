@@ -90,8 +90,7 @@ class NpzWriter:
         rows = np.ascontiguousarray(rows)
         if name not in self._growing:
             path = self._path.with_name(f"{self._path.name}.{name}.part")
-            file = self._files.enter_context(path.open("wb"))
-            self._growing[name] = _Spool(path, file, rows)
+            self._growing[name] = _Spool(path, self._files.enter_context(path.open("wb")), rows)
         self._growing[name].append(rows)
 
     def _assemble(self, archive):

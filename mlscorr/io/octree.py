@@ -151,8 +151,7 @@ class Octree:
             number = octant @ [4, 2, 1]
             for child in np.unique(number):
                 rows = number == child
-                place = octant[np.argmax(rows)]
-                yield from self._split(key.below(1, place), part[rows], node)
+                yield from self._split(key.below(1, octant[np.argmax(rows)]), part[rows], node)
         yield from node.done()
 
     def _parts(self, blocks, above, counts):

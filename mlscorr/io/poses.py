@@ -83,8 +83,7 @@ def read_poses(path: str | Path) -> Poses:
             f"{path} has the unknown suffix '{path.suffix}'; a path is .csv, .pos or SBET "
             f"({', '.join(SBET_SUFFIXES)})."
         )
-    zone = _sbet_zone(path) if suffix in SBET_SUFFIXES else None
-    trajectory = read_trajectory(path, zone)
+    trajectory = read_trajectory(path, _sbet_zone(path) if suffix in SBET_SUFFIXES else None)
     return Poses(trajectory.gps_time, trajectory.position, trajectory.attitude)
 
 
@@ -111,8 +110,7 @@ def _read_pos(path):
         ) from None
     from pyproj import Transformer
 
-    zone = utm_zone(*table[0, 1:3])
-    to_map = Transformer.from_crs("EPSG:4326", zone, always_xy=True)
+    to_map = Transformer.from_crs("EPSG:4326", utm_zone(*table[0, 1:3]), always_xy=True)
     table[:, 1], table[:, 2] = to_map.transform(table[:, 2], table[:, 1])
     return table
 

@@ -91,8 +91,7 @@ def publish(source: Path, target: Any) -> None:
         return
     parts = {"chunksize": SETTINGS.uploaded_bytes, "max_concurrency": 2}
     with asking(target):
-        how = parts if target.protocol in S3 else {}
-        target.fs.put_file(str(source), target.path, **how)
+        target.fs.put_file(str(source), target.path, **(parts if target.protocol in S3 else {}))
         target.fs.invalidate_cache()
 
 

@@ -53,8 +53,7 @@ def write_extracted_csv(path: str | Path, targets: Sequence[dict]) -> None:
         time = f"{target['gps_time']:.6f}"
         first = (target["name"] or "", target["pass"], time, target["kind"], *sizes)
         last = (target["points"], f"{target['score']:.3f}", str(target["matched"]).lower())
-        numbers = [f"{value:.4f}" for value in vectors]
-        rows.append((*first, *numbers, *last, target["reason"] or ""))
+        rows.append((*first, *[f"{value:.4f}" for value in vectors], *last, target["reason"] or ""))
     write_csv(path, rows)
 
 

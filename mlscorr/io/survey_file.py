@@ -212,8 +212,7 @@ def input_files(path: str | Path, planned: bool = False) -> list[Path]:
         For files that aren't there.
     """
     path = survey_toml(path)
-    named = files_of(path, read_survey_file(path, planned)).named
-    return [path, *(file for _, file in named)]
+    return [path, *(file for _, file in files_of(path, read_survey_file(path, planned)).named)]
 
 
 def survey_toml(path: str | Path) -> Path:

@@ -86,8 +86,7 @@ def session_file(path: Path, section: TrajectorySection) -> SessionFile:
         For those that don't exist.
     """
     file = existing(path, "trajectory.file", section.file)
-    accuracy = given_file(path, "trajectory.accuracy", section.accuracy)
-    return SessionFile(file, accuracy, section)
+    return SessionFile(file, given_file(path, "trajectory.accuracy", section.accuracy), section)
 
 
 def check_sessions(path: Path, sessions: Sequence[SessionFile]) -> None:

@@ -211,8 +211,7 @@ class PosSection(TomlSection):
 
     def pos(self) -> Pos:
         """The same in radians."""
-        sigma = np.radians(self.attitude_sigma)
-        return Pos(self.position_sigma, sigma, self.correlation_time)
+        return Pos(self.position_sigma, np.radians(self.attitude_sigma), self.correlation_time)
 
 
 class MatchingSection(TomlSection):

@@ -70,8 +70,7 @@ def _all_rows(layout):
         try:
             for _ in range(layout.lines):
                 next(file)
-            blanks = layout.separator == " "
-            lines = (" ".join(line.split()) for line in file) if blanks else file
+            lines = (" ".join(line.split()) for line in file) if layout.separator == " " else file
             reader = csv.reader(lines, delimiter=layout.separator, skipinitialspace=True)
             for row in reader:
                 yield layout.lines + reader.line_num, [cell.strip() for cell in row]

@@ -71,8 +71,7 @@ def export_trajectory(path: str | Path, trajectory: Trajectory, crs: str | None)
     if path.suffix.lower() == SUFFIXES[-1]:
         table = trajectory.gps_time, trajectory.position, trajectory.attitude.as_quat()
         with output_file(path) as part:
-            formats = ["%.6f"] + ["%.5f"] * 3 + ["%.10f"] * 4
-            np.savetxt(part, np.column_stack(table), fmt=formats)
+            np.savetxt(part, np.column_stack(table), fmt=["%.6f"] + ["%.5f"] * 3 + ["%.10f"] * 4)
         return [path.name]
     place, convergence = to_geographic(crs, trajectory.position)
     roll, pitch, heading = angles_from_attitude(trajectory.attitude)

@@ -145,8 +145,7 @@ def _used(layout: TableLayout) -> TableLayout:
     needless |= {"yaw"} if "heading" in columns else set()
     for group in (POSITION_SIGMAS, ATTITUDE_SIGMAS):
         needless |= set() if set(group) <= set(columns) else set(group)
-    used = {name: i for name, i in columns.items() if name not in needless}
-    return replace(layout, columns=used)
+    return replace(layout, columns={name: i for name, i in columns.items() if name not in needless})
 
 
 def _usual_heading(layout, section):

@@ -99,8 +99,7 @@ def match(
     pos = Pos() if pos is None else pos
     stated = stated_sigma(trajectory, pos, ordered.gps_time)
     pairs = find_pairs(ordered, control, search_radius)
-    chain = build_chain(ordered, control, pose, stated, pairs, pos)
-    decision = _decide(chain, len(control))
+    decision = _decide(build_chain(ordered, control, pose, stated, pairs, pos), len(control))
     refusals, reasons = explain(ordered, control, pairs, decision, search_radius)
     rank = np.argsort(order)
     column = decision.column[rank]

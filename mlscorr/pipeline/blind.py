@@ -58,12 +58,10 @@ def make_blind(
         When OUT holds another check, or a case can't be made.
     """
     out, names = Path(out), tuple(outside_mechanisms(mechanisms))
-    plan = {"cases": cases, "seed": seed, "mechanisms": list(names)}
-    key = _opened(out, plan)
-    drawn = mix(cases, np.random.default_rng([seed]), names)
+    key = _opened(out, {"cases": cases, "seed": seed, "mechanisms": list(names)})
     todo = {
         _name(i): (case, (seed, i), mechanisms)
-        for i, case in enumerate(drawn, start=1)
+        for i, case in enumerate(mix(cases, np.random.default_rng([seed]), names), start=1)
         if _name(i) not in key["labels"]
     }
     done = (progress or silent)("Making surveys", len(todo))

@@ -198,8 +198,7 @@ def _looked(
         faults.add("data", probe.fault or probe.doubt)
     elif probe.doubt:
         faults.warn(probe.doubt)
-    datum = datum_warnings(matched, survey.trajectory, survey.pos)
-    faults.warn(*problems.warnings, *datum)
+    faults.warn(*problems.warnings, *datum_warnings(matched, survey.trajectory, survey.pos))
     notes = [
         f"{len(set(matched.name))} of {len(probe.points)} targets that were looked at are found."
     ]

@@ -215,8 +215,7 @@ def _with_moved(finding: Finding, survey: Survey) -> Finding:
         return finding
     moved = moved[np.isin(np.array(moved.name, dtype=str), survey.control.name)]
     matched = TargetObservations.concatenate([finding.matches.matched, moved])
-    matches = replace(finding.matches, matched=matched)
-    return replace(finding, matches=matches)
+    return replace(finding, matches=replace(finding.matches, matched=matched))
 
 
 def _read(

@@ -117,8 +117,7 @@ def _without_doubles(near, everywhere):
 def _sentences(survey, intensities, targets):
     """What a reader of the list must know."""
     sentences = []
-    useless = why_useless(intensities)
-    if useless is not None:
+    if why_useless(intensities) is not None:
         values = ", ".join(f"{value}" for value in intensities)
         sentences.append(
             f"The cloud has no useful intensity (values: {values}), so that only plates that "

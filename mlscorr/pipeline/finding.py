@@ -83,8 +83,7 @@ def find_targets(
     ValueError
         When no target is found, or none of those found matches.
     """
-    done = _bar(survey, progress)
-    return _checked(survey, *fit_while_reading(survey, read, rng, done))
+    return _checked(survey, *fit_while_reading(survey, read, rng, _bar(survey, progress)))
 
 
 def _bar(survey, progress):

@@ -54,13 +54,12 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
         data += next_data(rows, survey, library, members, compared)
     noise = {sign.name: _NOISE for sign in signs if sign.is_noise}
     best = {addition.survey: addition for addition in sorted(data, key=lambda a: -(a.after or 0.0))}
-    events = event_sizes(observed, signs)
     return PlannedSurvey(
         survey,
         tuple(library),
         rows,
         compared,
-        events,
+        event_sizes(observed, signs),
         tuple(best.values()),
         left_out | noise,
         _accuracy(survey, rows),

@@ -134,8 +134,7 @@ def tie_mounting(
     while True:
         moved = increments_by_scanner(corrections, *sightings)
         turned = turned_directions(features, _move(corrections, features.scanner))
-        pairs = pair_features(features, moved, sigma, radius, turned=turned)
-        ties = agreeing_ties(pairs, moved)
+        ties = agreeing_ties(pair_features(features, moved, sigma, radius, turned=turned), moved)
         if len(ties) == 0:
             return calibration
         corrections = previewed_mounting(calibration, matched, ties)

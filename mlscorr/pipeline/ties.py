@@ -220,7 +220,6 @@ def _misfit(misclosure):
 
 def _weakest(ties):
     """The direction that ties hold least, and one sigma of a shift along it. Units: m."""
-    held = information(ties, np.zeros(len(ties), int))[0]
-    values, axes = np.linalg.eigh(held)
+    values, axes = np.linalg.eigh(information(ties, np.zeros(len(ties), int))[0])
     sigma = float(values[0] ** -0.5) if values[0] > 0 else None
     return {"direction": axes[:, 0].tolist(), "sigma": sigma}

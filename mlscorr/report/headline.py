@@ -37,8 +37,7 @@ class Statement:
 
     def document(self) -> dict[str, object]:
         """The row of ``statements[]`` in report.json."""
-        items = [{"name": name, "text": text} for name, text in self.items]
-        return {**vars(self), "items": items}
+        return {**vars(self), "items": [{"name": name, "text": text} for name, text in self.items]}
 
 
 def first_screen(report: CorrectionReport) -> dict[str, object]:
@@ -192,8 +191,7 @@ def _uncontrolled(report):
         )
     sigma = max((stretch.sigma for stretch in report.support.weak), default=0.0)
     if sigma > 0:
-        length = length_in_words(sigma)
-        result += f" An error of up to {length} is to be expected (one sigma)."
+        result += f" An error of up to {length_in_words(sigma)} is to be expected (one sigma)."
     return result
 
 

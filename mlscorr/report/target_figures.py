@@ -125,8 +125,7 @@ def _draw(axes, target):
     points = (view.points - outline.centre) @ turn.T
     is_round = target.kind in ("circle", "hole")
     half = 75.0 * outline.size * (1.0 if is_round else 1.15)  # cm: its board and what is beside it
-    within = np.abs(points).max(axis=1) < half
-    rows = np.flatnonzero(within)
+    rows = np.flatnonzero(np.abs(points).max(axis=1) < half)
     # so many make a figure of some 20 kB
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), 350)).astype(int)]
     names = np.array(BEAMS)[view.state[rows].astype(int)]

@@ -78,8 +78,7 @@ def _figure(height, correction, report, change, sigma, rows):
         _set_range(panel, values, change[:, axis])
         _unused(panel, new, [row for row in rows if row.group == "unused"], axis)
     _shade(panels, new, span, report.support)
-    groups = {row.group for row in rows}
-    handles = _legend(new, groups, report.support, sigma is not None)
+    handles = _legend(new, {row.group for row in rows}, report.support, sigma is not None)
     style.legend_above(figure, handles, columns=2)
     return figure
 

@@ -31,8 +31,7 @@ def viewer_data(
         Those near which the cloud is shown more densely.
     """
     spread, spacing = thin_evenly(cloud.xyz)
-    rows = np.concatenate([spread, _near_rows(cloud.xyz, near)])
-    picked = cloud[rows]
+    picked = cloud[np.concatenate([spread, _near_rows(cloud.xyz, near)])]
     moved = correction.apply(picked).xyz
     origin = np.round(np.median(picked.xyz, axis=0))
     return {

@@ -67,5 +67,4 @@ class DisplacedSurvey(SimulatedSurvey):
                 self.mounting,
             )
             xyz = block.cloud.xyz + self.move(points)
-            moved = PointCloud(xyz, block.cloud.gps_time, block.cloud.intensity)
-            yield replace(block, cloud=moved)
+            yield replace(block, cloud=PointCloud(xyz, block.cloud.gps_time, block.cloud.intensity))

@@ -182,8 +182,7 @@ def _direction(name, points):
     sight = arm - pose.attitude.apply(points.mounting.lever_arm)
     axis = pose.attitude.apply(points.mounting.boresight.apply(UP))
     if name in ("east", "north", "height"):
-        unit = np.eye(3)[("east", "north", "height").index(name)]
-        return np.broadcast_to(unit, sight.shape)
+        return np.broadcast_to(np.eye(3)[("east", "north", "height").index(name)], sight.shape)
     if name == "clock":
         motion = _motion(points)
         return motion["velocity"] + np.cross(motion["turn"], arm)
@@ -254,8 +253,7 @@ def _motion_table(trajectory):
         span = (late.gps_time - early.gps_time)[:, None]
         velocity = (late.position - early.position) / span
         turn = (late.attitude * early.attitude.inv()).as_rotvec() / span
-        pose = trajectory.at(time)
-        right, forward, _ = np.moveaxis(pose.attitude.as_matrix(), 2, 0)
+        right, forward, _ = np.moveaxis(trajectory.at(time).attitude.as_matrix(), 2, 0)
         speed = np.linalg.norm(velocity, axis=1)
         values = {
             "time": time, "velocity": velocity, "turn": turn, "speed": speed,

@@ -83,8 +83,7 @@ def random_survey(
     if effects:
         scenario = Scenario(**{**scenario.model_dump(), "effects": list(effects)})
         made = simulate(scenario, np.random.default_rng(seed))
-    targets = replace(made.targets, position=made.targets.position + more)
-    return replace(made, targets=targets)
+    return replace(made, targets=replace(made.targets, position=made.targets.position + more))
 
 
 def random_scenario(rng: Generator, name: str = "survey") -> Scenario:
@@ -200,5 +199,4 @@ def _heavier(survey, rng):
     """
     happens, n = rng.random() < MIX.heavy_tails, len(survey.targets)
     stretch = np.sqrt((MIX.freedom - 2.0) / rng.chisquare(MIX.freedom, (n, 1)))
-    error = survey.targets.position - survey.true_centre
-    return happens * (stretch - 1.0) * error
+    return happens * (stretch - 1.0) * (survey.targets.position - survey.true_centre)

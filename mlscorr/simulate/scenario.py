@@ -150,8 +150,7 @@ class Scenario(_Part):
         if self.drive.file is not None:
             return None
         ways = [self.drive.speed / (p.speed or self.drive.speed) for p in self.drive.passes]
-        pauses = [p.pause for p in self.drive.passes[1:]]
-        return self.drive.duration * sum(ways) + sum(pauses)
+        return self.drive.duration * sum(ways) + sum(p.pause for p in self.drive.passes[1:])
 
     @model_validator(mode="after")
     def _holds_its_events(self):

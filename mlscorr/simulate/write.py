@@ -130,10 +130,9 @@ def _truth(survey, points):
 
 def _mounting(mounting):
     """Lever arm (m) and boresight (deg) as survey.toml has them."""
-    boresight = mounting.boresight.as_euler("xyz", degrees=True)
     return {
         "lever_arm": np.asarray(mounting.lever_arm).round(9).tolist(),
-        "boresight": boresight.round(9).tolist(),
+        "boresight": mounting.boresight.as_euler("xyz", degrees=True).round(9).tolist(),
     }
 
 

@@ -28,8 +28,7 @@ def rows_frame(rows: Iterable[Mapping[str, Any]]) -> pandas.DataFrame:
     """
     frame = _pandas().DataFrame([dict(_cells(row)) for row in rows])
     # a vector that is not known is None in its row, and NaN in the columns that others have
-    vectors = [name for name in frame if f"{name}_{AXES[0]}" in frame]
-    return frame.drop(columns=vectors)
+    return frame.drop(columns=[name for name in frame if f"{name}_{AXES[0]}" in frame])
 
 
 def columns_frame(columns: Mapping[str, Sequence | np.ndarray]) -> pandas.DataFrame:

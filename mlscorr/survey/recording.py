@@ -171,8 +171,7 @@ class Survey(Summary):
         ----------
         file : CloudFile
         """
-        parts = self.by_scanner.values()
-        return next((part for part in parts if file in part.clouds), self)
+        return next((part for part in self.by_scanner.values() if file in part.clouds), self)
 
     @property
     def mountings(self) -> tuple[Mounting | None, ...]:

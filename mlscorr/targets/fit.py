@@ -77,8 +77,7 @@ class FittedTarget(Centre):
         ----------
         other : FittedTarget
         """
-        apart = np.linalg.norm(self.position - other.position)
-        near = apart < max(self.size, other.size) / 2
+        near = np.linalg.norm(self.position - other.position) < max(self.size, other.size) / 2
         return bool(near and abs(self.gps_time - other.gps_time) < MATCHING.pause)
 
 
@@ -119,8 +118,7 @@ def fit_targets(
     if len(cloud) < SETTINGS.smallest_count:
         return []
     if not (np.diff(cloud.gps_time) >= 0).all():
-        order = np.argsort(cloud.gps_time, kind="stable")
-        cloud = cloud[order]
+        cloud = cloud[np.argsort(cloud.gps_time, kind="stable")]
     if origin is None:
         origin = cloud.xyz.mean(axis=0)
         cloud = replace(cloud, xyz=cloud.xyz - origin)

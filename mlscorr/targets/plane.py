@@ -203,8 +203,7 @@ def centre_of(echoes: "Echoes", plane: Plane, outline: "Outline", rows: np.ndarr
     which plain sigmas of a fit overlook: the residuals tell by how much.
     """
     crossing = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
-    basis = np.column_stack([np.ones(len(rows)), crossing - outline.centre])
-    weights = np.linalg.pinv(basis)[0]
+    weights = np.linalg.pinv(np.column_stack([np.ones(len(rows)), crossing - outline.centre]))[0]
     height = plane.coordinates(echoes.xyz[rows])[:, 2]
     free = max(len(rows) - 3, 1)
     variance = plane.sigma**2 * (free + 2) / free * _correlation_factor(height)

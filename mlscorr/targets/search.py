@@ -77,8 +77,7 @@ def _pieces(cloud, survey):
     regions = bright_regions(cloud.xyz, cloud.intensity)[: SETTINGS.largest_fits]
     centre = np.array([region.centre for region in regions]).reshape(-1, 3)
     radius = 2 * np.array([region.radius for region in regions])  # what lies behind its edges
-    balls = Neighbourhoods(centre, radius).each(cloud.xyz)
-    for region, rows in zip(regions, balls, strict=True):
+    for region, rows in zip(regions, Neighbourhoods(centre, radius).each(cloud.xyz), strict=True):
         for _, visit in split_visits(cloud[rows], survey):
             surplus = max(0, len(visit) - SETTINGS.piece_points)  # of a stop in front of it
             piece = visit[surplus // 2 : len(visit) - (surplus + 1) // 2]

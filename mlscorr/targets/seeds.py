@@ -230,8 +230,7 @@ def _gaps(echoes, plane, points, size):
     height, beam = plane.coordinates(echoes.xyz)[:, 2], echoes.sight(slice(None)) @ plane.axes[2]
     blocked = (height * beam < 0) & (np.abs(height) > echoes.tolerance)
     blocked &= _steep(echoes, plane)
-    before = plane.crossing(echoes.xyz[blocked], echoes.sight(blocked))
-    known = np.vstack([points, before])
+    known = np.vstack([points, plane.crossing(echoes.xyz[blocked], echoes.sight(blocked))])
     known = known[:: len(known) // SETTINGS.piece_points + 1]
     if len(known) < SETTINGS.smallest_count:
         return

@@ -143,7 +143,6 @@ def plan_page(document: dict, name: str) -> Page:
 def _page(document, name, headline, summary, sections, separability, content):
     """The Page with what both have."""
     advice_title, sentences = advice(document)
-    parameters = separability["correlation"]["names"]
     common = {
         "document": document,
         "name": name,
@@ -151,7 +150,7 @@ def _page(document, name, headline, summary, sections, separability, content):
         "advice_title": advice_title,
         "advice": sentences,
         "classes": [titles(members) for members in separability["classes"]],
-        "parameter_count": len(parameters),
+        "parameter_count": len(separability["correlation"]["names"]),
         "left_out": [(title(k), why) for k, why in (document.get("left_out") or {}).items()],
     }
     if document.get("created"):

@@ -28,8 +28,7 @@ def site_map(document: dict) -> Figure:
     places += [row["position"][:2] for row in (*site["targets"], *rows)]
     points = [numbers(place) for place in places] or [np.zeros(2), np.ones(2)]
     low, high = corners(np.array(points), 0.12)
-    share = np.clip((high - low)[1] / (high - low)[0], 0.25, 1.6)
-    figure, panels = map_panels(len(states), share)
+    figure, panels = map_panels(len(states), np.clip((high - low)[1] / (high - low)[0], 0.25, 1.6))
     figure.set_dpi(180)
     for panel, state in zip(panels, states, strict=True):
         colours = _draw(panel, site, rows, state)

@@ -51,8 +51,7 @@ def verdict(document: dict) -> VerdictBox:
     if not is_judged(document):
         short = "Too little of this survey could be compared with the simulator."
         return VerdictBox("open", "It can't be told yet", [answer["sentence"] or short])
-    make = {"none": _nothing, "unknown": _unknown}.get(kind, _cause)
-    box = make(document)
+    box = {"none": _nothing, "unknown": _unknown}.get(kind, _cause)(document)
     others = not_ruled_out(document)
     more = [f"Not ruled out: {others}."] if others else []
     return box._replace(sentences=[*box.sentences, *more])

@@ -72,8 +72,7 @@ def draw(
     _check(options, views, engine)
     stream = _stream(survey, chunks, progress)
     rows = recomputed([row for row in targets if row.is_observed], correction)
-    looked_at = stream("Looking at the cloud")
-    to_draw = _views(survey, correction, rows, views, options, looked_at, ties)
+    to_draw = _views(survey, correction, rows, views, options, stream("Looking at the cloud"), ties)
     sigmas = point_sigma(survey.trajectory), point_sigma(getattr(correction, "corrected", None))
     largest = max((np.prod(view.camera.size) for view in to_draw), default=1)
     bytes_of_view = 2 * largest * np.dtype(np.uint64).itemsize  # before and after

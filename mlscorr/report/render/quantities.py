@@ -131,8 +131,7 @@ def paint(colour: str, value: np.ndarray, ends: tuple[float, float]) -> np.ndarr
     if colour in PAIRS:
         return rgb(*PAIRS[colour])[np.nan_to_num(value).astype(int) % len(PAIRS[colour])]
     share = np.clip((value - ends[0]) / (ends[1] - ends[0]), 0, 1)
-    level = np.nan_to_num(share * 255).astype(np.uint8)
-    picture = colour_table(colour)[level]
+    picture = colour_table(colour)[np.nan_to_num(share * 255).astype(np.uint8)]
     picture[np.isnan(value)] = rgb(GREY)
     return picture
 

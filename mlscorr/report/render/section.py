@@ -137,8 +137,7 @@ def _wall(scouted, rows):
     normal = np.append(vectors[:, 0], 0.0)
     foot = float(np.percentile(xyz[:, 2], 5))
     shift = np.median(xyz - scouted.before.xyz[rows], axis=0)
-    time = scouted.before.gps_time[rows]
-    splits, visits = _visits(time)
+    splits, visits = _visits(scouted.before.gps_time[rows])
     if len(visits) < 2:
         moved = float(np.hypot(shift @ normal, shift[2]))
         return Place(middle, normal, shift, ground, foot, moved, ())

@@ -24,8 +24,7 @@ def poses(trajectory: Trajectory, gps_time: np.ndarray) -> tuple[np.ndarray, Rot
     gps_time : (n,) array
         Rising. Units: s.
     """
-    local = trajectory.position - trajectory.position[0]
-    spline = CubicSpline(trajectory.gps_time, local)
+    spline = CubicSpline(trajectory.gps_time, trajectory.position - trajectory.position[0])
     start, end = trajectory.gps_time[[0, -1]]
     inside = np.clip(gps_time, start, end)
     position = spline(inside)

@@ -106,8 +106,7 @@ def gnss_fixes(
     """
     sky_rng, noise_rng, path_rng = rng.spawn(3)
     azimuth, elevation = _constellation(gps_time, sky_rng)
-    hidden = wall_elevation(azimuth, heading, walls)
-    visible = elevation > np.maximum(hidden, RECEIVER.mask)
+    visible = elevation > np.maximum(wall_elevation(azimuth, heading, walls), RECEIVER.mask)
     oblique = np.hypot(1.0, 1 / np.sin(np.maximum(elevation, RECEIVER.mask)))
     sigma = np.sqrt(2) * RECEIVER.phase_noise * oblique  # against a base station as good
     error = sigma * noise_rng.standard_normal(sigma.shape)

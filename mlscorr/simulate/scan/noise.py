@@ -67,8 +67,7 @@ class ScannerNoise:
         """Numbers for the first echoes of all pulses, and for some later ones."""
         first = self._first[source].result()
         if more:
-            later = DRAWS[source](self._later[source], more, self._size[source])
-            return np.append(first, later)
+            return np.append(first, DRAWS[source](self._later[source], more, self._size[source]))
         return first
 
     def angle(self, angle: np.ndarray) -> np.ndarray:

@@ -141,9 +141,8 @@ class Platform:
             Whether beams need the direction of their sweep.
         """
         n = len(number)
-        names = ("gps_time", "angle", "elevation")
         rays = Rays(
-            **{name: room.array(name, n) for name in names},
+            **{name: room.array(name, n) for name in ("gps_time", "angle", "elevation")},
             ray=room.array("ray", n, 9),
             single=room.array("single", n, 6, dtype=np.float32),
         )

@@ -98,11 +98,10 @@ class Replay:
         ----------
         met : Met
         """
-        noise = self.survey.scanner.range_noise * self.draws.range
         returns = Returns(
             gps_time=self._time,
             angle=self._angle,
-            range=met.range + noise,
+            range=met.range + self.survey.scanner.range_noise * self.draws.range,
             intensity=met.intensity,
             incidence=met.incidence,
             kept=np.isfinite(met.range),
@@ -202,8 +201,7 @@ def _without_pose(recorded, true, changed):
 
 def _without_mount(recorded, true, changed):
     lever_arm = recorded.lever_arm - (changed.lever_arm - true.lever_arm)
-    boresight = true.boresight * changed.boresight.inv() * recorded.boresight
-    return Mounting(lever_arm, boresight)
+    return Mounting(lever_arm, true.boresight * changed.boresight.inv() * recorded.boresight)
 
 
 def true_targets(targets: ControlPoints, effects: tuple, reference: Reference) -> ControlPoints:

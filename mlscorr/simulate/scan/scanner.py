@@ -107,11 +107,10 @@ def turn_of(scanner: ScannerScenario) -> Turn:
     turned = np.arange(count) / count
     low, high = scanner.field_of_view
     in_view = np.mod(360.0 * turned - low, 360.0) <= high - low
-    elevation = np.tile(np.radians(rings), scanner.points_per_line)
     return Turn(
         turned[in_view],
         2 * np.pi * turned[in_view],
-        elevation[in_view],
+        np.tile(np.radians(rings), scanner.points_per_line)[in_view],
         float(scanner.lines_per_second),
     )
 

@@ -273,8 +273,7 @@ def scatter(
     things = []
     for i in range(count):
         lengths = start + stretch * (i + rng.uniform(0.0, 1.0, places))
-        sides = rng.choice([-1, 1], places)
-        for s, side in zip(lengths, sides, strict=True):
+        for s, side in zip(lengths, rng.choice([-1, 1], places), strict=True):
             if is_free(s, side):
                 things.append((s, side))
                 break

@@ -112,8 +112,7 @@ class River:
             near, far = self._front(row)
             inward = np.cross(far - near, UP)
             inward /= np.linalg.norm(inward)
-            reflectance = self._house_rng.uniform(0.2, 0.5)
-            pieces.append(house(near, far, inward, row[3], reflectance))
+            pieces.append(house(near, far, inward, row[3], self._house_rng.uniform(0.2, 0.5)))
         return join(pieces)
 
     def _bank(self, stretch):
@@ -267,8 +266,7 @@ class River:
 
     def _car(self, s, inland, rng):
         along = self._facing(s)
-        right = np.cross(along, UP)
-        return car(self._foot(s, inland), along, right, rng.uniform(0.1, 0.5))
+        return car(self._foot(s, inland), along, np.cross(along, UP), rng.uniform(0.1, 0.5))
 
     def _bush(self, s, inland, rng):
         size = rng.uniform(0.5, 1.0)

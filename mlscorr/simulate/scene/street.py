@@ -43,8 +43,7 @@ class Street:
             s = -SETTINGS.margin
             while s < self.length + SETTINGS.margin - 14.0:
                 width = rng.uniform(8.0, 14.0)
-                setback = rng.uniform(0.0, 0.4)
-                front = self._front(side, s, s + width, setback)
+                front = self._front(side, s, s + width, rng.uniform(0.0, 0.4))
                 if self._is_clear(front):
                     houses.append(front)
                 gap = rng.uniform(2.0, 5.0)
@@ -54,8 +53,7 @@ class Street:
     def _front(self, side, start, end, setback):
         """A front whose middle keeps off the pavement too where the street bends."""
         s = np.linspace(start, end, 5)
-        kerb = self.section.half_width(s).max()
-        lateral = side * (kerb + self.section.pavement + setback)
+        lateral = side * (self.section.half_width(s).max() + self.section.pavement + setback)
         corners = self.line.place(s, lateral, self.section.kerb)
         chord = corners[0] + np.linspace(0, 1, 5)[:, None] * (corners[-1] - corners[0])
         _, _, right = self.line.frame(s)
