@@ -14,7 +14,7 @@ from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene.bank import Bank
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, scatter
-from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, join
+from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, join, unit
 from mlscorr.simulate.scene.things import car, house, lamp, leaves, tree
 from mlscorr.simulate.settings import SETTINGS
 
@@ -110,8 +110,7 @@ class River:
         pieces += [self._cross_wall(stretch.start) for stretch in self.stretches[1:]]
         for row in self.houses:
             near, far = self._front(row)
-            inward = np.cross(far - near, UP)
-            inward /= np.linalg.norm(inward)
+            inward = unit(np.cross(far - near, UP))
             pieces.append(house(near, far, inward, row[3], self._house_rng.uniform(0.2, 0.5)))
         return join(pieces)
 
@@ -173,7 +172,7 @@ class River:
     def _facing(self, s):
         """Horizontal unit vector (3,) along the shore, with minus it x UP towards the water."""
         ends = self.place(np.array([s - 0.2, s + 0.2]), 0.0, 0.0)
-        return (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        return unit(ends[1] - ends[0])
 
     def _on_house(self, s, half, rng):
         """On a house front, 2 cm before it."""
@@ -184,7 +183,7 @@ class River:
         else:
             return None
         near, far = self._front(row)
-        u = -(far - near) / np.linalg.norm(far - near)
+        u = -unit(far - near)
         foot = near + (s - row[0]) / (row[1] - row[0]) * (far - near)
         low = max(1.4, half + 0.4)
         centre = foot + rng.uniform(low, low + 0.8) * UP + 0.02 * np.cross(u, UP)
@@ -216,9 +215,8 @@ class River:
         steps = np.array([-0.2, 0.2])
         along = self.place(s + steps, inland, self.bank.height("slope", inland))
         up = self.place(s, inland + steps, self.bank.height("slope", inland + steps))
-        u = -(along[1] - along[0]) / np.linalg.norm(along[1] - along[0])
-        normal = np.cross(u, up[1] - up[0])
-        normal /= np.linalg.norm(normal)
+        u = -unit(along[1] - along[0])
+        normal = unit(np.cross(u, up[1] - up[0]))
         centre = along.mean(axis=0) + 0.01 * normal
         lateral = float(self.shore(s) + inland)
         return TargetSpot("road", s, lateral, centre, u, np.cross(normal, u), centre[2])

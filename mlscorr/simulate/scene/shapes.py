@@ -121,6 +121,11 @@ def post(foot: np.ndarray, height: float, width: float, reflectance: float) -> M
     return box(foot - (u + v) / 2, u, v, height * UP, reflectance)
 
 
+def unit(vector: np.ndarray) -> np.ndarray:
+    """The vector (3,) of length one in the same direction."""
+    return vector / np.linalg.norm(vector)
+
+
 def ray_caster(triangles: np.ndarray) -> Any:
     """Open3D's ray caster of triangles (n, 3, 3) about a local origin, in their order.
 

@@ -12,7 +12,7 @@ from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, eyes, scatter
 from mlscorr.simulate.scene.section import section
-from mlscorr.simulate.scene.shapes import UP, Mesh, four_corners, join, sees
+from mlscorr.simulate.scene.shapes import UP, Mesh, four_corners, join, sees, unit
 from mlscorr.simulate.scene.things import car, house, lamp, tree
 from mlscorr.simulate.settings import SETTINGS
 
@@ -66,13 +66,10 @@ class Street:
         """Whether no other part of the way runs through a house."""
         steps = np.linspace(0.0, 1.0, 5)[:, None]
         points = front.near + steps * (front.far - front.near)
-        inward = front.side * np.cross(front.far - front.near, UP)
-        inward /= np.linalg.norm(inward)
+        inward = unit(front.side * np.cross(front.far - front.near, UP))
         points = np.concatenate([points, points + 4.0 * inward, points + 8.0 * inward])
-        return (
-            self.line.distance(points)
-            > self.section.road + self.section.pavement - self.section.clearance
-        ).all()
+        way = self.section.road + self.section.pavement - self.section.clearance
+        return (self.line.distance(points) > way).all()
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -80,8 +77,7 @@ class Street:
         rng, low_high = self._house_rng, self.scenario.house_height
         pieces = [self._ground(), *(self._markings() if self.scenario.markings else ())]
         for front in self.houses:
-            inward = front.side * np.cross(front.far - front.near, UP)
-            inward /= np.linalg.norm(inward)
+            inward = unit(front.side * np.cross(front.far - front.near, UP))
             height, reflectance = rng.uniform(*low_high), rng.uniform(0.2, 0.5)
             pieces.append(house(front.near, front.far, inward, height, reflectance))
         return join(pieces)
@@ -196,9 +192,8 @@ class Street:
         _, forward, _ = self.line.frame(s)
         u = -side * (forward - forward[2] * UP) / np.linalg.norm(forward[:2])
         edge = float(self.section.half_width(s))
-        lateral = side * (
-            edge + rng.uniform(0.6, max(0.7, min(1.1, self.section.pavement - 0.6 * half)))
-        )
+        farthest = max(0.7, min(1.1, self.section.pavement - 0.6 * half))
+        lateral = side * (edge + rng.uniform(0.6, farthest))
         foot = self.line.place(s, lateral, self.section.kerb)
         low = max(1.0, half + 0.2)
         centre = foot + rng.uniform(low, low + 1.2) * UP
@@ -212,9 +207,8 @@ class Street:
         steps = np.array([-0.2, 0.2])
         along = self.line.place(s + steps, lateral, self.section.height(s + steps, lateral))
         across = self.line.place(s, lateral + steps, self.section.height(s, lateral + steps))
-        forward = (along[1] - along[0]) / np.linalg.norm(along[1] - along[0])
-        normal = np.cross(across[1] - across[0], forward)
-        normal /= np.linalg.norm(normal)
+        forward = unit(along[1] - along[0])
+        normal = unit(np.cross(across[1] - across[0], forward))
         right = np.cross(forward, normal)
         spin = rng.uniform(0.0, np.pi / 2)
         u = np.cos(spin) * right + np.sin(spin) * forward
