@@ -98,11 +98,8 @@ class PositionStep(Effect):
     time: float = quantity("s", 86_400.0, IN_TIME, least=0.0)
 
     def _error(self, value, reference, rng):
-        start = reference.start + self.time
-        number = int(value.segment(start))
-        if number < 0:
-            raise ValueError(_outside(self, value, reference))
-        hit = (value.gps_time >= start) & (value.segment(value.gps_time) == number)
+        start = _moment(self, value, reference)
+        hit = (value.gps_time >= start) & (value.segment(value.gps_time) == value.segment(start))
         return hit[:, None] * np.array(self.magnitude)
 
 
@@ -160,9 +157,7 @@ class PositionBump(Effect):
     )
 
     def _error(self, value, reference, rng):
-        middle = reference.start + self.time
-        if value.segment(middle) < 0:
-            raise ValueError(_outside(self, value, reference))
+        middle = _moment(self, value, reference)
         shape = np.exp(-0.5 * ((value.gps_time - middle) / self.width) ** 2)
         return shape[:, None] * np.array(self.magnitude)
 
@@ -253,10 +248,13 @@ class PositionNoise(Effect):
         return np.cos(angle) * noise[before] + np.sin(angle) * noise[before + 1]
 
 
-def _outside(effect, trajectory, reference):
-    """The sentence for an event at a time at which nothing was recorded."""
-    end = trajectory.gps_time[-1] - reference.start
-    return (
-        f"{effect.name} at {effect.time:g} s lies outside the trajectory, which ends after "
-        f"{end:.1f} s, or in one of its {len(trajectory.gaps)} gaps between passes."
-    )
+def _moment(effect, trajectory, reference):
+    """The gps_time (s) of an event; one at which nothing was recorded is refused."""
+    moment = reference.start + effect.time
+    if trajectory.segment(moment) < 0:
+        end = trajectory.gps_time[-1] - reference.start
+        raise ValueError(
+            f"{effect.name} at {effect.time:g} s lies outside the trajectory, which ends after "
+            f"{end:.1f} s, or in one of its {len(trajectory.gaps)} gaps between passes."
+        )
+    return moment
