@@ -64,9 +64,7 @@ def positional_accuracy(
 
 def _rms(values, axes):
     """Root of the mean square length of the first axes of vectors, None without any."""
-    if len(values) == 0:
-        return None
-    return float(np.sqrt((values[:, :axes] ** 2).sum(axis=1).mean()))
+    return float(np.sqrt((values[:, :axes] ** 2).sum(axis=1).mean())) if len(values) else None
 
 
 def _joined(fit, survey):

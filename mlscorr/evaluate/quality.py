@@ -135,10 +135,8 @@ def _value(quantity, report):
         return len(rows) if name == "n" else max((row[name] for row in rows), default=0.0)
     if quantity in COUNTS:
         return report[group][name]
-    if group == "leave_one_out":
-        values = report["control"]["leave_one_out"]
-    else:
-        values = report[group]["after"]
+    left_out = group == "leave_one_out"
+    values = report["control"]["leave_one_out"] if left_out else report[group]["after"]
     statistic, _, axis = name.partition("_")
     if axis not in AXES:
         return values.get(name)

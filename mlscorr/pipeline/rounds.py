@@ -120,8 +120,7 @@ def diagnose_until_none(
             break
         rounds.append(diagnose(survey, improved, library, progress=progress, costs=costs))
     first = rounds[0]
-    lone = lone_effects(
-        first.rows, first.signatures, first.inference, np.random.default_rng(SETTINGS.seed)
-    )
+    rng = np.random.default_rng(SETTINGS.seed)
+    lone = lone_effects(first.rows, first.signatures, first.inference, rng)
     rounds[1:] = [replace(each, signatures=()) for each in rounds[1:]]
     return DiagnosedRounds(tuple(rounds), lone)

@@ -68,9 +68,7 @@ class SightedTarget:
 
 
 def _nearest(place, own, others):
-    if len(others) == 0:
-        return None
-    return others[cKDTree(place[others]).query(place[own])[1]]
+    return others[cKDTree(place[others]).query(place[own])[1]] if len(others) else None
 
 
 def sightings_of(rows: Rows, finding: Any) -> list[Sighting]:

@@ -144,12 +144,10 @@ def _on_planes(chunk, rows, count, sample, normal):
         sigma = np.maximum(np.sqrt(np.add.reduceat(squares, first) / held), SETTINGS.file_step / 2)
     on = np.flatnonzero(np.abs(height - middle[group]) <= SETTINGS.trims[-1] * sigma[group])
     on = on[np.lexsort((chunk.gps_time[rows[on]], group[on]))]
-    clouds = np.empty(len(count), dtype=object)
+    clouds, limit = np.empty(len(count), dtype=object), SETTINGS.patch_pulses
     for i, part in enumerate(np.split(rows[on], np.searchsorted(group[on], range(1, len(count))))):
-        taken = (
-            (np.arange(SETTINGS.patch_pulses) + 0.5) * len(part) / SETTINGS.patch_pulses
-        ).astype(int)
-        clouds[i] = chunk[part[taken] if len(part) > SETTINGS.patch_pulses else part]
+        taken = ((np.arange(limit) + 0.5) * len(part) / limit).astype(int)
+        clouds[i] = chunk[part[taken] if len(part) > limit else part]
     return clouds
 
 

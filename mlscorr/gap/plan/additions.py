@@ -62,9 +62,8 @@ def additions(rows: Rows, survey: Survey) -> tuple[Addition, ...]:
     ]
     if len(targets):
         items = np.unique(rows.item[targets])
-        near = items[
-            np.linspace(0, len(items) - 1, min(SETTINGS.stop_targets, len(items))).astype(int)
-        ]
+        count = min(SETTINGS.stop_targets, len(items))
+        near = items[np.linspace(0, len(items) - 1, count).astype(int)]
         made += [
             _more_targets("as many targets again, between the others", rows, survey, items),
             _more_targets(

@@ -213,9 +213,7 @@ class Bench:
         whole = self.survey.trajectory
         step = max(1, int(SETTINGS.epoch_step / np.median(np.diff(whole.gps_time))))
         ends = np.searchsorted(whole.gps_time, whole.gaps)
-        rows = np.unique(
-            np.concatenate([np.arange(0, len(whole), step), ends.ravel(), [len(whole) - 1]])
-        )
+        rows = np.unique(np.r_[0 : len(whole) : step, ends.ravel(), len(whole) - 1])
         session = None if whole.session is None else whole.session[rows]
         pose = whole.gps_time[rows], whole.position[rows], whole.attitude[rows]
         thin = Trajectory(*pose, session=session)

@@ -79,9 +79,7 @@ def given_error(trajectory: Trajectory, series: PosErrorSeries, rng: Generator) 
             f"{duration:.1f} s: take a longer series or a shorter pass."
         )
     begin = series.gps_time[0] + rng.uniform(0.0, spare)
-    gps_time = np.clip(
-        begin + trajectory.gps_time - trajectory.gps_time[0], None, series.gps_time[-1]
-    )
+    gps_time = np.minimum(begin + trajectory.gps_time - trajectory.gps_time[0], series.gps_time[-1])
     smallest = SETTINGS.smallest_position_sigma, SETTINGS.smallest_attitude_sigma
     columns = (
         series.position,
