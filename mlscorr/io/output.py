@@ -92,9 +92,10 @@ def _place(out):
         if out.is_dir() and os.access(out, os.W_OK):
             return out.resolve()
         refusing, cause = (out, "not writable") if probe.exists() else (above, error.strerror)
+        lacks = "used" if out.is_dir() else "made"
         raise OSError(
-            f"the output folder {out} can't be used: {refusing} takes no folder ({cause}). Choose "
-            "another place."
+            f"the output folder {out} can't be {lacks}: {refusing} takes no folder ({cause}). "
+            "Choose another place."
         ) from None
     finally:  # wherever an interruption left it
         for folder in (probe, inside):
