@@ -31,7 +31,7 @@ FAMILIES = ("exponential", "matern32", "matern52")  # of 1, 2, 3 states, which n
 INTEGRATED = "integrated"
 INTEGRATED_KIND = len((*FAMILIES, INTEGRATED))
 SERIES_BELOW = 1.0  # beyond it 1 - exp(-y) sum loses no more than three digits
-LARGEST_LAG = float(-np.log(np.square(np.finfo(float).eps)))  # exp(-x / 2) is nothing beside one
+LARGEST_LAG = float(-np.log(np.finfo(float).tiny))  # exp(-x) is the smallest number there is
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from scipy.linalg import LinAlgError, block_diag, cholesky, solve_triangular
 
-from mlscorr.collocation.covariance import LARGEST_LAG, correlation
+from mlscorr.collocation.covariance import correlation
 from mlscorr.collocation.model import (
     LARGEST_ERROR,
     NOT_POSITIVE,
@@ -28,6 +28,8 @@ from mlscorr.collocation.sparse_rows import SparseRows
 from mlscorr.collocation.states import Layout
 
 CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
+# Time lag in units of 1 / rate at which rounding leaves no correlation, of exp(-x / 2) neither
+UNCORRELATED_LAG = float(-np.log(np.square(np.finfo(float).eps)))
 
 
 def collocate_dense(
@@ -188,7 +190,7 @@ def _add_signals(layout, clocks, mixing, row, total):
                 break
             for s in range(layout.states.size):
                 lag = layout.rates[s] * (clocks[i, s] - clocks[j, s])
-                if abs(lag) > LARGEST_LAG:
+                if abs(lag) > UNCORRELATED_LAG:
                     continue
                 weight = 0.0
                 for k in range(processes[s], processes[s + 1]):
