@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -78,9 +78,13 @@ def estimate_survey(
     Raises
     ------
     ValueError
-        As ``find_control``, and where ties alone are asked for and there is none.
+        As ``find_control``, for another use of ties, and where they alone are asked for and there
+        is none.
     """
     ties = ("auto" if survey.use_ties else "off") if ties is None else ties
+    if ties not in get_args(TieUse):
+        known = ", ".join(map(repr, get_args(TieUse)))
+        raise ValueError(f"ties = {ties!r} is no use of ties: give one of {known}, or None.")
     if ties == "only":
         survey = without_control(survey)
     collector = TieCollector(survey)

@@ -439,12 +439,12 @@ def test_bad_control_is_refused(tmp_path, old, new, message):
 
 
 def test_sigmas_in_millimetres_are_one_warning(tmp_path):
-    "A list in another unit is told once, not twice a point, so that other warnings can be read"
+    "A list in another unit is named once, not twice a point, so that other warnings can be read"
     text = CONTROL.replace(",0.003,", ",3,").replace(",0.004,", ",4,")
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning) as warned:
         read_control(control(tmp_path, text=text))
-    assert len(told) == 1
-    sentence = str(told[0].message)
+    assert len(warned) == 1
+    sentence = str(warned[0].message)
     assert re.search(r"T01 .* 3 m .*\(millimetres\?\), nor will 3 more sigmas\.", sentence)
 
 

@@ -67,6 +67,12 @@ def test_ties_alone_bring_passes_together(survey):
     assert list(misfit(result))[1] < 0.005  # m
 
 
+def test_another_use_of_ties_is_refused(survey):
+    "A misspelt use is no silent default: what may be given is named"
+    with pytest.raises(ValueError, match=r"ties = 'never' .* 'auto', 'off', 'only', or None"):
+        mlscorr.correct(survey, ties="never")
+
+
 def test_the_report_tells_what_ties_did(tied, tmp_path):
     """report.json has misfits by pair of passes, and shares that add up to one; the page shows the
     ties on a map, and a wall as each pass saw it

@@ -33,10 +33,10 @@ def all_pairs(features, place, sigma, radius, shift):
     "Pairs (k, 2) within the gates, of all that two visits make, by their definition"
     visit, kind = visit_number(features), features.kind
     first, second = np.nonzero(visit[:, None] < visit)
-    one, other = features.direction[first], features.direction[second]
-    cosine = np.einsum("ni,ni->n", one, other)
+    before, after = features.direction[first], features.direction[second]
+    cosine = np.einsum("ni,ni->n", before, after)
     sign = np.where((cosine < 0) & np.isin(kind[first], ("line", "dash")), -1.0, 1.0)
-    axis = one + sign[:, None] * other
+    axis = before + sign[:, None] * after
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     apart = place[second] + shift[second] - place[first]
     along = np.abs(np.einsum("ni,ni->n", apart, axis))
