@@ -222,6 +222,6 @@ def missing_sentence(
         hint += " It holds no coordinates: is another file meant?"
     elif others:
         where = f"columns.{missing[0]} = '{shown(near or others[0])}'"
-        hint += f" Another name is told under [control] or [trajectory] in survey.toml, as {where}."
+        hint += f" Name it under [control] or [trajectory] in survey.toml, as {where}."
     names = shown(", ".join(header)) or "no header"
     return f"{path} has no column {', '.join(missing)}; it has {names}.{hint}"
