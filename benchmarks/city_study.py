@@ -221,7 +221,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("drives", type=int, nargs="*", default=[1, 2])
     parser.add_argument("--tiles", type=int, default=4, help="Of each drive.")
-    parser.add_argument("--limit", type=int, default=SETTINGS.area_features, help="Of an area.")
+    parser.add_argument("--limit", type=int, default=SETTINGS.area_seconds, help="Of an area, s.")
     parser.add_argument("--seed", type=int, default=0, help="Of the city and its drives.")
     parser.add_argument("--run", action="store_true")
     given = parser.parse_args()

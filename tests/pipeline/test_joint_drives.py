@@ -9,7 +9,7 @@ from mlscorr.io.project_file import read_project
 from mlscorr.io.task_store import TaskStore
 from mlscorr.io.time_systems import WEEK
 from mlscorr.pipeline.file_finding import find_in_file
-from mlscorr.pipeline.project.areas import areas_of, margin_of, pieces_of
+from mlscorr.pipeline.project.areas import areas_of, margin_of, pieces_of, places_each_second
 from mlscorr.pipeline.project.city import drives_by_areas, project_drives
 from mlscorr.pipeline.project.corrected import found_drive
 from mlscorr.pipeline.project.engine import engine
@@ -20,6 +20,7 @@ from tests.beds import project_street as bed
 
 ORIGIN = np.array([*bed.PLACE, 0.0])
 AWAY = np.array([5000.0, 0.0, 0.0])  # m
+ABOVE = np.array([0.0, 0.0, 60.0])  # m
 
 
 @pytest.fixture(scope="module")
@@ -225,6 +226,30 @@ def test_nothing_corrects_a_drive_elsewhere(drives):
     alone = results([first])["first"][0]
     assert np.array_equal(added(apart["first"][0]), added(alone))
     assert apart["first"][1].state == "controlled"
+
+
+def test_a_drive_that_nothing_ties_leaves_the_others_as_they_are(drives, together):
+    "On a bridge 60 m above them a third one is uncorrected, and changes both others by 2 mm at most"
+    first, second = drives
+    third = elsewhere(second, 3600.0, ABOVE)
+    third = replace(third, survey=replace(third.survey, name="third"))
+    three = results([first, second, third])
+    assert [three[name][1].state for name in ("first", "second", "third")] == [
+        "controlled", "tied", "uncorrected",
+    ]  # fmt: skip
+    assert np.abs(added(three["third"][0])).max() < 1e-9
+    for name in ("first", "second"):
+        assert np.abs(added(three[name][0]) - added(together[name][0])).max() < 0.002  # m
+        assert three[name][1].tied_with.keys() == together[name][1].tied_with.keys()
+
+
+def test_areas_count_time_and_not_what_was_seen(drives):
+    "With a fifth of the planes there are as many seconds, in the order of time, 5 or 6 of each drive"
+    thin = [replace(drive, features=drive.features[::5]) for drive in drives]
+    places = [places_each_second([drive]) for drive in drives]
+    assert {len(places_each_second([drive])) for drive in thin} <= {5, 6}
+    assert [len(part) for part in places] == [len(places_each_second([drive])) for drive in thin]
+    np.testing.assert_array_equal(places_each_second(drives), np.vstack(places))
 
 
 def test_passes_without_any_control_fit_to_one_another_only(drives):

@@ -2,8 +2,9 @@
 
 Ties may join the drives of a whole city, and what solves them together grows faster than they do.
 What a place far away tells of a drive here has faded on the way. So a city is cut where as much
-lies on both sides, until no part holds more planes and poles than a machine takes at once. Areas
-share no estimate: each uses what was recorded in it and in its margin, and no more.
+was driven on both sides, until no part holds more than a machine takes at once; what that costs
+goes with the time of the drives, however much they saw. Areas share no estimate: each uses what was
+recorded in it and in its margin, and no more.
 """
 
 from __future__ import annotations
@@ -83,6 +84,18 @@ def margin_of(drives: Sequence[FoundDrive]) -> float:
     way = sum(np.linalg.norm(np.diff(t.position, axis=0), axis=1).sum() for t in recorded)
     seconds = sum(float(np.ptp(t.gps_time)) for t in recorded)
     return max(TIES.pause * float(way) / seconds, drives[0].survey.search_radius)
+
+
+def places_each_second(drives: Sequence[FoundDrive]) -> np.ndarray:
+    """A place (n, 3) of what drives saw in each second of them. Units: m.
+
+    Parameters
+    ----------
+    drives : sequence of FoundDrive
+    """
+    seen = [drive.features for drive in drives]
+    first = [np.unique(np.floor(part.gps_time), return_index=True)[1] for part in seen]
+    return np.vstack([part.centre[rows] for part, rows in zip(seen, first, strict=True)])
 
 
 def areas_of(places: np.ndarray, limit: int, margin: float) -> list[Area]:

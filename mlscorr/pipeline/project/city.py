@@ -10,7 +10,14 @@ import numpy as np
 
 from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
-from mlscorr.pipeline.project.areas import Area, Piece, areas_of, margin_of, pieces_of
+from mlscorr.pipeline.project.areas import (
+    Area,
+    Piece,
+    areas_of,
+    margin_of,
+    pieces_of,
+    places_each_second,
+)
 from mlscorr.pipeline.project.corrected import DriveState, corrected_drives
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive
 from mlscorr.pipeline.project.joint import FoundDrive
@@ -84,7 +91,7 @@ def project_drives(
     origin: np.ndarray,
     with_ties: bool,
     work: Callable[[Iterable[AreaInput]], list[list[AreaResult]]] = in_turn,
-    limit: int = SETTINGS.area_features,
+    limit: int = SETTINGS.area_seconds,
 ) -> Iterator[tuple[CorrectedSurvey, DriveState]]:
     """The results of all drives.
 
@@ -100,12 +107,11 @@ def project_drives(
     work : function of AreaInputs
         Gives the results of each.
     limit : int
-        Of planes and poles in an area and its margin.
+        Of the time that drives spend in an area and its margin. Units: s.
     """
     groups = near_drives(drives) if with_ties else [[drive] for drive in drives]
     for group in groups:
-        places = np.vstack([drive.features.centre for drive in group])
-        areas = areas_of(places, limit, margin_of(group))
+        areas = areas_of(places_each_second(group), limit, margin_of(group))
         if with_ties and len(areas) > 1:
             yield from drives_by_areas(group, areas, order, origin, work)
             continue

@@ -96,7 +96,8 @@ def corrected_drives(
             section=ties,
         )
         results.append(corrected)
-    return list(zip(results, states, strict=True))
+    pairs = zip(results, states, strict=True)
+    return [(corrected, state) for corrected, state in pairs if state.name in part.names]
 
 
 def drive_fields(drive: FoundDrive, estimate: Estimate) -> dict[str, Any]:

@@ -21,17 +21,25 @@ class JointEstimate:
     Parameters
     ----------
     joint : JointDrives
+        With drives beside these, which nothing ties to them.
     estimate : Estimate
+        Of all of the joint drives.
+    names : set of str
+        Of the drives that hold together.
     """
 
     joint: JointDrives
     estimate: Estimate
+    names: set[str]
 
 
 def estimate_group(
     group: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool
 ) -> list[JointEstimate]:
     """The POS errors of drives near each other, of those together that ties join.
+
+    Where ties part them, those with all of the control stay as they are: what has neither moved
+    nothing. Others are estimated anew, without a shift in common with control that isn't theirs.
 
     Parameters
     ----------
@@ -46,10 +54,16 @@ def estimate_group(
     features = joint.features(origin) if with_ties else None
     least = order if len(group) == 1 else min(order, 0)
     estimate = estimate_together(joint.survey, joint.control(), features, least)
-    parts = _tied(joint, estimate)
-    if len(parts) == 1:
-        return [JointEstimate(joint, estimate)]
-    return [result for part in parts for result in estimate_group(part, order, origin, with_ties)]
+    parts, results = _tied(joint, estimate), []
+    owner = np.repeat([d.survey.name for d in joint.drives], [len(d.control) for d in joint.drives])
+    controlled = set(owner[estimate.used].tolist())
+    for part in parts:
+        names = {drive.survey.name for drive in part}
+        if len(parts) == 1 or (len(part) > 1 and controlled and controlled <= names):
+            results.append(JointEstimate(joint, estimate, names))
+        else:
+            results += estimate_group(part, order, origin, with_ties)
+    return results
 
 
 def _tied(joint, estimate):
