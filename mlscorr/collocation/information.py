@@ -105,10 +105,8 @@ class InformationSolver:
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """Few rows, of which W^T W = c^T V^-1 c: residuals and steps of the prior, triangular."""
-        white = self._white(columns)
-        is_own = np.array_equal(columns, self.columns)
-        x = self._own_states if is_own else self._estimate(white)
-        parts = chain(self._residuals(white, x), self._prior_steps(x))
+        states, residuals = self._solved(columns)
+        parts = chain(residuals, self._prior_steps(states))
         triangles = [np.linalg.qr(p.reshape(-1, columns.shape[1]), mode="r") for p in parts]
         return np.asarray(np.linalg.qr(np.concatenate(triangles), mode="r"))
 
@@ -127,9 +125,7 @@ class InformationSolver:
         """V^-1 c."""
         if columns.shape[1] == 0:
             return columns
-        white = self._white(columns)
-        residuals = self._residuals(white, self._estimate(white))
-        parts = zip(self.sides, residuals, strict=True)
+        parts = zip(self.sides, self._solved(columns)[1], strict=True)
         weights = [side.white.swapaxes(1, 2) @ residual for side, residual in parts]
         return np.concatenate([part.reshape(-1, part.shape[2]) for part in weights])
 
@@ -169,7 +165,7 @@ class InformationSolver:
 
     def predictor(self, _: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
         """The predictor of the rows' own columns, whatever is given; see Collocation.predict."""
-        states = self._own_states.copy()
+        states = self._own_solution[0].copy()
         states[:, -1] -= states[:, :-1] @ trend
         inverse = np.empty(0) if trend_root is None else self._inverse
         table = self.layout, self.knots, self.pattern, self._cells, states, inverse
@@ -220,7 +216,7 @@ class InformationSolver:
 
         Who needs both has the factor worked out again: it is most of the memory.
         """
-        values, _ = self._factor, self._own_states
+        values, _ = self._factor, self._own_solution
         del self.__dict__["_factor"]
         invert_in_place(self.pattern, values)
         return values
@@ -233,9 +229,9 @@ class InformationSolver:
         return np.concatenate([part.reshape(-1, width) for part in parts])
 
     @cached_property
-    def _own_states(self):
-        """States (n, p + 1) by these columns."""
-        return self._estimate(self._white(self.columns))
+    def _own_solution(self):
+        """States and residuals by these columns, which outlast the factor."""
+        return self._estimate(self.columns)
 
     def _refuse(self, error):
         """Say where knots stand too close, by the error of each state's pivot."""
@@ -258,23 +254,21 @@ class InformationSolver:
             "the solver place its own, and give each observation the sigma that it has."
         )
 
-    def _white(self, columns):
-        """W c in parts (n, r, c)."""
-        parts = zip(self.sides, self.by_rows(columns), strict=True)
-        return [np.ascontiguousarray(side.white @ part) for side, part in parts]
+    def _solved(self, columns):
+        """States and residuals by columns."""
+        is_own = np.array_equal(columns, self.columns)
+        return self._own_solution if is_own else self._estimate(columns)
 
-    def _estimate(self, white):
-        """L^-1 H^T R^-1 c (states, c) of columns W c."""
-        x = np.zeros((self.pattern.states, white[0].shape[2]))
+    def _estimate(self, columns):
+        """States x = L^-1 H^T R^-1 c (states, c), and residuals W (c - H x) in parts (n, r, c)."""
+        parts = zip(self.sides, self.by_rows(columns), strict=True)
+        white = [np.ascontiguousarray(side.white @ part) for side, part in parts]
+        x = np.zeros((self.pattern.states, columns.shape[1]))
         for sides, part in zip(self.sides, white, strict=True):
             observe(self.layout, self.pattern, self._cells, sides, x, part, True)
         solve_in_place(self.pattern, self._factor, x)
-        return x
-
-    def _residuals(self, white, x):
-        """W (c - H x)."""
-        for sides, part in zip(self.sides, white, strict=True):
-            yield self._left(sides, part, x)
+        pairs = zip(self.sides, white, strict=True)
+        return x, [self._left(sides, part, x) for sides, part in pairs]
 
     def _left(self, sides, white, x):
         left = white.copy()

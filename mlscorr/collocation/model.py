@@ -154,8 +154,7 @@ class Collocation:
     @cached_property
     def weights(self) -> np.ndarray:
         """V^-1 (l - A x), (m,)."""
-        residual = self.misclosure - self.design @ self.trend
-        return self.solver.solve(residual[:, None])[:, 0]
+        return self._solved_columns @ np.append(-self.trend, 1.0)
 
     def predict(
         self,
@@ -212,7 +211,12 @@ class Collocation:
     @cached_property
     def projected(self) -> np.ndarray:
         """V^-1 A times the root of the trend's covariance, (m, p)."""
-        return self.solver.solve(self.design) @ self.trend_root
+        return self._solved_columns[:, :-1] @ self.trend_root
+
+    @cached_property
+    def _solved_columns(self):
+        """V^-1 [A, l], (m, p + 1)."""
+        return self.solver.solve(np.column_stack([self.design, self.misclosure]))
 
     def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
@@ -242,9 +246,8 @@ class Collocation:
                 f"Without the {len(rows)} observations that are left out the other "
                 f"{len(self.misclosure) - len(rows)} do not determine the trend."
             )
-        weights = self.weights[rows]  # first: sparse rows part with their factor for an inverse
         covariance = np.linalg.inv(self.precision_of(rows))
-        return covariance @ weights, covariance
+        return covariance @ self.weights[rows], covariance
 
     def precision_of(self, rows: np.ndarray) -> np.ndarray:
         """Inverse covariance (k, k) of rows that are left out, the trend unknown."""

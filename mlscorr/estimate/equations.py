@@ -18,6 +18,7 @@ from mlscorr.collocation import (
     collocate,
     collocate_rows,
     collocate_rows_dense,
+    likelihood_changes,
 )
 from mlscorr.collocation.trend import polynomial_design
 from mlscorr.estimate.settings import SETTINGS
@@ -219,11 +220,36 @@ class Equations(Summary):
         ----------
         parameters : SignalParameters
         like : Collocation, optional
-            Of the same equations by this, under parameters near by.
+            Of the same equations by this, under parameters near by: with its knots a difference
+            is smooth, and costs half as much.
         """
-        if self.ties is None or self.misclosure.size + len(self.ties) > SETTINGS.dense_rows:
-            return self.solve(parameters, like)
-        return collocate_rows_dense(self.rows(parameters))
+        if self._is_dense:
+            return collocate_rows_dense(self.rows(parameters))
+        return self.solve(parameters, like)
+
+    def likelihoods(
+        self, near: Sequence[SignalParameters], parameters: SignalParameters, solved: Collocation
+    ) -> np.ndarray:
+        """Log-likelihoods (k,) of k parameters near some, as differences need them.
+
+        Parameters
+        ----------
+        near : sequence of SignalParameters
+        parameters : SignalParameters
+        solved : Collocation
+            By weigh, under these.
+        """
+        if not self._is_dense:
+            return np.array([self.weigh(each, solved).log_likelihood for each in near])
+        rows, changed = self.rows(parameters), [self.rows(each) for each in near]
+        return solved.log_likelihood + likelihood_changes(solved, rows, changed)
+
+    @property
+    def _is_dense(self):
+        """Whether the covariance matrix is the fastest way to a likelihood."""
+        if self.ties is None:
+            return False
+        return self.misclosure.size + len(self.ties) <= SETTINGS.dense_rows
 
     def _signals(self, parameters):
         signals = pose_signals(self.stated, parameters, self.partials)

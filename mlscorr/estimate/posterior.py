@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
 
 import numpy as np
 from scipy.linalg import cholesky
 from scipy.optimize import minimize
 from scipy.stats import norm, qmc
 
-from mlscorr.collocation import Collocation
 from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.prior import NAMES, Prior
@@ -98,9 +96,7 @@ class Objective:
         """
         return np.log([getattr(parameters, name) for name in NAMES])[self.prior.free]
 
-    def __call__(
-        self, family: str, logarithms: np.ndarray, like: Sequence[Collocation] = ()
-    ) -> float:
+    def __call__(self, family: str, logarithms: np.ndarray) -> float:
         """The log posterior of a family at free logarithms (k,), but for a constant.
 
         A search may try scales of which rounding leaves no likelihood: it turns back there.
@@ -109,24 +105,17 @@ class Objective:
         ----------
         family : str
         logarithms : (k,) array
-        like : sequence of Collocation
-            Of each block, near by: with their knots differences are smooth, and cost half as much.
         """
+        chosen = self.parameters(family, logarithms)
         try:
-            return self._value(logarithms, self._solve(family, logarithms, like))
+            likelihood = sum(block.weigh(chosen).log_likelihood for block in self.blocks)
         except np.linalg.LinAlgError:
             return IMPROBABLE
+        return float(self._prior(logarithms) + likelihood)
 
-    def _solve(self, family, logarithms, like=()):
-        """Each block's Collocation."""
-        chosen = self.parameters(family, logarithms)
-        pairs = zip_longest(self.blocks, like)
-        return [block.weigh(chosen, near) for block, near in pairs]
-
-    def _value(self, logarithms, solved):
-        """The log posterior by each block's Collocation."""
-        prior = -0.5 * np.sum(((logarithms - self.initial) / self.spread) ** 2)
-        return prior + sum(part.log_likelihood for part in solved)
+    def _prior(self, logarithms):
+        """Log priors of logarithms (..., k), but for a constant."""
+        return -0.5 * np.sum(((logarithms - self.initial) / self.spread) ** 2, axis=-1)
 
     def gradient(self, family: str, logarithms: np.ndarray) -> tuple[float, np.ndarray]:
         """The log posterior and its gradient (k,).
@@ -136,14 +125,16 @@ class Objective:
         family : str
         logarithms : (k,) array
         """
+        steps = logarithms + SETTINGS.step * np.eye(len(logarithms))
+        chosen, *near = (self.parameters(family, each) for each in (logarithms, *steps))
         try:
-            solved = self._solve(family, logarithms)
+            solved = [block.weigh(chosen) for block in self.blocks]
+            pairs = zip(self.blocks, solved, strict=True)
+            ahead = sum(block.likelihoods(near, chosen, part) for block, part in pairs)
         except np.linalg.LinAlgError:
             return IMPROBABLE, np.zeros(len(logarithms))
-        value = self._value(logarithms, solved)
-        steps = logarithms + SETTINGS.step * np.eye(len(logarithms))
-        ahead = np.array([self(family, step, solved) for step in steps])
-        return value, (ahead - value) / SETTINGS.step
+        value = self._prior(logarithms) + sum(part.log_likelihood for part in solved)
+        return value, (self._prior(steps) + ahead - value) / SETTINGS.step
 
     def maximum(self, family: str, start: np.ndarray) -> tuple[np.ndarray, float]:
         """The most probable logarithms of a family, and the log posterior there.

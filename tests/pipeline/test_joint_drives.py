@@ -229,7 +229,7 @@ def test_nothing_corrects_a_drive_elsewhere(drives):
 
 
 def test_a_drive_that_nothing_ties_leaves_the_others_as_they_are(drives, together):
-    "On a bridge 60 m above them a third one is uncorrected, and changes both others by 2 mm at most"
+    "60 m above them a third one is uncorrected, and changes both others by 2 mm at most"
     first, second = drives
     third = elsewhere(second, 3600.0, ABOVE)
     third = replace(third, survey=replace(third.survey, name="third"))
@@ -244,7 +244,7 @@ def test_a_drive_that_nothing_ties_leaves_the_others_as_they_are(drives, togethe
 
 
 def test_areas_count_time_and_not_what_was_seen(drives):
-    "With a fifth of the planes there are as many seconds, in the order of time, 5 or 6 of each drive"
+    "With a fifth of the planes there are as many seconds in the order of time, 5 or 6 of a drive"
     thin = [replace(drive, features=drive.features[::5]) for drive in drives]
     places = [places_each_second([drive]) for drive in drives]
     assert {len(places_each_second([drive])) for drive in thin} <= {5, 6}
