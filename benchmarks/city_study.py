@@ -1,6 +1,7 @@
 """A city at the level of small values: what planning, joining and solving of many drives costs.
 
-    python benchmarks/city_study.py [DRIVES ...] [--tiles TILES] [--limit LIMIT] [--seed SEED]
+    python benchmarks/city_study.py [DRIVES ...] [--tiles TILES] [--places PLACES] [--limit LIMIT]
+                                    [--seed SEED]
 
 Vehicles wander a grid of streets, 200 s each, at 10 Hz. What each saw of walls, road and poles, and
 the control points of one drive in ten, is made up; no point of a cloud is. Each size runs in a
@@ -54,7 +55,6 @@ TURN = 1.5  # s, one sigma of how a turn is smoothed: a jerk of 1.5 m/s^3, no st
 ORIGIN = np.array([532_000.0, 3_374_000.0, 40.0])
 START = 1_357_700_000.0  # s, GPS
 SIGMA = 0.5  # m, that the POS states
-PLACES_PER_BLOCK = 300  # planes and poles along a block that a drive sees
 NOISE = 0.005  # m, of a plane's place
 CONTROL_SHARE = 0.1  # of the drives
 
@@ -62,10 +62,10 @@ CONTROL_SHARE = 0.1  # of the drives
 class City:
     "Streets, drives that wander over them, and what these saw"
 
-    def __init__(self, drives, tiles, seed):
+    def __init__(self, drives, tiles, places, seed):
         self.rng = np.random.default_rng(seed)
         self.edge = max(int(np.sqrt(drives * DURATION * SPEED / BLOCK / 6)), 3)  # seen 3 times
-        self.tiles, self.blocks, self.errors = tiles, {}, {}
+        self.tiles, self.places, self.blocks, self.errors = tiles, places, {}, {}
         self.drives = [self.drive(number) for number in range(drives)]
 
     def crossings(self):
@@ -88,7 +88,7 @@ class City:
             low, high = np.array(key, float) * BLOCK
             along = (high - low) / BLOCK
             across = np.array([-along[1], along[0]])
-            rng, n = np.random.default_rng([*key[0], *key[1]]), PLACES_PER_BLOCK
+            rng, n = np.random.default_rng([*key[0], *key[1]]), self.places
             at, part = rng.uniform(0, BLOCK, n), rng.choice(4, n, p=[0.35, 0.3, 0.3, 0.05])
             side = np.select([part == 1, part == 2], [10.0, -10.0], rng.uniform(-6, 6, n))
             plan = low + at[:, None] * along + side[:, None] * across
@@ -144,7 +144,7 @@ class City:
         "TieFeatures of a drive"
         parts = [self.block(*ends) for ends in itertools.pairwise(way)]
         place, direction, kind = (np.concatenate(each) for each in zip(*parts, strict=True))
-        number = np.repeat(np.arange(len(parts)), PLACES_PER_BLOCK)
+        number = np.repeat(np.arange(len(parts)), self.places)
         along = (way[1:] - way[:-1])[number]
         ahead = np.einsum("ni,ni->n", place[:, :2] - ORIGIN[:2] - BLOCK * way[number], along)
         times = passed[number] + ahead / SPEED
@@ -176,12 +176,12 @@ class City:
         return Matched(observed, points)
 
 
-def run(number, tiles, limit, seed):
+def run(number, tiles, places, limit, seed):
     "Print what a city of so many drives costs"
     begin = process_time()
-    city = City(number, tiles, seed)
+    city = City(number, tiles, places, seed)
     made, memory_before = process_time() - begin, memory()
-    places, left, within, states = [], [], [], []
+    positions, left, within, states = [], [], [], []
     with threadpool_limits(1):
         for corrected, state in project_drives(city.drives, 1, ORIGIN, True, limit=limit):
             motion_of(corrected, False)
@@ -190,7 +190,7 @@ def run(number, tiles, limit, seed):
             remains = city.left(state.name, correction)
             within.append(np.abs(remains) < 2 * correction.corrected.position_sigma)
             rows = slice(None, None, round(RATE))
-            places.append(correction.recorded.position[rows])
+            positions.append(correction.recorded.position[rows])
             left.append(remains[rows])
     joined = process_time() - begin - made
     features = sum(len(drive.features) for drive in city.drives)
@@ -198,7 +198,7 @@ def run(number, tiles, limit, seed):
     size = [np.sqrt((part**2).sum(axis=1).mean()) for part in left]
     print(
         number, features, made, joined, memory_before, memory(), held,
-        *np.percentile(size, [50, 95]), 100 * np.mean(within), _apart(places, left),
+        *np.percentile(size, [50, 95]), 100 * np.mean(within), _apart(positions, left),
     )  # fmt: skip
 
 
@@ -221,12 +221,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("drives", type=int, nargs="*", default=[1, 2])
     parser.add_argument("--tiles", type=int, default=4, help="Of each drive.")
+    parser.add_argument("--places", type=int, default=300, help="Planes and poles of a block.")
     parser.add_argument("--limit", type=int, default=SETTINGS.area_seconds, help="Of an area, s.")
     parser.add_argument("--seed", type=int, default=0, help="Of the city and its drives.")
     parser.add_argument("--run", action="store_true")
     given = parser.parse_args()
     if given.run:
-        run(given.drives[0], given.tiles, given.limit, given.seed)
+        run(given.drives[0], given.tiles, given.places, given.limit, given.seed)
         return
     heads = (
         "drives",
@@ -241,10 +242,12 @@ def main():
         "within 2 sigma, %",
         "apart, m",
     )
-    table = Table(*heads, title=f"{given.tiles} tiles a drive; what is left: 3D RMS of a drive")
+    title = f"{given.tiles} tiles a drive, {given.places} planes and poles a block of {BLOCK:.0f} m"
+    table = Table(*heads, title=f"{title}; what is left: 3D RMS of a drive")
     for number in given.drives:
         command = [sys.executable, __file__, str(number), "--tiles", str(given.tiles)]
-        command += ["--limit", str(given.limit), "--seed", str(given.seed), "--run"]
+        command += ["--places", str(given.places), "--limit", str(given.limit)]
+        command += ["--seed", str(given.seed), "--run"]
         words = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
         table.add_row(*(f"{float(word):.4g}" for word in words))
     Console(width=120).print(table)

@@ -224,7 +224,8 @@ def choose_parameters(
     share = np.exp([value - probable[0][1] for _, value in probable])
     chosen = zip([row[0] for row in probable], (share / share.sum()).tolist(), strict=True)
     by_share = tuple(chosen)
-    if len(equations.names) > SETTINGS.block:  # so many know the parameters well
+    ties = 0 if equations.ties is None else len(equations.ties)  # a row each, targets have three
+    if max(len(equations.names), ties / 3) > SETTINGS.block:  # so many know the parameters well
         return Posterior(by_share, by_share)
     drawn = []
     for (parameters, probability), (_, value) in zip(by_share, probable, strict=True):
