@@ -1,11 +1,11 @@
 """A city at the level of small values: what planning, joining and solving of many drives costs.
 
     python benchmarks/city_study.py [DRIVES ...] [--tiles TILES] [--places PLACES] [--limit LIMIT]
-                                    [--seed SEED]
+                                    [--seed SEED] [--workers WORKERS]
 
 Vehicles wander a grid of streets, 200 s each, at 10 Hz. What each saw of walls, road and poles, and
 the control points of one drive in ten, is made up; no point of a cloud is. Each size runs in a
-process of its own, which tells its memory; seconds are of the processor.
+process of its own, which tells its memory; seconds are of the processor but for those by clock.
 """
 
 import argparse
@@ -13,8 +13,10 @@ import itertools
 import resource
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
-from time import process_time
+from tempfile import TemporaryDirectory
+from time import perf_counter
 
 import numpy as np
 from rich.console import Console
@@ -27,12 +29,16 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.control import NO_POINTS
+from mlscorr.io.task_store import TaskStore
 from mlscorr.matching import Matches
 from mlscorr.pipeline.finding import Finding
-from mlscorr.pipeline.project.city import project_drives
+from mlscorr.pipeline.project.city import in_turn, project_drives
 from mlscorr.pipeline.project.corrected import motion_of
+from mlscorr.pipeline.project.engine import engine
 from mlscorr.pipeline.project.joint import FoundDrive
+from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.settings import SETTINGS
+from mlscorr.pipeline.project.stages import area_tasks
 from mlscorr.survey import (
     ControlPoints,
     Matched,
@@ -176,14 +182,15 @@ class City:
         return Matched(observed, points)
 
 
-def run(number, tiles, places, limit, seed):
+def run(given):
     "Print what a city of so many drives costs"
-    begin = process_time()
-    city = City(number, tiles, places, seed)
-    made, memory_before = process_time() - begin, memory()
+    number, begin = given.drives[0], processor_time()
+    city = City(number, given.tiles, given.places, given.seed)
+    made, clock = processor_time() - begin, perf_counter()
     positions, left, within, states = [], [], [], []
-    with threadpool_limits(1):
-        for corrected, state in project_drives(city.drives, 1, ORIGIN, True, limit=limit):
+    with threadpool_limits(1), areas_at_work(given.workers) as work:
+        drives = project_drives(city.drives, 1, ORIGIN, True, work, given.limit)
+        for corrected, state in drives:
             motion_of(corrected, False)
             states.append(state.state)
             correction = corrected.estimate.correction
@@ -192,14 +199,28 @@ def run(number, tiles, places, limit, seed):
             rows = slice(None, None, round(RATE))
             positions.append(correction.recorded.position[rows])
             left.append(remains[rows])
-    joined = process_time() - begin - made
+    clock, joined = perf_counter() - clock, processor_time() - begin - made
     features = sum(len(drive.features) for drive in city.drives)
     held = sum(state in ("controlled", "tied") for state in states)
     size = [np.sqrt((part**2).sum(axis=1).mean()) for part in left]
     print(
-        number, features, made, joined, memory_before, memory(), held,
+        number, features, made, joined, clock, memory(), held,
         *np.percentile(size, [50, 95]), 100 * np.mean(within), _apart(positions, left),
     )  # fmt: skip
+
+
+@contextmanager
+def areas_at_work(workers):
+    "What estimates areas: this process, or so many others as a project has them"
+    if workers == 1:
+        yield in_turn
+        return
+    with TemporaryDirectory() as folder, engine(workers, None) as processes:
+        store = TaskStore(Path(folder))
+        run = Run(store, processes, lambda outcome: None)
+        yield lambda areas: list(run.results(area_tasks(store, "city", areas)).values())
+        if run.faults:
+            raise SystemExit(str(run.faults[0].fault))
 
 
 def _apart(places, left):
@@ -211,9 +232,19 @@ def _apart(places, left):
     return np.sqrt(((left[first[other]] - left[second[other]]) ** 2).sum(axis=1).mean())
 
 
+def used():
+    "What this process and its workers, once they ended, have used"
+    return [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+
+
+def processor_time():
+    "Of all of them in s"
+    return sum(part.ru_utime + part.ru_stime for part in used())
+
+
 def memory():
-    "Largest memory of this process so far in MB"
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
+    "Of the largest of them so far in MB"
+    return max(part.ru_maxrss for part in used()) * 1024 / 1e6
 
 
 def main():
@@ -224,17 +255,18 @@ def main():
     parser.add_argument("--places", type=int, default=300, help="Planes and poles of a block.")
     parser.add_argument("--limit", type=int, default=SETTINGS.area_seconds, help="Of an area, s.")
     parser.add_argument("--seed", type=int, default=0, help="Of the city and its drives.")
+    parser.add_argument("--workers", type=int, default=1, help="Processes that estimate areas.")
     parser.add_argument("--run", action="store_true")
     given = parser.parse_args()
     if given.run:
-        run(given.drives[0], given.tiles, given.places, given.limit, given.seed)
+        run(given)
         return
     heads = (
         "drives",
         "planes, poles",
         "making, s",
         "joining, s",
-        "MB before",
+        "by clock, s",
         "MB",
         "held",
         "left of 0.87 m",
@@ -247,7 +279,7 @@ def main():
     for number in given.drives:
         command = [sys.executable, __file__, str(number), "--tiles", str(given.tiles)]
         command += ["--places", str(given.places), "--limit", str(given.limit)]
-        command += ["--seed", str(given.seed), "--run"]
+        command += ["--seed", str(given.seed), "--workers", str(given.workers), "--run"]
         words = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
         table.add_row(*(f"{float(word):.4g}" for word in words))
     Console(width=120).print(table)
