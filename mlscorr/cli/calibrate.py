@@ -5,7 +5,8 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say, say_statements
+from mlscorr.cli import terminal
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
 from mlscorr.cli.work import print_json, work
 
 
@@ -31,7 +32,7 @@ def calibrate(
         result = mlscorr.calibrate(recorded, progress=progress, ties=False if no_ties else None)
         content = result.write(out, with_drift, clouds, overwrite, progress)
     print_json(content, as_json)
-    say_statements(content["statements"])
+    terminal.say_statements(content["statements"])
     if "scanners" in content:
         _tell_scanners(content["scanners"])
     else:
@@ -79,18 +80,12 @@ def _tell_mounting(content):
 
 
 def _tell_misclosures(content):
-    say(f"{'RMSE of misclosures (m)':34s}{'n':>4s}{'E before':>11s}{'N':>8s}{'H':>8s}"
-        f"{'E after':>10s}{'N':>8s}{'H':>8s}")  # fmt: skip
-    methods = [("LSC", content["lsc"]), ("LS", content["ls"])]
+    methods = {"LSC": content["lsc"], "LS": content["ls"]}
     if "with_drift" in content:
-        methods.append(("LSC with drift", content["with_drift"]))
-    for role in ("control", "check"):
-        for method_title, method in methods:
-            group = method[role]
-            title = f"{role} points, {method_title}"
-            if group["n"] == 0:
-                say(f"{title:34s}   0  none")
-                continue
-            numbers = [*group["before"]["rmse"], *group["after"]["rmse"]]
-            say(f"{title:34s}{group['n']:4d}" + "{:11.4f}{:8.4f}{:8.4f}{:10.4f}{:8.4f}{:8.4f}"
-                .format(*numbers))  # fmt: skip
+        methods["LSC with drift"] = content["with_drift"]
+    rows = [
+        (f"{role} points, {title}", method[role], "after")
+        for role in ("control", "check")
+        for title, method in methods.items()
+    ]
+    terminal.say_rmse(rows, width=34, decimals=4)

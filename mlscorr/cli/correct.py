@@ -123,22 +123,12 @@ def tell(report: dict, out: Path, as_json: bool) -> None:
     terminal.say_statements(report["statements"])
     for sentence in tie_sentences(report["ties"], report["control"]["n_scored"]):
         terminal.say(sentence)
-    terminal.say(f"{'RMSE of misclosures (m)':24s}{'n':>4s}  {'E before':>9s}{'N':>8s}{'H':>8s}"
-         f"  {'E after':>9s}{'N':>8s}{'H':>8s}")  # fmt: skip
     rows = [
         ("control points", report["control"], "after"),
         ("  each left out in turn", report["control"], "leave_one_out"),
         ("check points", report["check"], "after"),
     ]
-    for title, group, after in rows:
-        if group["before"]["rmse"] is None or group[after]["rmse"] is None:
-            terminal.say(f"{title:24s}{group['n']:4d}  none")
-            continue
-        numbers = [*group["before"]["rmse"], *group[after]["rmse"]]
-        text = "".join(
-            f"{'  ' * (i % 3 == 0)}{v:{9 - (i % 3 > 0)}.3f}" for i, v in enumerate(numbers)
-        )
-        terminal.say(f"{title:24s}{group['n']:4d}{text}")
+    terminal.say_rmse(rows, width=24, decimals=3)
     if (out / "report.html").exists():
         terminal.say(f"Report:    {out / 'report.html'}")
         terminal.say(f"Pictures:  {out / 'pictures'}")

@@ -4,7 +4,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
@@ -225,3 +225,23 @@ def say_statements(statements: list[dict]) -> None:
         speak(f"{MARKS[row['rating']]} {row['what']}: {row['sentence']}")
         for item in row["items"]:
             speak("    " + ": ".join(filter(None, (item["name"], item["text"]))))
+
+
+def say_rmse(rows: Iterable[tuple[str, dict, str]], width: int, decimals: int) -> None:
+    """Print a table of the RMSE of misclosures on stderr.
+
+    Parameters
+    ----------
+    rows : iterable of (title, group, after)
+        A group of points as documents have it, and which of its states comes after ``before``.
+    width : int
+        Of the titles.
+    decimals : int
+    """
+    heads = "".join(f"{f'E {when}':>11s}{'N':>8s}{'H':>8s}" for when in ("before", "after"))
+    say(f"{'RMSE of misclosures (m)':{width}s}{'n':>4s}{heads}")
+    for title, group, after in rows:
+        before, left = group["before"]["rmse"], group[after]["rmse"]
+        numbers = enumerate([*before, *left] if before and left else [])
+        text = "".join(f"{v:{8 if i % 3 else 11}.{decimals}f}" for i, v in numbers)
+        say(f"{title:{width}s}{group['n']:4d}{text or '  none'}")
