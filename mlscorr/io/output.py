@@ -19,7 +19,7 @@ from mlscorr.survey import InputFile
 
 try:
     import fcntl
-except ImportError:  # Windows: no folder has a lock, and what killed runs leave stays
+except ImportError:  # Windows: no folder or run has a lock, and what killed runs leave stays
     fcntl = None
 
 PART = ".part"  # ends the name of what isn't whole yet

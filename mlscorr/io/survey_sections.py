@@ -42,13 +42,18 @@ class CloudSection(TomlSection):
     gps_time: Literal["auto", "week", "standard"] = "auto"
 
 
-class TrajectoryColumns(ColumnsSection):
-    """Which column of a trajectory is what."""
+class PlaceColumns(ColumnsSection):
+    """Which column of a place is what."""
 
-    gps_time: Column = None
     easting: Column = None
     northing: Column = None
     height: Column = None
+
+
+class TrajectoryColumns(PlaceColumns):
+    """Which column of a trajectory is what."""
+
+    gps_time: Column = None
     latitude: Column = None
     longitude: Column = None
     roll: Column = None
@@ -128,13 +133,10 @@ class CalibratedMountingSection(MountingSection):
         return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
 
 
-class ControlColumns(ColumnsSection):
+class ControlColumns(PlaceColumns):
     """Which column of a control list is what."""
 
     name: Column = None
-    easting: Column = None
-    northing: Column = None
-    height: Column = None
     sigma: Column = None
     sigma_horizontal: Column = None
     sigma_vertical: Column = None

@@ -18,14 +18,9 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.io.folders import remove
 from mlscorr.io.opening import read_bytes
-from mlscorr.io.output import PART
+from mlscorr.io.output import PART, fcntl
 from mlscorr.io.publishing import locked_in_store, make_folder, names_in, publish, scratch_folder
 from mlscorr.io.storage import is_remote
-
-try:
-    import fcntl
-except ImportError:  # Windows: nothing tells that another run is at work
-    fcntl = None
 
 SUFFIX = ".result"
 KINDS = (str, int, float, Path, np.generic)  # of values that are told by what they print

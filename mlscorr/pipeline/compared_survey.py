@@ -157,12 +157,8 @@ class ComparedSurvey(Summary):
             (folder / name).mkdir()
             clouds = write_clouds(self.survey, folder / name, self.corrections[name], done)
             files += [
-                {
-                    "method": name,
-                    "name": f"{name}/{path.name}",
-                    "points": points,
-                    "points_outside_trajectory": outside,
-                }
+                {"method": name, "name": f"{name}/{path.name}", "points": points}
+                | {"points_outside_trajectory": outside}
                 for path, points, outside in clouds
             ]
         return files

@@ -39,11 +39,8 @@ def correction_figure(correction: Correction, report: CorrectionReport) -> Figur
     new = correction.corrected
     change = new.position - correction.recorded.position
     rows = [row for row in ordered(report.targets) if row.is_observed]
-    figure = _figure(6.6, correction, report, change, new.position_sigma, rows)
-    for panel, axis in zip(figure.axes, ("Easting", "Northing", "Height"), strict=True):
-        panel.set_ylabel(f"{axis} (m)")
-    figure.axes[0].set_title("Correction of the position: corrected − recorded")
-    return figure
+    words = "the position", ("Easting (m)", "Northing (m)", "Height (m)")
+    return _figure(6.6, correction, report, change, new.position_sigma, rows, words)
 
 
 @style.styled
@@ -57,19 +54,20 @@ def attitude_figure(correction: Correction, report: CorrectionReport) -> Figure:
     """
     sigma = correction.corrected.attitude_sigma
     sigma = None if sigma is None else np.degrees(sigma)
-    figure = _figure(4.4, correction, report, attitude_change(correction), sigma, [])
-    for panel, axis in zip(figure.axes, ("Roll", "Pitch", "Heading"), strict=True):
-        panel.set_ylabel(f"{axis} (deg)")
-    figure.axes[0].set_title("Correction of roll, pitch and heading: corrected − recorded")
-    return figure
+    words = "roll, pitch and heading", ("Roll (deg)", "Pitch (deg)", "Heading (deg)")
+    return _figure(4.4, correction, report, attitude_change(correction), sigma, [], words)
 
 
-def _figure(height, correction, report, change, sigma, rows):
-    """Curves (n, 3) with sigma (n, 3) or None, over them the marks of rows of targets."""
+def _figure(height, correction, report, change, sigma, rows, words):
+    """Curves (n, 3) with sigma (n, 3) or None, over them the marks of rows of targets.
+
+    Words name what is corrected, and its three parts.
+    """
     figure, new = style.new_figure(height), correction.corrected
     panels = figure.subplots(3, 1, sharex=True)
     span = report.coverage.control_span
     for axis, panel in enumerate(panels):
+        panel.set_ylabel(words[1][axis])
         values = _curve(
             panel, new, change[:, axis], None if sigma is None else sigma[:, axis], span
         )
@@ -77,6 +75,7 @@ def _figure(height, correction, report, change, sigma, rows):
             values += _marks(panel, new, [row for row in rows if row.group == group], axis, group)
         _set_range(panel, values, change[:, axis])
         _unused(panel, new, [row for row in rows if row.group == "unused"], axis)
+    panels[0].set_title(f"Correction of {words[0]}: corrected − recorded")
     _shade(panels, new, span, report.support)
     handles = _legend(new, {row.group for row in rows}, report.support, sigma is not None)
     style.legend_above(figure, handles, columns=2)
