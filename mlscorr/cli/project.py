@@ -38,14 +38,18 @@ def correct_drives(
         Where something failed.
     """
     from mlscorr.evaluate.quality import failures
-    from mlscorr.io.project_file import read_project_file
-    from mlscorr.pipeline.project import check_engine, correct_project
+    from mlscorr.io.project_file import read_project, read_project_file
+    from mlscorr.pipeline.project import check_engine, check_project_output, correct_project
 
     with terminal.exit_code(terminal.Exit.USAGE):
         read_project_file(project)
         check_engine(options.workers, options.scheduler)
+    with terminal.exit_code(terminal.Exit.BAD_DATA):
+        parts = read_project(project)
+    with terminal.exit_code(terminal.Exit.USAGE):
+        check_project_output(parts, out, options)
     with terminal.exit_code(terminal.Exit.BAD_DATA, lambda: RESUMPTION):
-        result = correct_project(project, out, options, tell)
+        result = correct_project(parts, out, options, tell)
         terminal.deafen()
     print_json(result.document, as_json)
     terminal.say_statements(result.document["statements"])

@@ -11,8 +11,10 @@ import warnings
 import laspy
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import mlscorr
+from mlscorr.cli import app
 from mlscorr.pipeline.project import Options, check_project, correct_project, project_status
 from tests.beds import project_street as bed
 from tests.beds.documents import undocumented
@@ -195,6 +197,16 @@ def test_a_project_of_one_drive_is_its_survey(project, tmp_path):
     for name in ("tile-1.laz", "tile-2.laz", "trajectory.csv", "targets.csv"):
         alone = (tmp_path / "alone" / name).read_bytes()
         assert (tmp_path / "out" / "first" / name).read_bytes() == alone
+
+
+def test_a_folder_of_others_is_wrong_use_as_of_a_survey(project, tmp_path):
+    "Exit code 2 for a folder that holds other files, and for that of an input, of both alike"
+    (tmp_path / "notes.txt").write_text("mine")
+    for file in (project, project.parent / "first" / "survey.toml"):
+        for out, words in ((tmp_path, "already (first: notes.txt)"), (file.parent, "the input")):
+            ended = CliRunner().invoke(app, ["correct", str(file), "-o", str(out)])
+            assert ended.exit_code == 2, ended.stderr
+            assert f"The output folder {out} holds" in ended.stderr and words in ended.stderr
 
 
 def test_resume_does_what_is_missing_or_damaged(project, copy):

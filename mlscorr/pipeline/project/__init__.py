@@ -1,7 +1,7 @@
 """Many drives as one project: tasks of one file each, joined by what is small."""
 
 from mlscorr.pipeline.project.checking import check_project
-from mlscorr.pipeline.project.correction import Options, correct_project
+from mlscorr.pipeline.project.correction import Options, check_project_output, correct_project
 from mlscorr.pipeline.project.document import ProjectResult
 from mlscorr.pipeline.project.engine import check_engine
 from mlscorr.pipeline.project.status import project_status

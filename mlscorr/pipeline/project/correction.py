@@ -74,7 +74,7 @@ class Options:
 
 
 def correct_project(
-    path: str | Path,
+    path: str | Path | ProjectParts,
     out: str | Path,
     options: Options | None = None,
     tell: Callable[[str], object] = lambda _: None,
@@ -83,8 +83,8 @@ def correct_project(
 
     Parameters
     ----------
-    path : path
-        project.toml, or the folder that holds it.
+    path : path or ProjectParts
+        project.toml, or the folder that holds it; or what was read of it.
     out : path
         Folder for the results: a folder of each drive, project.json, project.html, log.txt, and
         the results of tasks.
@@ -106,10 +106,14 @@ def correct_project(
         When writing fails.
     """
     options, out = options or Options(), as_path(out).absolute()
-    project = read_project(path)
+    project = path if isinstance(path, ProjectParts) else read_project(path)
     check_exports(options.trajectories, project.crs, is_read=True)
-    _check_out(project, out, options)
+    check_project_output(project, out, options)
     store = TaskStore(out / STORE)
+    if options.overwrite and not options.resume and is_folder(store.folder):
+        with store.locked():
+            remove_folder(store.folder)
+    make_folder(out)
     with store.locked(), logged(out / "log.txt", store.folder / "plan.json", tell) as progress:
         with engine(options.workers, options.scheduler) as chosen:
             work = _Work(project, out, options, Run(store, chosen, progress.ended), progress)
@@ -118,8 +122,8 @@ def correct_project(
     return result
 
 
-def _check_out(project, out, options):
-    """Refuse a folder of other results; an old run's go where nothing is resumed."""
+def check_project_output(project: ProjectParts, out: Path, options: Options) -> None:
+    """Refuse a folder for the results that holds others, or an input."""
     is_ours = is_folder(out / STORE)
     if is_ours and not (options.resume or options.overwrite):
         raise ValueError(
@@ -131,10 +135,6 @@ def _check_out(project, out, options):
     for drive in project.drives:
         for folder in (drive.name, SHARED_TILES):
             check(out / folder, drive.parts.files.clouds, overwrite=True)
-    if options.overwrite and not options.resume and is_ours:
-        with TaskStore(out / STORE).locked():
-            remove_folder(out / STORE)
-    make_folder(out)
 
 
 @dataclass(frozen=True)
