@@ -7,7 +7,7 @@ import numpy as np
 
 from mlscorr.io.column_names import find_meanings
 from mlscorr.io.layout_search import NUMBER, check_chosen, find_layout, likely_header
-from mlscorr.io.layouts import TableLayout, not_text
+from mlscorr.io.layouts import TableLayout, head, not_text
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
@@ -109,7 +109,8 @@ def read_layout(
     ----------
     path : path
     required, groups : sequence
-        See find_columns: a table with all required names in a first line with commas is our own.
+        See find_columns: a table in UTF-8 with all required names in a first line with commas is
+        our own.
     names, lacking, chosen, unnamed
         See find_layout.
     hints : mapping, optional
@@ -130,12 +131,10 @@ def read_layout(
             header, lines = read_header(path)
         except ValueError as error:
             header, refusal = [], error
-        if not chosen and set(required) <= set(header):
+        if not chosen and set(required) <= set(header) and head(path):
             columns = find_columns(path, header, required, groups)
             return TableLayout(path, tuple(header), lines, columns, is_own=True)
     layout = find_layout(path, names, lacking, chosen, unnamed)
-    if layout is not None and refusal and set(required) <= set(map(str.casefold, layout.header)):
-        raise refusal
     if layout is None:
         header = likely_header(path, names)
         meanings = find_meanings(header, names, chosen)

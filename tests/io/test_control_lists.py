@@ -8,12 +8,13 @@ import pytest
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, plain
-from mlscorr.io.control import holds_points, read_control
+from mlscorr.io.control import COLUMNS, holds_points, read_control
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.toml_file import read_toml
 from mlscorr.survey import Trajectory
 
 ALL = {"kind": "circle", "size": 0.6, "sigma": [0.003, 0.004]}
+LETTERS = ("utf-8", "cp1252")
 PLACES = [[532012.49, 3373991.48, 44.48], [532030.0, 3373978.17, 44.5]]
 
 
@@ -103,6 +104,20 @@ def test_letters_of_names_are_told_apart(name, encoding, drive, tmp_path):
     "Chinese letters take two bytes, umlauts stand alone"
     points = read(tmp_path, f"PtID;E;N;H\n{name};532012,49;3373991,48;44,48\n", drive, encoding)
     assert points.control.name == (name,)
+
+
+@pytest.mark.parametrize("rows", [1, 180], ids=["at first", "behind the first block"])
+def test_our_own_columns_in_other_letters_are_read_and_said_alike(rows, drive, tmp_path):
+    "control.csv of an office whose letters are Windows-1252 is read as in UTF-8, and that is said"
+    points = [f"{532000 + i % 40},{3374000 + i},44.5,0.003,0.004,circle,0.6,control"
+              for i in range(rows)]  # fmt: skip
+    names = [f"P{i}" for i in range(rows - 1)] + ["Brücke"]
+    lines = [",".join(COLUMNS), *map(",".join, zip(names, points, strict=True)), ""]
+    lists = {letters: read(tmp_path, "\n".join(lines), drive, letters) for letters in LETTERS}
+    assert lists["cp1252"].control.name == lists["utf-8"].control.name == tuple(names)
+    assert np.array_equal(lists["cp1252"].control.position, lists["utf-8"].control.position)
+    assert lists["utf-8"].layout is None
+    assert "(commas, decimal point, letters of Windows-1252)" in lists["cp1252"].layout
 
 
 def test_columns_of_the_list_go_before_what_is_said_of_all(drive, tmp_path):
