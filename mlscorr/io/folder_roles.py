@@ -24,7 +24,9 @@ MESHES = (".ply",)
 TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
 TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx")
 RECORDS = (".out", ".smrmsg", ".bin")
-RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json", "truth.json")
+RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json")
+SIMULATED = "a simulated survey, which is one by itself"
+LEFT_OUT = {"truth.json": SIMULATED, **dict.fromkeys(RESULTS, "results of a run")}
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class FileRole:
 
 
 def sort_files(folder: Path) -> list[FileRole]:
-    """Roles of the files in a folder and in the folders within it, but those of results.
+    """Roles of the files in a folder and in those within it that hold no results or other survey.
 
     Parameters
     ----------
@@ -55,23 +57,24 @@ def sort_files(folder: Path) -> list[FileRole]:
     -------
     list of FileRole
     """
-    results = []
-    places = list(_places(folder, results, SETTINGS.folder_depth))
+    left_out: list[FileRole] = []
+    places = list(_places(folder, left_out, SETTINGS.folder_depth))
     files = [path for place in places for path in sorted(place.iterdir()) if path.is_file()]
     roles = [_role(path) for path in files if path.name[0] != "." and path.suffix != ".toml"]
-    return roles + [FileRole(path, "none", "results of a run") for path in results]
+    return roles + left_out
 
 
-def _places(folder, results, depth) -> Iterator[Path]:
-    """A folder and those within it that are not hidden; those of results go into their list."""
+def _places(folder, left_out, depth) -> Iterator[Path]:
+    """A folder and those within it that are not hidden; what is left out goes into its list."""
     yield folder
     for path in sorted(folder.iterdir()) if depth else ():
         if not path.is_dir() or path.name[0] == ".":
             continue
-        if any((path / name).exists() for name in RESULTS):
-            results.append(path)
+        reasons = [reason for name, reason in LEFT_OUT.items() if (path / name).exists()]
+        if reasons:
+            left_out.append(FileRole(path, "none", reasons[0]))
         else:
-            yield from _places(path, results, depth - 1)
+            yield from _places(path, left_out, depth - 1)
 
 
 def _role(path) -> FileRole:

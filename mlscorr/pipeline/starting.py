@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mlscorr.io.conversion import is_foreign, recorded_points
-from mlscorr.io.folder_roles import FileRole, sort_files
+from mlscorr.io.folder_roles import SIMULATED, FileRole, sort_files
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.output import output_file
@@ -180,8 +180,10 @@ def _clouds(folder, given, roles):
     if damaged:
         raise ValueError(" ".join(damaged))
     clouds = [Cloud(read_layout(role.path)) for role in roles if role.role == "cloud"]
-    foreign = [role.reason for role in roles if role.role == "none" and is_foreign(role.path)]
-    return clouds or _no_cloud(folder, foreign)
+    reasons = [role.reason for role in roles if role.role == "none" and is_foreign(role.path)]
+    reasons += [f"{folder} holds no cloud of its own, and {role.path} is {SIMULATED}: give that "
+                "folder." for role in roles if role.reason == SIMULATED]  # fmt: skip
+    return clouds or _no_cloud(folder, reasons)
 
 
 def _no_cloud(folder, reasons=()):

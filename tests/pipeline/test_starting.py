@@ -1,6 +1,7 @@
 """A folder in, a survey.toml that runs out; or a sentence on what is ambiguous and what to add."""
 
 import re
+import shutil
 import tomllib
 from dataclasses import replace
 
@@ -211,6 +212,22 @@ def test_clouds_in_a_folder_of_their_own_are_a_pattern(folder):
     assert document["cloud"]["files"] == ["las/*.las"]
     assert document["scene"] == {"reference": "street.ply"}
     assert "Files overlap in time" in started.text
+
+
+def test_simulated_surveys_and_results_are_left_out_and_called_what_they_are(folder):
+    "Each within a folder is said to be one or the other; alone, it is the folder to be given"
+    (folder / "replica").mkdir()
+    shutil.copy(folder / "control.csv", folder / "replica")
+    (folder / "replica" / "truth.json").write_text("{}")
+    (folder / "corrected").mkdir()
+    (folder / "corrected" / "report.json").write_text("{}")
+    reasons = {role.path.name: role.reason for role in mlscorr.init(folder).roles}
+    assert reasons["replica"] == "a simulated survey, which is one by itself"
+    assert reasons["corrected"] == "results of a run"
+    for path in folder.glob("*.las"):
+        path.unlink()
+    with pytest.raises(ValueError, match=r"replica is a simulated survey.*: give that folder\."):
+        mlscorr.init(folder)
 
 
 def test_a_trajectory_of_another_day_is_not_taken(folder):
