@@ -15,6 +15,7 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
     """Tell in seconds all that is wrong with a survey or project, and what correcting it takes."""
     with exit_code(Exit.BAD_DATA):
         from mlscorr.io.project_file import is_project
+        from mlscorr.survey.summary import counted
 
         if is_project(survey):
             from mlscorr.pipeline.project import check_project
@@ -32,10 +33,10 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
     for fault in checked.faults:
         warn(f"Error: {fault.sentence}")
     if checked.faults:
-        warn(_count(checked.faults, "fault"))
+        warn(counted(len(checked.faults), "fault"))
         raise typer.Exit(CODES[checked.faults[0].where])
     following = f"mlscorr correct {quote(str(survey))} -o OUT"
-    say(f"No fault, {_count(checked.warnings, 'warning')}. Next: {following}")
+    say(f"No fault, {counted(len(checked.warnings), 'warning')}. Next: {following}")
 
 
 def _list(title: str, lines: Sequence[str]) -> None:
@@ -49,7 +50,3 @@ def _amount(amount):
     digits = 0 if amount.number >= 10 or amount.number == int(amount.number) else 1
     number = f"{amount.number:,.{digits}f}".replace(",", " ")
     return f"{amount.what}: {number}{' ' * bool(amount.unit)}{amount.unit} ({amount.source})"
-
-
-def _count(things, noun):
-    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"

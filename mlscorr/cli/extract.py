@@ -22,9 +22,12 @@ def extract(
 
 def _tell(content, out):
     """How many objects were found and matched, and where the results lie."""
+    from mlscorr.survey.summary import counted
+
     targets = content["targets"]
     matched = sum(row["matched"] for row in targets)
-    say(f"{len(targets)} target-like objects in {len({row['pass'] for row in targets})} passes.")
+    passes = counted(len({row["pass"] for row in targets}), "pass")
+    say(f"{counted(len(targets), 'target-like object')} in {passes}.")
     if content["surveyed"]:
         points = len({row["name"] for row in targets if row["matched"]})
         say(

@@ -24,14 +24,15 @@ def simulate(
         inputs = [scenario, *scenario_files(read_scenario(scenario))]
     with work(out, overwrite, inputs=inputs) as progress:
         from mlscorr.pipeline import simulate_survey
+        from mlscorr.survey.summary import counted
 
         made = simulate_survey(scenario, out, seed, overwrite, progress)
     print_json(made, as_json)
     points = sum(file["points"] for file in made["files"])
     say(
-        f"Simulated {made['name']}: {points} points in {len(made['files'])} files, "
-        f"{made['control']} control and {made['check']} check points, "
-        f"{made['passes']} passes in {made['end'] - made['start']:.0f} s."
+        f"Simulated {made['name']}: {points} points in {counted(len(made['files']), 'file')}, "
+        f"{made['control']} control and {counted(made['check'], 'check point')}, "
+        f"{counted(made['passes'], 'pass')} in {made['end'] - made['start']:.0f} s."
     )
     say(f"Survey:  {out / 'survey.toml'}")
     say(f"Truth:   {out / 'truth.json'} and {out / 'truth.npz'}")

@@ -16,6 +16,7 @@ from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.frames import angle_sigma
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Trajectory
+from mlscorr.survey.summary import counted
 
 COMPONENTS = ("easting", "northing", "height", "roll", "pitch", "heading")
 
@@ -177,14 +178,9 @@ def sparse_warnings(equations: Equations, order: int, fitted_order: int) -> Iter
     targets, epochs = len(equations.target_rows), equations.epochs
     if fitted_order < order:
         yield (
-            f"{targets} control points at {epochs} epochs are too few for a "
-            f"trend of order {order}, which needs {order + 2}: order {fitted_order} is used."
-        )
-    if targets < SETTINGS.smallest_targets:
-        yield (
-            f"Only {targets} control {'point takes' if targets == 1 else 'points take'} part: a "
-            "wrong one can't be found, and how fast the POS drifts is what it states itself. "
-            f"Survey at least {SETTINGS.smallest_targets}."
+            f"{counted(targets, 'control point')} at {counted(epochs, 'epoch')} "
+            f"{'is' if targets == 1 else 'are'} too few for a trend of order {order}, which needs "
+            f"{order + 2}: order {fitted_order} is used."
         )
     if epochs == 1 and targets > 1:
         yield (

@@ -18,6 +18,7 @@ from typing import Any, TextIO, cast
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import WEB, asking, check_bucket, is_remote, is_there
+from mlscorr.survey.summary import counted
 
 S3 = ("s3", "s3a")  # schemes of stores that take a file in parts, side by side
 
@@ -157,9 +158,9 @@ def check_contents(out: Path, held: Sequence[str], present: Sequence[str]) -> No
         )
     if present:
         raise ValueError(
-            f"The output folder {out} holds {len(present)} entries already (first: {present[0]}). "
-            "Choose another folder, or allow with --overwrite that files of the same name are "
-            "replaced."
+            f"The output folder {out} holds {counted(len(present), 'entry')} already (first: "
+            f"{present[0]}). Choose another folder, or allow with --overwrite that files of the "
+            "same name are replaced."
         )
 
 

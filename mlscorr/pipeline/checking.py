@@ -150,7 +150,7 @@ def _placed_times(survey) -> tuple[int, list[str]]:
             start, end = survey.trajectory.gps_time[[0, -1]]
             outside.append(
                 f"About {share:.0%} of the points of {file.name} lie outside the trajectory "
-                f"[{start:.3f}, {end:.3f}] s or in its {len(survey.trajectory.gaps)} gaps, by "
+                f"[{start:.3f}, {end:.3f}] s or in its gaps ({len(survey.trajectory.gaps)}), by "
                 f"{len(segment)} times spread over it: they stay as they are (exit code 4). Export "
                 "the whole trajectory."
             )

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import PointCloud, Survey
+from mlscorr.survey.summary import counted
 from mlscorr.targets import BY_EDGES, Candidates, search_radius, why_useless
 
 
@@ -92,8 +93,8 @@ def check_control(survey: Survey) -> None:
         )
     if len(survey.control) == 0:
         raise ValueError(
-            f"{survey.path} names {len(survey.check)} check points and no control point: check "
-            "points never enter an estimate. Give some of them the role control."
+            f"{survey.path} names {counted(len(survey.check), 'check point')} and no control "
+            "point: check points never enter an estimate. Give some of them the role control."
         )
 
 

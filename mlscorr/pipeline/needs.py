@@ -15,6 +15,7 @@ from mlscorr.io.settings import SETTINGS as IO
 from mlscorr.pipeline.quick_look import QuickLook
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import CloudFile, PointCloud, Survey
+from mlscorr.survey.summary import counted
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def amounts_read(survey: Survey, sampled: int) -> tuple[Amount, ...]:
     way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     points = sum(map(recorded_points, survey.clouds))
     return (
-        Amount("points", points, "", f"headers of {len(survey.cloud_paths)} cloud files"),
+        Amount("points", points, "", f"headers of {_files(survey)}"),
         Amount("scanners", len(survey.by_scanner), "", "survey.toml"),
         Amount("passes", sampled, "", f"{IO.sampled_points} times of each file"),
         Amount("trajectory", driven, "s", f"{len(trajectory)} epochs, {way.sum() / 1e3:.2f} km"),
@@ -120,7 +121,7 @@ def amounts_written(survey: Survey) -> tuple[Amount, ...]:
     epochs = len(survey.trajectory)
     table = epochs * SETTINGS.epoch_bytes / 1e6
     return (
-        Amount("clouds", clouds, "MB", f"{len(survey.cloud_paths)} files, sizes of the inputs"),
+        Amount("clouds", clouds, "MB", f"sizes of {_files(survey)}"),
         Amount("trajectory.csv", table, "MB", f"{epochs} epochs of {SETTINGS.epoch_bytes} bytes"),
         Amount("report.html, report.json, targets.csv, pictures", SETTINGS.report_megabytes, "MB",
                "surveys of 24 points; docs/results.md"),
@@ -160,3 +161,8 @@ def amounts_needed(
         Amount("memory", SETTINGS.memory, "GB",
                "largest of 0.5 to 22 million points; docs/results.md"),
     )  # fmt: skip
+
+
+def _files(survey):
+    """How many clouds it has."""
+    return counted(len(survey.cloud_paths), "cloud file")

@@ -27,6 +27,7 @@ from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.survey_text import SurveyText
 from mlscorr.survey import PointCloud, Trajectory
+from mlscorr.survey.summary import counted
 
 HINT = " What is said in survey.toml is given here as --set 'control.size = 0.6'."
 
@@ -240,7 +241,7 @@ def _targets(points):
     whole = points.control + points.check
     kinds = Counter(zip(whole.kind, whole.size.tolist(), strict=True))
     listed = ", ".join(f"{n} {kind} {size:g} m" for (kind, size), n in kinds.most_common(5))
-    return f"{len(points.control)} control, {len(points.check)} check points: {listed}"
+    return f"{len(points.control)} control, {counted(len(points.check), 'check point')}: {listed}"
 
 
 def _rate(cloud: Cloud, trajectory: Trajectory) -> float | None:

@@ -23,6 +23,7 @@ from mlscorr.estimate import (
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.survey import Matched, Survey, TieFeatures, Ties
+from mlscorr.survey.summary import counted
 from mlscorr.ties import (
     NORMAL_SCATTER,
     SETTINGS,
@@ -231,8 +232,8 @@ def _untied(estimate, features, radius):
     """The estimate with the reason why nothing is tied, a warning where something should be."""
     passes, near = len(np.unique(features.pass_number)), _revisited(features, radius)
     what = (
-        f"{near} of {len(features)} planes, poles and markings of {passes} "
-        f"pass{'es' * (passes > 1)} lie within about {radius:.1f} m of what was scanned at another "
+        f"{near} of {len(features)} planes, poles and markings of {counted(passes, 'pass')} "
+        f"lie within about {radius:.1f} m of what was scanned at another "
         "time"
     )
     if near < SETTINGS.neighbours:

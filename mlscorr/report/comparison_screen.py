@@ -9,6 +9,7 @@ from mlscorr.effects.wording import joined
 from mlscorr.evaluate.rows import PointCounts, TargetRow
 from mlscorr.report import headline, tables
 from mlscorr.report.settings import SETTINGS
+from mlscorr.survey.summary import counted
 
 COLLOCATION = "lsc"
 OTHERS = {
@@ -101,12 +102,12 @@ def basis(document: dict) -> str:
         The content of compare.json.
     """
     control, check = document["control_points"], document["check_points"]
-    made = f"Every method was fitted to the same {_points(control, 'control point')}"
+    made = f"Every method was fitted to the same {counted(control, 'control point')}"
     if document["scored_by"] == "check":
-        return f"{made} and scored by {_points(check, 'check point')} that took no part."
+        return f"{made} and scored by {counted(check, 'check point')} that took no part."
     if document["scored_by"] == "control":
         return f"{made}. Nothing independent is left to score them by: this is the mere fit."
-    too_few = f"only {_points(check, 'check point')}" if check else "no check points"
+    too_few = f"only {counted(check, 'check point')}" if check else "no check points"
     groups = document["cross_validation_groups"]
     left = "each left out in turn" if groups == control else f"left out in {groups} groups in turn"
     others = "; each check point from all control points" if check else ""
@@ -115,10 +116,6 @@ def basis(document: dict) -> str:
         f"cross-validated over all points: control points, {left}, are predicted from the "
         f"others{others}."
     )
-
-
-def _points(number, words):
-    return f"{number} {words}{'s' * (number != 1)}"
 
 
 def verdict(document: dict) -> list[str]:

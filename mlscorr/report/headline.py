@@ -10,6 +10,7 @@ import numpy as np
 from mlscorr.evaluate.rows import PointCounts
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.tables import length_in_words, percent, verdict
+from mlscorr.survey.summary import counted
 
 NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
 RATINGS = ("green", "amber", "red")  # as it should be; mind it; not whole, or worse than before
@@ -266,8 +267,8 @@ def warning_statements(warnings: Iterable[str]) -> Iterator[Statement]:
     """
     doubts = dict.fromkeys(warnings)
     if doubts:
-        count = "1 warning:" if len(doubts) == 1 else f"{len(doubts)} warnings:"
-        yield Statement("Warnings", "amber", count, tuple(("", text) for text in doubts))
+        count = counted(len(doubts), "warning")
+        yield Statement("Warnings", "amber", f"{count}:", tuple(("", text) for text in doubts))
 
 
 def _named(points):

@@ -8,6 +8,7 @@ import numpy as np
 from mlscorr.evaluate.rows import Statistics
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
+from mlscorr.survey.summary import counted
 
 AXES = ("E", "N", "H")
 QUANTITIES = ("Easting", "Northing", "Height (vertical)", "Horizontal distance", "3D distance")
@@ -156,7 +157,7 @@ def count(report: CorrectionReport, role: str) -> str:
         ``control`` or ``check``.
     """
     points, n = report.count(role)
-    words = "1 point" if points == 1 else f"{points} points"
+    words = counted(points, "point")
     return words if points == n else f"{n} observations of {words}"
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Pos, Scanner
 from mlscorr.survey.clouds import CloudFile
-from mlscorr.survey.summary import Summary
+from mlscorr.survey.summary import Summary, counted
 from mlscorr.survey.targets import ControlPoints
 from mlscorr.survey.trajectory import Mounting, Trajectory
 
@@ -132,7 +132,7 @@ class Survey(Summary):
         return [
             ("name", self.name),
             ("coordinates", self.crs or "not stated"),
-            ("clouds", f"{len(self.cloud_paths)} files, {self.points} points"),
+            ("clouds", f"{counted(len(self.cloud_paths), 'file')}, {self.points} points"),
             (
                 "trajectory",
                 f"{len(self.trajectory)} epochs, {start:.1f} to {end:.1f} s, gaps {passes - 1}",

@@ -36,6 +36,22 @@ position_sigma=None, attitude_sigma=None, session=None)
         return [(field.name, _short(getattr(self, field.name))) for field in fields(self)]
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things in words.
+
+    Parameters
+    ----------
+    number : int
+    noun : str
+        Of one of them.
+
+    >>> counted(1, "pass"), counted(2, "pass"), counted(3, "entry"), counted(0, "cloud file")
+    ('1 pass', '2 passes', '3 entries', '0 cloud files')
+    """
+    ends = {"s": f"{noun}es", "y": f"{noun[:-1]}ies"}
+    return f"{number} {noun if number == 1 else ends.get(noun[-1], f'{noun}s')}"
+
+
 def _short(value):
     """A field's value in a few words."""
     if isinstance(value, np.ndarray):

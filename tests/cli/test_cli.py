@@ -330,7 +330,7 @@ def test_a_process_of_its_own_refuses_it_alike(bad, survey):
 @pytest.mark.parametrize(
     ("out", "arguments", "code", "words"),
     [
-        ("full", (), 2, ["holds 1 entries already", "notes.txt", "--overwrite"]),
+        ("full", (), 2, ["holds 1 entry already", "notes.txt", "--overwrite"]),
         ("survey", (), 2, ["holds the input"]),
         ("survey", ("--overwrite",), 2, ["holds the input"]),
         ("survey/../survey", ("--overwrite",), 2, ["holds the input"]),

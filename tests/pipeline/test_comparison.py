@@ -166,7 +166,7 @@ def test_without_control_points_there_is_nothing_to_compare(street, tmp_path):
     "A survey of check points alone is refused"
     folder = shutil.copytree(street, tmp_path / "survey")
     rewrite_control(folder, lambda rows: [row for row in rows if row["role"] == "check"])
-    with pytest.raises(ValueError, match="1 check points and no control point"):
+    with pytest.raises(ValueError, match="1 check point and no control point"):
         mlscorr.compare(mlscorr.read_survey(folder))
 
 

@@ -149,7 +149,7 @@ def test_check_looks_at_a_merged_cloud(merged):
     assert checked.faults == ()
     amounts = {amount.what: amount for amount in checked.read}
     assert amounts["scanners"].number == 2
-    assert "headers of 1 cloud files" in amounts["points"].source
+    assert "headers of 1 cloud file" in amounts["points"].source
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from mlscorr.survey import Matched, Survey
-from mlscorr.survey.summary import Summary, html_table
+from mlscorr.survey.summary import Summary, counted, html_table
 from tests.beds.tied_passes import tied_passes
 
 
@@ -55,3 +56,11 @@ def test_a_sentence_covers_all_columns():
     shown = html_table("Gap", [("One & all",), ("a", 1, None)])
     assert '<td colspan="3">One &amp; all</td>' in shown
     assert "<td>a</td><td>1</td><td>None</td>" in shown
+
+
+@pytest.mark.parametrize(("noun", "several"), [
+    ("pass", "passes"), ("cloud file", "cloud files"), ("entry", "entries"), ("gap", "gaps"),
+])  # fmt: skip
+def test_one_thing_is_counted_in_the_singular(noun, several):
+    "None and two are in the plural"
+    assert [counted(n, noun) for n in range(3)] == [f"0 {several}", f"1 {noun}", f"2 {several}"]
