@@ -1,11 +1,18 @@
 """What ``import mlscorr`` offers: functions that are loaded when they are used."""
 
 import ast
+import inspect
+import re
 from pathlib import Path
 
 import pytest
 
 import mlscorr
+
+VERBS = [
+    name for name in mlscorr.__all__
+    if name != "simulate" and "survey" in inspect.signature(getattr(mlscorr, name)).parameters
+]  # fmt: skip
 
 
 def typed_names():
@@ -33,3 +40,13 @@ def test_a_name_that_is_none_is_an_attribute_error():
     "As of any module"
     with pytest.raises(AttributeError, match="no attribute 'corect'"):
         _ = mlscorr.corect
+
+
+@pytest.mark.parametrize("name", VERBS)
+@pytest.mark.parametrize("given", ["street/survey.toml", Path("street"), None], ids=repr)
+def test_a_path_where_a_survey_belongs_is_told_how_to_read_it(name, given):
+    "All that take a survey say what they were given, and which function gives one"
+    others = {"apply": ([],), "render": ("out",)}.get(name, ())
+    words = re.escape(repr(str(given)))
+    with pytest.raises(TypeError, match=f"{words}.*{type(given).__name__}.*mlscorr.read_survey"):
+        getattr(mlscorr, name)(given, *others)

@@ -20,7 +20,7 @@ from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
-from mlscorr.survey import Survey
+from mlscorr.survey import Survey, check_survey
 from mlscorr.survey.summary import Summary
 
 CLOCK = "time_offset"
@@ -68,6 +68,7 @@ def apply(survey: Survey, effects: Iterable[Effect]) -> AppliedSurvey:
     >>> round(float(np.median(np.linalg.norm(way, axis=1))), 2)  # m, at 4 m/s
     0.08
     """
+    check_survey(survey)
     effects = tuple(effects)
     stubborn = [effect for effect in effects if effect.name not in TAKEN_OUT]
     if not effects:

@@ -22,7 +22,7 @@ from mlscorr.pipeline.calibrated_survey import (
 )
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
-from mlscorr.survey import Survey
+from mlscorr.survey import Survey, check_survey
 from mlscorr.survey.summary import Summary
 
 SEEN_BY_OTHERS = "Another scanner saw it, this one did not."
@@ -75,6 +75,7 @@ def calibrate(
     >>> round(float(result.calibration.lsc.correction[2]), 1)  # m, up
     0.2
     """
+    check_survey(survey)
     for name, part in survey.by_scanner.items():
         if part.mounting is None:
             raise ValueError(

@@ -16,7 +16,7 @@ from mlscorr.pipeline.compared_survey import ComparedSurvey
 from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.pipeline.methods import METHODS, load_open3d
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Survey
+from mlscorr.survey import Survey, check_survey
 
 
 def compare(
@@ -55,6 +55,7 @@ def compare(
     >>> compared.row("lsc")["check"]["rmse_3d"] < compared.row("raw")["check"]["rmse_3d"]
     True
     """
+    check_survey(survey)
     control, check, finding = find_control(survey, rng, progress)
     candidates = finding.candidates
     load_open3d()  # takes seconds, which are not the method's

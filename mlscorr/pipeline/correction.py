@@ -14,7 +14,7 @@ from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.finding import Finding
 from mlscorr.pipeline.tying import TieUse, estimate_survey
-from mlscorr.survey import Matched, Survey
+from mlscorr.survey import Matched, Survey, check_survey
 
 
 def correct(
@@ -65,6 +65,7 @@ def correct(
     >>> max(result.check["after"]["rmse"]) < 0.03
     True
     """
+    check_survey(survey)
     survey, control, check, finding, estimate = estimate_survey(survey, order, ties, rng, progress)
     result = CorrectedSurvey(**corrected_fields(survey, control, check, finding, estimate))
     datum = result.warnings[len(finding.warnings) :]  # those of the finding were told meanwhile

@@ -22,7 +22,7 @@ from mlscorr.pipeline.finding import (
     unmatched,
 )
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Survey, TargetObservations
+from mlscorr.survey import Survey, TargetObservations, check_survey
 from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
 from mlscorr.targets import BY_EDGES, distinct, search_targets, why_useless
@@ -70,6 +70,7 @@ def extract(
     >>> sum(row["matched"] for row in found.targets)
     5
     """
+    check_survey(survey)
     rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
     surveyed = survey.surveyed
     kinds = dict.fromkeys(zip(surveyed.kind, surveyed.size.tolist(), strict=True))

@@ -17,7 +17,7 @@ from mlscorr.gap.observe import Rows, background
 from mlscorr.gap.plan import NextData, event_sizes, next_data, planned_rows
 from mlscorr.gap.signatures import signatures
 from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.survey import Matched, Survey, TargetObservations
+from mlscorr.survey import Matched, Survey, TargetObservations, check_survey
 from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
 
@@ -44,6 +44,7 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
     ValueError
         Without a mounting, or when nothing will be seen.
     """
+    check_survey(survey)
     survey.check_one_scanner("a plan")
     rows = planned_rows(survey)
     library = known_effects() if library is None else library

@@ -13,7 +13,7 @@ from mlscorr.evaluate.rows import TargetRow
 from mlscorr.io.output import check_output, document, output_folder
 from mlscorr.io.trajectory import read_trajectory
 from mlscorr.pipeline.correction import correct
-from mlscorr.survey import Survey
+from mlscorr.survey import Survey, check_survey
 
 PAGE = (1920, 1080)  # pixels, of a common screen
 TIME_DIGITS = 1e-6  # s, to which a corrected trajectory is written
@@ -61,6 +61,7 @@ def render(
     """
     from mlscorr.report.render import PictureOptions, draw, panel_size
 
+    check_survey(survey)
     check_output(out, [file.path for file in survey.inputs], overwrite)
     drawn = {name: options.pop(name) for name in ("views", "engine") if name in options}
     asked = PictureOptions(panel_size(size), panel_size(size, stacked=True), **options)

@@ -15,7 +15,7 @@ from mlscorr.io.las import read_chunks
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_ties_csv
 from mlscorr.pipeline.finding import silent
-from mlscorr.survey import TIE_KINDS, Survey, TieFeatures
+from mlscorr.survey import TIE_KINDS, Survey, TieFeatures, check_survey
 from mlscorr.survey.summary import Summary, counted
 from mlscorr.ties import (
     SETTINGS,
@@ -61,6 +61,7 @@ def find_ties(survey: Survey, progress: Callable | None = None) -> TiedSurvey:
     >>> tied.pairs[0]["passes"]
     [1, 2]
     """
+    check_survey(survey)
     done = (progress or silent)("Searching the cloud", survey.points)
     collector = TieCollector(survey)
     for file in survey.clouds:

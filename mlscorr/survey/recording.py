@@ -234,3 +234,23 @@ class Survey(Summary):
                 "mounting. Give it a survey.toml of each scanner: its files under [cloud] (split "
                 "one with points of several), its [mounting] and its [scanner]."
             )
+
+
+def check_survey(value: object) -> None:
+    """Refuse what is no survey, as the path of one.
+
+    Parameters
+    ----------
+    value : object
+        Given where a Survey belongs.
+
+    Raises
+    ------
+    TypeError
+        With the way out.
+    """
+    if not isinstance(value, Survey):
+        raise TypeError(
+            f"A Survey belongs where {str(value)[:60]!r} ({type(value).__name__}) was given: read "
+            "one with mlscorr.read_survey(path), and give that."
+        )
