@@ -117,10 +117,13 @@ def _tell(content):
 
 def _tell_rounds(ablation):
     """The gap with each effect by itself, and after each round."""
+    from mlscorr.effects.labels import title
+
     terminal.say(f"{'In the simulator':34s}{'gap before':>12s}{'after':>10s}")
     for row in ablation["alone"]:
-        terminal.say(f"{row['effect'] + ' alone':34s}{row['before']:9.1f} mm{row['after']:7.1f} mm")
+        words = f"{title(row['effect'])} alone"
+        terminal.say(f"{words:34s}{row['before']:9.1f} mm{row['after']:7.1f} mm")
     for row in ablation["rounds"]:
-        words, unit = f"round {row['round']}: {row['label']}", row["unit"]
+        words, unit = f"round {row['round']}: {title(row['label'])}", row["unit"]
         terminal.say(f"{words:34s}{row['before']:9.1f} {unit:2s}{row['after']:7.1f} {unit:2s}")
     terminal.say(ablation["ended"])

@@ -15,6 +15,7 @@ def plan(
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
     with work(out, overwrite, survey, planned=True):
         content = mlscorr.plan(mlscorr.read_survey(survey, planned=True)).write(out, overwrite)
+    from mlscorr.effects.labels import lowered, parameter_title, titles
     from mlscorr.report.gap import accuracy_sentence
 
     print_json(content, as_json)
@@ -22,9 +23,10 @@ def plan(
     for parts in content["detectable"].values():
         for part in parts:
             usual = "" if part["typical"] is None else f"{part['typical']:.3g}"
-            say(f"{part['name']:39s}{part['detectable']:9.3g}  {part['unit']:12s}  {usual}")
+            words = f"{parameter_title(part['name']):39s}{part['detectable']:9.3g}"
+            say(f"{words}  {part['unit']:12s}  {usual}")
     for members in content["classes"]:
-        say(f"Can't be told apart: {', '.join(members)}.")
+        say(f"Can't be told apart: {lowered(titles(members))}.")
     if content["accuracy"] is not None:
         say(accuracy_sentence(content["accuracy"]))
     for number, sentence in enumerate(content["advice"], start=1):

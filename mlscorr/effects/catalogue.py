@@ -94,6 +94,11 @@ def known_effects() -> tuple[type[Effect], ...]:
     return (*EFFECTS, *_registered.values())
 
 
+def effects_by_name() -> dict[str, type[Effect]]:
+    """Classes of all effects by their names."""
+    return {kind.name: kind for kind in known_effects()}
+
+
 def effect_class(name: str) -> type[Effect]:
     """The class of an effect by its name.
 
@@ -106,7 +111,7 @@ def effect_class(name: str) -> type[Effect]:
     ValueError
         For an unknown name, with the nearest known one.
     """
-    by_name = {kind.name: kind for kind in known_effects()}
+    by_name = effects_by_name()
     if name not in by_name:
         near = get_close_matches(str(name), by_name, n=1, cutoff=0.0)[0]
         raise ValueError(f"{name!r} is an unknown effect; the nearest known one is {near}.")

@@ -7,6 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from mlscorr.effects import Effect, effect_class
+from mlscorr.effects.labels import lowered, title
 from mlscorr.gap.close.closure import Closure
 from mlscorr.gap.infer.causes import Inference
 from mlscorr.gap.infer.separability import Separability
@@ -110,9 +111,8 @@ def _sentence(inference):
         + (f" ± {parameter.sigma:.2g}" if np.isfinite(parameter.sigma) else "")
         for parameter in cause.parameters
     ]
-    names = verdict.label.replace("+", " and ")
     do = "explain" if "+" in verdict.label else "explains"
-    return f"{names} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
+    return f"{title(verdict.label)} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
 
 
 def _advice(inference, closure, next_data):
@@ -131,7 +131,7 @@ def _advice(inference, closure, next_data):
         sentences.append(f"Look for what makes a {verdict.lead}: no effect of the library does.")
         if closure.effect != "none":  # it impersonates the cause
             sentences.append(
-                f"The nearest known effect, {closure.effect}, closes "
+                f"The nearest known effect, {lowered(title(closure.effect))}, closes "
                 f"{100 * max(0.0, min(1.0, closure.shrink)):.0f} % of the gap and leaves "
                 "the rest: don't use it."
             )
@@ -139,7 +139,7 @@ def _advice(inference, closure, next_data):
         sentences += [effect_class(part).remedy for part in verdict.label.split("+")]
         sentences.append(NEXT_RUN)
     labels = (*verdict.set, *inference.same)
-    open_question = [name for name in labels if name not in ("none", verdict.label)]
+    open_question = [lowered(title(n)) for n in labels if n not in ("none", verdict.label)]
     if open_question and next_data:
         sentences.append(
             f"To settle what is open ({', '.join(dict.fromkeys(open_question))}), measure "

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlscorr.effects import Effect, known_effects
+from mlscorr.effects.labels import lowered, parameter_title, titles
 from mlscorr.estimate import PlannedAccuracy, predict_accuracy
 from mlscorr.gap.document import map_document, separability_document
 from mlscorr.gap.infer import Observations, Separability, compare_signatures
@@ -173,8 +174,8 @@ class PlannedSurvey(Summary):
             )
         if hidden:
             advice.append(
-                f"Don't expect to see {', '.join(hidden)}: only more than {LARGE:.0f} times the "
-                "usual size would show."
+                f"Don't expect to see {lowered(titles(hidden))}: only more than {LARGE:.0f} times "
+                "the usual size would show."
             )
         if not self.separability.classes:
             advice.append("All effects that show can be told apart.")
@@ -258,7 +259,7 @@ def too_little(
     signs, _ = signatures(rows, survey, library)
     compared = compare_signatures(Observations.of(rows, background(rows, survey)), signs)
     sizes = [
-        f"{name} {size:.2g} {unit}"
+        f"{lowered(parameter_title(name))} {size:.2g} {unit}"
         for name, unit, size in zip(
             compared.names, compared.units, compared.detectable, strict=True
         )

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.effects import Effect
+from mlscorr.effects.labels import lowered, title
 from mlscorr.gap.close import LoneEffect, lone_effects
 from mlscorr.gap.infer import Costs
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
@@ -36,15 +37,16 @@ class DiagnosedRounds:
     def ended(self) -> str:
         """Why it ended, in a sentence."""
         label, number = self.rounds[-1].inference.verdict.label, len(self.rounds)
-        named = [each.inference.verdict.label for each in self.rounds[:-1]]
+        named = [lowered(title(each.inference.verdict.label)) for each in self.rounds[:-1]]
         if label == "none":
             whole = f"with {', '.join(named)} in the simulator " if named else ""
             return f"Round {number}: {whole}nothing is left to find."
         if label == "unknown":
             return f"Round {number}: what is left no known effect explains."
+        words = lowered(title(label))
         if number < SETTINGS.rounds:
-            return f"Round {number}: {label} can't be put into the simulator once more."
-        return f"After {number} rounds {label} is still found: the simulator has what was named."
+            return f"Round {number}: {words} can't be put into the simulator once more."
+        return f"After {number} rounds {words} is still found: the simulator has what was named."
 
     @property
     def document(self) -> dict:

@@ -163,7 +163,7 @@ def test_too_few_targets_are_told_with_the_plan(tmp_path):
     simulate(scenario, np.random.default_rng(5)).write(folder)
     with pytest.raises(ValueError, match="at least 12 targets") as error:
         mlscorr.diagnose(mlscorr.read_survey(folder))
-    assert "time_offset" in str(error.value)
+    assert "scanner clock offset" in str(error.value)
 
 
 def test_a_simulator_with_an_unknown_effect_is_refused(late, tmp_path):

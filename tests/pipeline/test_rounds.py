@@ -32,7 +32,7 @@ def test_one_command_finds_the_cause_and_then_none(survey, tmp_path):
     assert rounds[0]["after"] < 0.1 * rounds[0]["before"]
     assert told["ablation"]["alone"][0]["effect"] == "time_offset"
     assert "nothing is left to find" in told["ablation"]["ended"]
-    assert "time_offset alone" in done.output and "round 2: none" in done.output
+    assert "Scanner clock offset alone" in done.output and "round 2: Nothing" in done.output
     page = " ".join((out / "gap.html").read_text().split())
     assert "1. Scanner clock offset" in page and "2. Nothing" in page
     assert rounds[0]["parameters"][0]["estimate"] == pytest.approx(0.02, abs=1e-3)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.effects import Effect
+from mlscorr.effects.labels import lowered, titles
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.separability import Separability, compare_signatures
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
@@ -107,7 +108,7 @@ def next_data(
         after = _largest(compare_signatures(observed, signs), names)
         if before - after >= SETTINGS.smallest_fall:
             why = (
-                f"{' and '.join(names)}: squared correlation falls from {before:.2f} to "
+                f"{lowered(titles(names))}: squared correlation falls from {before:.2f} to "
                 f"{after:.2f}" + ("." if after <= INFERENCE.same else ", which is still one class.")
             )
             data.append(NextData(addition.name, why, before, after))

@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from mlscorr.effects.labels import lowered
 from mlscorr.effects.wording import joined, known
 from mlscorr.report.gap.innovations import channel_style
-from mlscorr.report.gap.labels import lowered
 from mlscorr.report.gap.numbers import numbers, plain
 from mlscorr.report.gap.rows import bin_names
 from mlscorr.report.headline import Statement

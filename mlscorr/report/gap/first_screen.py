@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
+from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import joined
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.signatures.signatures import NO_MOUNTING
 from mlscorr.report.gap.channels import channel_statements
-from mlscorr.report.gap.labels import lowered, title
 from mlscorr.report.gap.verdict import facts, is_named, verdict
 from mlscorr.report.headline import Statement, statements_section, warning_statements
 from mlscorr.report.tables import length_in_words

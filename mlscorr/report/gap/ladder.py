@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from mlscorr.effects.labels import OTHERS, family, title
 from mlscorr.effects.wording import known
-from mlscorr.report.gap.labels import OTHERS, family, title
 from mlscorr.report.gap.settings import SETTINGS
 from mlscorr.report.style import BLUE, GREEN, GREY, ORANGE, label, legend_above, new_figure, styled
 

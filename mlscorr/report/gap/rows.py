@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from itertools import pairwise
 
+from mlscorr.effects.labels import meaning, title
 from mlscorr.effects.wording import DASH, known
-from mlscorr.report.gap.labels import meaning, sentences_of, title
+from mlscorr.report.gap.labels import sentences_of
 from mlscorr.report.gap.numbers import column, percent, plain, signed
 
 COVARIATES = {

@@ -4,9 +4,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from mlscorr.effects.labels import parameter_title
 from mlscorr.effects.wording import known
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
-from mlscorr.report.gap.labels import title
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.rows import DetectableRow
 from mlscorr.report.gap.settings import SETTINGS
@@ -40,21 +40,6 @@ def classes_in_order(separability: dict) -> tuple[list[int], list[tuple[int, int
 def _squares(separability):
     """Squared correlation (n, n)."""
     return np.array([numbers(row) for row in separability["correlation"]["matrix"]]) ** 2
-
-
-def parameter_title(name: str) -> str:
-    """The name of a parameter in words: the effect's, and which part of it.
-
-    Parameters
-    ----------
-    name : str
-
-    >>> parameter_title("lever_arm up"), parameter_title("time_offset")
-    ('Lever arm, up', 'Scanner clock offset')
-    """
-    effect, _, part = name.partition(" ")
-    part = part.replace("magnitude ", "").replace("(phase)", "")
-    return title(effect) + (f", {part}" if part else "")
 
 
 @styled

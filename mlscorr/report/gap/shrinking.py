@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
+from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import DASH, joined, known
-from mlscorr.report.gap.labels import lowered, title
 from mlscorr.report.gap.numbers import percent, signed
 
 GAPS = {  # by the kind of gap that a closure measures

@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 from mlscorr.effects import Effect
+from mlscorr.effects.labels import family, lowered, meaning, title
 from mlscorr.effects.wording import DASH, joined, known, size
-from mlscorr.report.gap.labels import family, lowered, meaning, sentences_of, title
+from mlscorr.report.gap.labels import sentences_of
 from mlscorr.report.gap.shrinking import Fact, is_closed, is_within, shrinking
 
 CERTAINTY = (  # probability from which on one says so

@@ -34,4 +34,4 @@ def test_targets_alone_confuse_a_datum_with_a_lever_arm_and_more_speed_does_not_
     assert "vertical_datum" in compared.same("lever_arm", [0.0, 0.0, 0.1])
     for one in next_data(g.rows, g.survey, EFFECTS, ("time_offset", "clock_drift"), compared):
         assert one.after < one.before
-        assert "time_offset and clock_drift" in one.why
+        assert "scanner clock offset and scanner clock drift" in one.why

@@ -1,0 +1,100 @@
+"""The labels of a diagnosis in plain words: effects, pairs, nothing, something unknown."""
+
+from collections.abc import Iterable
+
+from mlscorr.effects.catalogue import effects_by_name
+from mlscorr.effects.wording import joined
+
+OTHERS = {
+    "none": ("Nothing", "The simulator describes this survey as it is."),
+    "unknown": ("Something unknown", "An error that none of the known effects explains."),
+}
+
+
+def title(label: str) -> str:
+    """A label in words: of an effect, of a pair joined by +, of none or unknown.
+
+    Parameters
+    ----------
+    label : str
+
+    >>> title("time_offset+range_noise"), title("none")
+    ('Scanner clock offset and noisy ranges', 'Nothing')
+    """
+    return titles(label.split("+"))
+
+
+def titles(names: Iterable[str]) -> str:
+    """Effects in words, in a row.
+
+    Parameters
+    ----------
+    names : iterable of str
+
+    >>> titles(["range_bias", "range_walk", "position_step"])
+    'Range bias, range walk and GNSS jump'
+    """
+    first, *rest = [_words(name)[0] for name in names] or [""]
+    return joined([first, *map(lowered, rest)])
+
+
+def lowered(text: str) -> str:
+    """A title or sentence as it goes on within a sentence.
+
+    Parameters
+    ----------
+    text : str
+
+    >>> lowered("Scanner clock offset"), lowered("GNSS jump")
+    ('scanner clock offset', 'GNSS jump')
+    """
+    return text if text[1:2].isupper() else text[:1].lower() + text[1:]
+
+
+def meaning(label: str) -> str:
+    """What a label is, in a sentence for each of its parts.
+
+    Parameters
+    ----------
+    label : str
+    """
+    return " ".join(filter(None, (_words(name)[1] for name in label.split("+"))))
+
+
+def family(label: str) -> str:
+    """Where a label belongs: none, unknown, noise or effect.
+
+    Parameters
+    ----------
+    label : str
+
+    >>> family("range_noise"), family("range_noise+time_offset")
+    ('noise', 'effect')
+    """
+    if label in OTHERS:
+        return label
+    kinds = [effects_by_name().get(name) for name in label.split("+")]
+    return "noise" if all(kind and kind.is_scatter() for kind in kinds) else "effect"
+
+
+def parameter_title(name: str) -> str:
+    """The name of a parameter in words: the effect's, and which part of it.
+
+    Parameters
+    ----------
+    name : str
+
+    >>> parameter_title("lever_arm up"), parameter_title("time_offset")
+    ('Lever arm, up', 'Scanner clock offset')
+    """
+    effect, _, part = name.partition(" ")
+    part = part.replace("magnitude ", "").replace("(phase)", "")
+    return title(effect) + (f", {part}" if part else "")
+
+
+def _words(name):
+    """Title and meaning of an effect, none or unknown; of others the name itself."""
+    kind = effects_by_name().get(name)
+    if kind:
+        return kind.title, kind.meaning
+    return OTHERS.get(name, (name.replace("_", " ").capitalize(), ""))
