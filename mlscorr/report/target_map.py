@@ -46,8 +46,8 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
         places = array(ordered(rows, group), "surveyed")
         axes.plot(*places[:, :2].T, linestyle="none", **style.MARKS[group])
     names = {row.name: (row.surveyed[:2], -1 if row.before[0] > 0 else 1) for row in rows[::-1]}
-    write_names(axes, names, width)
     mark_places(axes, [(place.easting, place.northing) for place in report.next_control])
+    write_names(axes, names, width)
     frame(axes, low, high)
     axes.set_title("Where the targets lie, and their horizontal residuals")
     _key(axes, low, high, strip, times)
@@ -119,26 +119,36 @@ def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) 
     Parameters
     ----------
     axes : Axes
-        Of a map.
+        Of a map, with its stars: where one stands, a name goes to the other side.
     names : mapping
         To easting and northing (m), and to 1 for a name right of the mark, -1 for one left of it.
     width : float
         Of a figure's whole width on the map. Units: m.
     """
-    taken, letter = np.empty((0, 4)), np.array([0.0105, 0.018]) * width  # m on the map
+    taken, letter = [], np.array([0.0105, 0.018]) * width  # m on the map
+    places = [line.get_xydata() for line in axes.lines if line.get_marker() == NEXT["marker"]]
+    stars = [[*np.ravel(place) + letter[1] / 4, *letter[[1, 1]]] for place in places]
     for name, (place, side) in names.items():
         text = style.label(name)
         half = letter * [len(text) / 2, 0.5]
-        middle = np.add(place, [side * (half[0] + letter[0]), 0.0])
-        apart = np.abs(taken[:, :2] - middle) >= taken[:, 2:] + half
-        if not apart.any(axis=1).all():
+        boxes = {
+            s: [*np.add(place, [s * (half[0] + letter[0]), 0.0]), *half] for s in (side, -side)
+        }
+        free = [s for s in boxes if not _covers(boxes[s], stars)][:1]
+        if not free or _covers(boxes[free[0]], taken):
             continue
-        taken = np.vstack([taken, [*middle, *half]])
+        taken.append(boxes[free[0]])
         axes.annotate(
-            text, place, xytext=(6 * side, 0), textcoords="offset points",
-            horizontalalignment="left" if side > 0 else "right", verticalalignment="center",
+            text, place, xytext=(6 * free[0], 0), textcoords="offset points",
+            horizontalalignment="left" if free[0] > 0 else "right", verticalalignment="center",
             fontsize=7, parse_math=False, zorder=5,
         )  # fmt: skip
+
+
+def _covers(box, others):
+    """Whether a box (middle and half its size) covers any of others."""
+    others = np.reshape(others, (-1, 4))
+    return (np.abs(others[:, :2] - box[:2]) < others[:, 2:] + box[2:]).all(axis=1).any()
 
 
 def _key(axes, low, high, strip, times):

@@ -1,7 +1,11 @@
 """The map of the targets and their residuals."""
 
 import re
+from dataclasses import replace
 
+import numpy as np
+
+from mlscorr.estimate.placement import NextControl
 from mlscorr.report.target_map import map_figure
 from tests.beds.reports import drive, fabricate
 
@@ -26,3 +30,20 @@ def test_names_on_the_map_do_not_cover_one_another():
     boxes = [text.get_window_extent() for text in names]
     assert 10 < len(names) < 300
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def test_names_on_the_map_go_to_the_other_side_of_a_star():
+    "Where a control point is needed right beside a target, its name stays, and can be read"
+    _, correction, report = fabricate(drive(), 6)
+    row = report.targets[0]
+    beside = 12.0 * np.array([-1.0 if row.before[0] > 0 else 1.0, 0.0])  # m
+    place = NextControl(row.gps_time, *row.surveyed[:2] + beside, *[0.1] * 6, 0.2, 1, "far off")
+    report = replace(report, next_control=(place,))
+    axes = map_figure(correction, report).axes[0]
+    axes.figure.draw_without_rendering()
+    texts = {text.get_text(): text for text in axes.texts}
+    (star,) = (line for line in axes.lines if line.get_marker() == "*" and len(line.get_xdata()))
+    name, box = texts[row.name], star.get_window_extent().padded(5.0)
+    assert not name.get_window_extent().overlaps(box)
+    assert not name.get_window_extent().overlaps(texts["1"].get_window_extent())
+    assert (name.xyann[0] > 0) == (row.before[0] > 0)
