@@ -35,6 +35,6 @@ def _tell(content, out):
             "points."
         )
     for row in content["unseen"]:
-        say(f"Not found: {row['name']}: {row['reason']}")
+        say(f"Without target: {row['name']}: {row['reason']}")
     say(f"Targets:  {out / 'targets.csv'} and {out / 'targets.json'}")
     say(f"Pictures: {out / 'targets.png'}")

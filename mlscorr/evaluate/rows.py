@@ -12,6 +12,7 @@ NAMES = ("rmse", "mean", "std", "min", "max")  # of statistics, as documents hav
 VECTORS = ("surveyed", "observed", "sigma", "before", "after", "left_out")  # of a TargetRow
 SINGLE = ("name", "gps_time", "role", "used", "reason")
 CHECK_REASON = "check point"  # why it took no part in the estimate
+SEEN_BY_OTHERS = "Another scanner saw it, this one did not."
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ class TargetRow:
     pass_number : int or None
         Passes count from 1 in time.
     gps_time : float or None
-        Units: s.
+        Of the observation, or of that which was refused as that of the point. Units: s.
     role : str
         ``control`` or ``check``.
     surveyed, observed, sigma, before, after, left_out : (3,) array
@@ -150,12 +151,13 @@ class TargetRow:
         surveyed: np.ndarray,
         reason: str,
         scanned: bool = True,
+        gps_time: float | None = None,
     ) -> TargetRow:
-        """The row of a surveyed point that was not observed."""
+        """The row of a surveyed point that was not observed, or has an observation refused then."""
         nan = np.full(3, np.nan)
         vectors = {"observed": nan, "sigma": nan, "before": nan, "after": nan, "left_out": nan}
         row: dict[str, Any] = {"surveyed": surveyed, **vectors, "used": False, "reason": reason}
-        return cls(name, pass_number, None, role, **row, scanned=scanned)
+        return cls(name, pass_number, gps_time, role, **row, scanned=scanned)
 
     @classmethod
     def read(cls, row: dict) -> TargetRow:
@@ -209,7 +211,9 @@ class PointCounts:
         Name and reason of each that has points of the cloud about it and no observation.
     refused, outside : tuple of (str, str)
         Name and reason of each that was observed and not used, and of each about which nothing was
-        scanned.
+        scanned, or by another scanner alone.
+    misplaced : tuple of (str, str)
+        Those of the missing of which something was found that does not fit: in place, kind or size.
     """
 
     surveyed: int
@@ -218,6 +222,12 @@ class PointCounts:
     missing: tuple[tuple[str, str], ...] = ()
     refused: tuple[tuple[str, str], ...] = ()
     outside: tuple[tuple[str, str], ...] = ()
+    misplaced: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def hidden(self) -> tuple[tuple[str, str], ...]:
+        """Those of the missing of which nothing was found."""
+        return tuple(point for point in self.missing if point not in self.misplaced)
 
     @classmethod
     def of(cls, rows: Iterable[TargetRow], role: str) -> PointCounts:
@@ -241,7 +251,8 @@ class PointCounts:
         everything = {row.name for row in rows}
         counts = len(everything), len(observed), len(scored)
         outside = everything - observed - missing
-        return cls(*counts, *map(reasons, (missing, observed - scored, outside)))
+        misplaced = missing & {row.name for row in rows if row.gps_time is not None}
+        return cls(*counts, *map(reasons, (missing, observed - scored, outside, misplaced)))
 
     def document(self) -> dict[str, object]:
         """What the sections ``control`` and ``check`` of report.json have of it."""

@@ -107,7 +107,8 @@ def unseen_rows(
         no_pose = _no_pose(point, survey, candidates)
         named = refusal.name, refusal.pass_number, role, point.position[0]
         is_scanned = no_pose is not None or refusal.name in scanned
-        rows.append(TargetRow.unobserved(*named, no_pose or refusal.reason, is_scanned))
+        why = no_pose or refusal.reason, is_scanned, None if no_pose else refusal.gps_time
+        rows.append(TargetRow.unobserved(*named, *why))
     return rows
 
 

@@ -191,7 +191,8 @@ def _wrong_place(case, row):
         f"{case.name(point)} lies {case.off(row, point):.2f} m from where the observation at "
         f"{case.when(row)} says once corrected; {case.corrected(row)}. Its surveyed point is "
         f"wrong, or this is another object (probability {wrong[point]:.3f} by {passes} "
-        f"observations; misclosure {misclosure:.2f} m, {case.limit})."
+        f"observation{'' if passes == 1 else 's'}; misclosure {misclosure:.2f} m, {case.limit}): "
+        "compare its coordinates with the surveyor's record, or leave it out."
     )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.estimate import Calibration
+from mlscorr.evaluate.rows import SEEN_BY_OTHERS
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.evaluate.ties import misfit_section
 from mlscorr.io.las import sample_gps_times
@@ -24,8 +25,6 @@ from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
 from mlscorr.survey import Survey, check_survey
 from mlscorr.survey.summary import Summary
-
-SEEN_BY_OTHERS = "Another scanner saw it, this one did not."
 
 
 def calibrate(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.evaluate.rows import PointCounts
+from mlscorr.evaluate.rows import SEEN_BY_OTHERS, PointCounts
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.tables import length_in_words, percent, verdict
 from mlscorr.survey.summary import counted
@@ -142,17 +143,20 @@ def _scored(points):
     """Sentences on the check points that were seen, and on those that were not."""
     scored = f"{points.scored} of {points.surveyed} surveyed check points"
     yield f"{scored} {'was' if points.scored == 1 else 'were'} seen and scored."
-    missing, n = points.missing, len(points.missing)
-    if n:
-        them = "1 check point was" if n == 1 else f"{n} check points were"
-        yield (
-            f"{them} not seen although the cloud covers {'its' if n == 1 else 'their'} "
-            f"surroundings ({_names(missing)}): the error there is unknown, and counts against "
-            "this result."
-        )
-    outside = len(points.outside)
-    if outside:
-        yield f"{outside} {'stands' if outside == 1 else 'stand'} where nothing was scanned."
+    hidden = "not seen although the cloud covers the surroundings"
+    unfit = "found, but refused, as place, kind or size does not fit"
+    for words, some in ((hidden, points.hidden), (unfit, points.misplaced)):
+        if n := len(some):
+            them = f"{n} check point{' was' if n == 1 else 's were'} {words} ({_names(some)})"
+            yield f"{them}: the error there is unknown, and counts against this result."
+    for where, number in _away(points):
+        yield f"{number} {'stands' if number == 1 else 'stand'} where {where}."
+
+
+def _away(points):
+    """What was scanned where points without points of the cloud stand, and their number."""
+    there = {SEEN_BY_OTHERS: "only another scanner saw the target"}
+    return Counter(there.get(why, "nothing was scanned") for _, why in points.outside).items()
 
 
 def _control(report):
@@ -172,12 +176,9 @@ def control_statement(points: PointCounts) -> Statement:
         Of the control points.
     """
     parts = [f"{points.scored} of {points.surveyed} surveyed points used"]
-    if points.refused:
-        parts.append(f"{len(points.refused)} refused ({_names(points.refused)})")
-    if points.missing:
-        parts.append(f"{len(points.missing)} not seen ({_names(points.missing)})")
-    if points.outside:
-        parts.append(f"{len(points.outside)} where nothing was scanned")
+    lost = {"refused": points.refused + points.misplaced, "not seen": points.hidden}
+    parts += [f"{len(some)} {words} ({_names(some)})" for words, some in lost.items() if some]
+    parts += [f"{number} where {where}" for where, number in _away(points)]
     rating = "amber" if points.refused or points.missing else "green"
     return Statement("Control points", rating, ", ".join(parts) + ".", _named(points))
 

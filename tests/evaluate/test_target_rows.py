@@ -8,6 +8,7 @@ import pytest
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import Outlier
+from mlscorr.evaluate.rows import PointCounts
 from mlscorr.evaluate.target_rows import surveyed_rows, target_rows, unseen_rows
 from mlscorr.matching import Refusal
 from mlscorr.survey import PointCloud, Survey
@@ -83,6 +84,18 @@ def test_unseen_points_have_the_reason_of_the_matching(matched):
     assert (first.reason, second.reason) == ("hidden", "not there")
     np.testing.assert_array_equal(first.surveyed, matched.surveyed.position[2])
     assert not first.is_observed and not second.used
+
+
+def test_an_observation_that_was_refused_leaves_its_time(matched):
+    "So that what was found, and does not fit, is told apart from what nobody saw"
+    refusals = [Refusal("T02", 1, "too far off", TIME + 3.0), Refusal("T03", None, "not there")]
+    refused, unseen = unseen_rows(survey_of(matched), refusals, candidates(), {"T02", "T03"})
+    assert (refused.gps_time, unseen.gps_time) == (TIME + 3.0, None)
+    assert not refused.is_observed and not refused.used
+    counts = PointCounts.of([refused, unseen], "control")
+    assert [name for name, _ in counts.misplaced] == ["T02"]
+    assert [name for name, _ in counts.hidden] == ["T03"]
+    assert len(counts.missing) == 2
 
 
 def test_points_without_a_pose_are_the_better_reason(matched):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from mlscorr.evaluate.rows import SEEN_BY_OTHERS, TargetRow
 from mlscorr.report.calibration_page import (
     calibration_page,
     calibration_screen,
@@ -15,9 +16,9 @@ SCANNER = {"range_offset": RANGES, "encoder_scale": RANGES | {"correction": 1e-4
 PARAMETERS = {"position_scale": 1.0, "position_time": 30.0}
 
 
-def calibrated(determined=True, worse=False, significant=False):
+def calibrated(determined=True, worse=False, significant=False, unseen=()):
     "Content of calibration.json of a scanner whose lever arm lacks 9 cm to the left, and its rows"
-    rows = fabricate(drive())[2].targets
+    rows = [*fabricate(drive())[2].targets, *unseen]
     scores = {role: score_of([r for r in rows if r.group == role]) for role in ("control", "check")}
     if worse:
         scores = {role: replace(s, before=s.after, after=s.before) for role, s in scores.items()}
@@ -52,6 +53,20 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
     assert content["rating"] == "amber"
     assert text.index(lacks) < text.index("How far the cloud is")
     assert all(row["sentence"] in text for row in content["statements"])
+
+
+def test_points_that_another_scanner_alone_saw_are_called_so():
+    "Not that nothing was scanned about them: two scanners look at two sides of a street"
+    rows = fabricate(drive())[2].targets
+    unseen = [
+        TargetRow.unobserved(name, None, role, rows[0].surveyed, SEEN_BY_OTHERS, False)
+        for name, role in (("T90", "control"), ("T91", "control"), ("C90", "check"))
+    ]
+    said = {row["what"]: row for row in calibrated(unseen=unseen)["statements"]}
+    assert "2 where only another scanner saw the target" in said["Control points"]["sentence"]
+    assert "1 stands where only another scanner saw the target." in said["Check points"]["sentence"]
+    assert {"name": "T90", "text": SEEN_BY_OTHERS} in said["Control points"]["items"]
+    assert "nothing was scanned" not in said["Control points"]["sentence"]
 
 
 def test_a_calibration_that_makes_check_points_worse_is_red():

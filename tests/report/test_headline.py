@@ -50,6 +50,24 @@ def test_refused_and_missing_control_points_are_counted():
     assert "Control: 5 of 7 surveyed points used, 1 refused (T01), 1 not seen (T40)." in text
 
 
+def test_what_was_found_half_a_metre_off_is_not_said_to_be_unseen():
+    "Refused, with its reason; a check point counts against the result all the same"
+    report, seen = fabricate(drive())[2], {"scanned": True, "gps_time": 413_200.0}
+    reason = "T40 lies 0.50 m from where the observation says."
+    rows = [
+        TargetRow.unobserved(name, 1, role, np.zeros(3), reason, **seen)
+        for name, role in (("T40", "control"), ("C40", "check"))
+    ]
+    report = replace(report, targets=[*report.targets, *rows])
+    said = {row.what: row for row in statements(report)}
+    assert said["Control points"].sentence == "6 of 7 surveyed points used, 1 refused (T40)."
+    assert said["Control points"].items == (("T40", reason),)
+    words = "1 check point was found, but refused, as place, kind or size does not fit (C40)"
+    assert words in said["Check points"].sentence and said["Check points"].rating == "red"
+    assert "not seen" not in headline(report)
+    assert report.document()["check"]["n_unseen"] == 1
+
+
 def test_an_extrapolated_part_is_told_with_its_length_and_the_error_to_expect():
     "Seconds, metres, share of the points, and the largest sigma"
     weak = WeakStretch(0.0, 20.0, 100.0, 0.4, "a"), WeakStretch(50.0, 61.5, 60.0, 1.25, "b")
