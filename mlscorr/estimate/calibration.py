@@ -10,11 +10,10 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate.equations import Equations
-from mlscorr.estimate.guards import Guards, global_test_warnings
+from mlscorr.estimate.guards import Guards, few_targets, global_test_warnings
 from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS, MountingEstimate
 from mlscorr.estimate.posterior import Posterior
 from mlscorr.estimate.screening import Outlier, Screening
-from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.tied import TieResiduals
 from mlscorr.survey import Mounting, Trajectory
@@ -247,11 +246,7 @@ def _few_control(equations):
             "No control point takes part: the mounting is that which makes the passes agree, and "
             "where they are is what the POS says."
         )
-    elif number < SETTINGS.smallest_targets:
-        yield (
-            f"Only {number} control {'point takes' if number == 1 else 'points take'} part, which "
-            "nothing but ties can test."
-        )
+    yield from few_targets(number)
 
 
 def _warnings(estimate, determined):

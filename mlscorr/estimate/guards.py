@@ -182,11 +182,28 @@ def sparse_warnings(equations: Equations, order: int, fitted_order: int) -> Iter
             f"{'is' if targets == 1 else 'are'} too few for a trend of order {order}, which needs "
             f"{order + 2}: order {fitted_order} is used."
         )
+    yield from few_targets(targets)
     if epochs == 1 and targets > 1:
         yield (
             f"All {targets} control points were seen within {np.ptp(equations.observed):.1f} s at "
             f"{equations.observed.min():.1f} s: the correction is known there, and elsewhere it is "
             "the same shift with growing sigmas."
+        )
+
+
+def few_targets(targets: int) -> Iterator[str]:
+    """A sentence where a wrong control point could not be found.
+
+    Parameters
+    ----------
+    targets : int
+        Control points that take part.
+    """
+    if 0 < targets < SETTINGS.smallest_targets:
+        yield (
+            f"Only {targets} control {'point takes' if targets == 1 else 'points take'} part: a "
+            "wrong one can't be found, and how fast the POS drifts is what it states itself. "
+            f"Survey at least {SETTINGS.smallest_targets}."
         )
 
 

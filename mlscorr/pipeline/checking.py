@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.estimate import few_targets
 from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.io.conversion import read_in_part
 from mlscorr.io.las import spread_records
@@ -18,7 +19,7 @@ from mlscorr.io.preparation import glance
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline import needs
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
-from mlscorr.pipeline.near_points import check_control
+from mlscorr.pipeline.near_points import check_control, no_control
 from mlscorr.pipeline.quick_look import QuickLook, look_near_control
 from mlscorr.survey import Survey
 
@@ -93,7 +94,8 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
         faults.add("data", sentence)
     layouts = [read_layout(path) for path in survey.cloud_paths]
     passes, outside = _placed_times(survey)
-    faults.warn(*outside, *_crs_hints(survey, layouts), *_uncovered(survey, layouts))
+    uncovered, is_beside = _uncovered(survey, layouts)
+    faults.warn(*outside, *_crs_hints(survey, layouts), *uncovered)
     for layout in layouts:
         sentence, is_explained = far_cloud(
             layout.cloud.name, cloud_box(layout)[:, :2], survey.trajectory
@@ -104,7 +106,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
             faults.warn(sentence)
     sample = faults.of("data", needs.sample_clouds, survey)
     faults.warn(*(sample.warnings if sample else ()))
-    probe, notes, unchecked = _looked(survey, faults, needs_control)
+    probe, notes, unchecked = _looked(survey, faults, needs_control, is_beside)
     return CheckedSurvey(
         faults=tuple(faults.faults),
         warnings=tuple(faults.warnings),
@@ -157,30 +159,29 @@ def _placed_times(survey) -> tuple[int, list[str]]:
     return passes, outside
 
 
-def _uncovered(survey, layouts) -> Iterator[str]:
-    """A sentence on surveyed points outside the boxes of all files."""
-    if any(read_in_part(file.path) for file in survey.clouds):
-        return
+def _uncovered(survey, layouts) -> tuple[list[str], bool]:
+    """A sentence on surveyed points outside the boxes of all files; whether all control is."""
     place = survey.surveyed.position[:, :2]
-    covered = np.zeros(len(place), bool)
+    covered = np.full(len(place), any(read_in_part(file.path) for file in survey.clouds))
     for layout in layouts:
         low, high = cloud_box(layout)[:, :2]
         margin = survey.search_radius
         covered |= ((place >= low - margin) & (place <= high + margin)).all(axis=1)
-    if not covered.all():
-        names = [survey.surveyed.name[i] for i in np.flatnonzero(~covered)]
-        yield (
-            f"{len(names)} of the {len(place)} surveyed points lie more than "
-            f"{survey.search_radius:g} m outside the clouds by their headers (first: {names[0]})."
-        )
+    names = [survey.surveyed.name[i] for i in np.flatnonzero(~covered)]
+    sentence = (
+        f"{len(names)} of the {len(place)} surveyed points lie more than {survey.search_radius:g} "
+        f"m outside the clouds by their headers (first: {next(iter(names), None)})."
+    )
+    return [sentence] * bool(names), not covered[: len(survey.control)].any()
 
 
 def _looked(
-    survey: Survey, faults: Faults, needs_control: bool
+    survey: Survey, faults: Faults, needs_control: bool, is_beside: bool
 ) -> tuple[QuickLook | None, list[str], tuple[str, ...]]:
     """What a look at some targets shows, sentences on it, and on what was not looked at."""
     if needs_control:
         faults.of("data", check_control, survey)
+        faults.warn(*few_targets(len(survey.control)))
     if not len(survey.surveyed):
         return None, [], ("Targets in the cloud: the survey has no control.",)
     if parts := [file.path.name for file in survey.clouds if read_in_part(file.path)]:
@@ -193,9 +194,11 @@ def _looked(
         return None, [], reasons
     matched = probe.matched
     is_whole = len(probe.points) == len(survey.surveyed)
-    is_none = is_whole and not len(matched) and needs_control
-    if probe.fault or (probe.doubt and is_none):
-        faults.add("data", probe.fault or probe.doubt)
+    is_found = not set(survey.control.name).isdisjoint(matched.name)
+    is_none = needs_control and len(survey.control) and not is_found and (is_whole or is_beside)
+    if probe.fault or is_none:
+        words = no_control(survey, len(matched)) if len(matched) else probe.doubt
+        faults.add("data", probe.fault or words)
     elif probe.doubt:
         faults.warn(probe.doubt)
     faults.warn(*problems.warnings, *datum_warnings(matched, survey.trajectory, survey.pos))

@@ -11,7 +11,7 @@ import numpy as np
 
 from mlscorr.io.las import read_chunks
 from mlscorr.matching import Matches, match
-from mlscorr.pipeline.near_points import NearPoints, check_control, nothing_found
+from mlscorr.pipeline.near_points import NearPoints, check_control, no_control, nothing_found
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Matched, PointCloud, Survey
 from mlscorr.targets import (
@@ -233,10 +233,7 @@ def find_control(
     finding = find_targets(survey, rng, progress, read)
     control, check = finding.matches.by_role(survey)
     if len(control) == 0:
-        raise ValueError(
-            f"None of the {len(survey.control)} control points was found in the cloud, only "
-            f"{len(check)} check points, which must not take part in the estimate."
-        )
+        raise ValueError(no_control(survey, len(check)))
     return control, check, finding
 
 

@@ -98,6 +98,21 @@ def check_control(survey: Survey) -> None:
         )
 
 
+def no_control(survey: Survey, observations: int) -> str:
+    """The sentence for clouds in which check points alone were found.
+
+    Parameters
+    ----------
+    survey : Survey
+    observations : int
+        Of them.
+    """
+    return (
+        f"None of the {counted(len(survey.control), 'control point')} was found in the cloud, only "
+        f"{counted(observations, 'check point')}, which must not take part in the estimate."
+    )
+
+
 def _other_heights(survey, radius):
     """A sentence where surveyed points lie farther above or below the drive than is searched."""
     place, path = survey.surveyed.position, survey.trajectory.position

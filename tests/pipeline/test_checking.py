@@ -20,12 +20,12 @@ NEAR = 1.5  # m from a surveyed point: what is left of the cloud
 
 @pytest.fixture(scope="module")
 def small(street, tmp_path_factory):
-    "The street with little more than three of its targets"
+    "The street with little more than four of its targets"
     folder = tmp_path_factory.mktemp("small") / "survey"
     shutil.copytree(street, folder, ignore=shutil.ignore_patterns("truth.*"))
     header, *rows = (folder / "control.csv").read_text().splitlines()
     checks = [row for row in rows if row.endswith(",check")]
-    rows = [row for row in rows if row not in checks][:2] + checks[:1]
+    rows = [row for row in rows if row not in checks][:3] + checks[:1]
     (folder / "control.csv").write_text("\n".join([header, *rows]) + "\n")
     cloud = laspy.read(folder / "pass-1.laz")
     control, check, _ = read_control(folder / "control.csv")
@@ -69,7 +69,7 @@ def test_a_good_survey_has_no_fault_and_is_counted(small):
     assert amounts["points"] == laspy.read(small / "pass-1.laz").header.point_count
     assert [amounts[name] for name in ("scanners", "passes", "control points", "check points")] == [
         *(1, 1),
-        *(2, 1),
+        *(3, 1),
     ]
     assert amounts["trajectory"] == pytest.approx(8.0)
     written = sum(amount.number for amount in checked.written)
@@ -101,8 +101,8 @@ def test_all_faults_are_named_at_once(survey):
 @pytest.mark.parametrize(
     ("column", "change", "words"),
     [
-        (3, lambda height: height + 15.3, r"3 of 3 .* 15\.[23]\d m below .* geoid undulation"),
-        (7, lambda size: size / 2, "0 are found as they stand, 3 with sizes doubled"),
+        (3, lambda height: height + 15.3, r"4 of 4 .* 15\.[23]\d m below .* geoid undulation"),
+        (7, lambda size: size / 2, "0 are found as they stand, 4 with sizes doubled"),
     ],
     ids=["heights", "radii"],
 )
@@ -124,6 +124,41 @@ def test_a_survey_without_control_points_has_a_fault(lines, survey):
     with pytest.raises(ValueError, match="gives no control points") as refused:
         mlscorr.correct(mlscorr.read_survey(survey))
     assert sentences(checked) == [str(refused.value)]
+
+
+@pytest.mark.parametrize(
+    ("number", "words"), [(1, "1 control point takes"), (2, "2 control points")]
+)
+def test_few_control_points_are_a_warning_as_in_a_correction(number, words, survey):
+    "One or two can't be tested: told beforehand in the sentence of the correction itself"
+    lines = (survey / "control.csv").read_text().splitlines(keepends=True)
+    (survey / "control.csv").write_text("".join([lines[0], *lines[1 : number + 1], lines[-1]]))
+    checked = mlscorr.check(survey)
+    (warning,) = checked.warnings
+    assert not checked.faults and warning.startswith(f"Only {words}")
+    with warnings.catch_warnings(record=True, action="always") as caught:
+        mlscorr.correct(mlscorr.read_survey(survey))
+    assert warning in [str(each.message) for each in caught]
+
+
+@pytest.mark.parametrize(
+    ("kept", "words"), [((), "No point of the cloud"), (("check",), "only 1 ")]
+)
+def test_control_outside_all_clouds_is_a_fault_as_in_a_correction(kept, words, survey):
+    "Nine control points down the street, more than are looked at, or beside one check point"
+    header, *rows = (survey / "control.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows for _ in range(3)]
+    for i, row in enumerate(cells):
+        if row[-1] not in kept:
+            row[0], row[1] = f"T{i}", f"{float(row[1]) + 300.0 + i:.3f}"
+    rows = dict.fromkeys(map(",".join, cells))
+    (survey / "control.csv").write_text("\n".join([header, *rows]) + "\n")
+    with warnings.catch_warnings(action="ignore"):
+        (fault,) = mlscorr.check(survey).faults
+    with pytest.raises(ValueError, match=words) as refused:
+        mlscorr.correct(mlscorr.read_survey(survey))
+    assert fault.where == "data" and words in fault.sentence
+    assert fault.sentence[:20] == str(refused.value)[:20]
 
 
 def test_a_small_difference_of_heights_is_a_warning_as_in_a_correction(survey):

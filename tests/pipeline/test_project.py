@@ -181,6 +181,13 @@ def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
     (fault,) = checked.faults
     assert "tile-2.laz" in fault.sentence and "cut off" in fault.sentence
     assert any("(first: far)" in sentence for sentence in checked.warnings)
+    (folder / "second" / "tile-2.laz").write_bytes((folder / "second" / "tile-1.laz").read_bytes())
+    header, *points = (folder / "control.csv").read_text().splitlines()
+    near = [point for point in points if point.endswith(",control")][:2]
+    (folder / "control.csv").write_text("\n".join([header, *near, ""]))
+    assert any(text.startswith("Only 2 control") for text in check_project(folder).warnings)
+    (folder / "control.csv").write_text("\n".join([header, points[-1], ""]))
+    assert any("(first: far)" in fault.sentence for fault in check_project(folder).faults)
 
 
 def test_a_project_of_one_drive_is_its_survey(project, tmp_path):

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from mlscorr.estimate import few_targets
 from mlscorr.io.preparation import glance
 from mlscorr.io.project_file import ProjectParts, read_project, read_project_file
 from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
@@ -93,11 +94,14 @@ def _check_control(project, checked, faults):
             faults.warn(NO_CONTROL.format(survey.name))
     near = {name for survey, _ in checked for name in survey.surveyed.name}
     names = [*project.control.name, *project.check.name]
+    held = near.intersection(project.control.name)
+    faults.warn(*few_targets(len(held)))
     if far := [name for name in names if name not in near]:
-        faults.warn(
+        sentence = (
             f"{len(far)} of the {len(names)} surveyed points of {project.path} lie near no cloud "
             f"by the headers (first: {far[0]})."
         )
+        faults.warn(sentence) if held else faults.add("data", sentence)
 
 
 def _all(what: str, checked: Sequence[tuple[Survey, CheckedSurvey]]) -> Iterable[str]:
