@@ -25,6 +25,7 @@ def write_survey_copy(
     mountings: Sequence[Mounting] = (),
     clouds: Sequence[Sequence[str]] = (),
     trajectory: str | None = None,
+    control: Sequence[str] = (),
 ) -> None:
     """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
 
@@ -42,6 +43,8 @@ def write_survey_copy(
         New files of each scanner, in the folder.
     trajectory : str, optional
         New trajectory.file of all sessions, in the folder.
+    control : sequence of str, optional
+        Names of the control points by which that one was corrected.
     """
     source = as_path(source)
     document = tomlkit.parse(read_bytes(source).decode(ENCODING))
@@ -60,7 +63,7 @@ def write_survey_copy(
             for number, name in enumerate(section.get("files", ())):  # keeps comments between
                 section["files"][number] = _moved(there, name, source.parent)
     if trajectory is not None:
-        _set_trajectory(document, trajectory)
+        _set_trajectory(document, trajectory, sorted(set(control)))
     for section, mounting in zip(scanners or [document], mountings, strict=bool(mountings)):
         _set_mounting(section["mounting"], mounting)
     Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
@@ -78,13 +81,15 @@ def _set_clouds(source, document, sessions, scanners, clouds):
             section["files"] = list(names)
 
 
-def _set_trajectory(document, name):
-    """One trajectory in our own columns."""
+def _set_trajectory(document, name, control):
+    """One trajectory in our own columns, with the control points by which it was corrected."""
     if _listed(document["trajectory"]):
         document["trajectory"] = tomlkit.table()
-    document["trajectory"]["file"] = name
     for key in set(document["trajectory"]) - {"file"}:  # its sigmas and columns are its own
         del document["trajectory"][key]
+    document["trajectory"]["file"] = name
+    if control:
+        document["trajectory"]["corrected_by"] = control
 
 
 def _listed(section):

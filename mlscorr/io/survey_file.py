@@ -136,6 +136,7 @@ class SurveyParts:
             layouts=tuple(layouts),
             inputs=self.inputs,
             scanners=() if is_one else scanners,
+            corrected_by=tuple(n for part in settings.trajectories for n in part.corrected_by),
         )
 
 

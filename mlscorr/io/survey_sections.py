@@ -83,6 +83,7 @@ class TrajectorySection(TomlSection):
     pitch: Literal["nose up", "nose down"] | None = None
     roll: Literal["right side down", "right side up"] | None = None
     axes: Literal["right-forward-up", "forward-left-up", "forward-right-down"] | None = None
+    corrected_by: list[str] = Field(default_factory=list)  # names of control points
 
 
 class SessionSection(TrajectorySection):

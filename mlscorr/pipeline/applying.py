@@ -234,6 +234,7 @@ class AppliedSurvey(Summary):
                 [] if mounting is None else [mounting],
                 [[written_name(file.path) for file in part.clouds] for part in parts],
                 trajectory,
+                survey.corrected_by,
             )
             effects = [effect.document() for effect in self.effects]
             content = document("applied", {"name": survey.name, "effects": effects, "files": files})

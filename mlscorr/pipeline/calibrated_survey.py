@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +30,74 @@ from mlscorr.survey.summary import Summary
 if TYPE_CHECKING:
     import pandas
 
+    from mlscorr.pipeline.calibration import CalibratedScanners
+
+
+def write_calibration(
+    self: CalibratedSurvey | CalibratedScanners,
+    out: str | Path,
+    with_drift: bool = False,
+    clouds: bool = False,
+    overwrite: bool = False,
+    progress: Callable | None = None,
+) -> dict:
+    """Write calibration.json, its page, and survey.toml with the calibrated mountings.
+
+    Parameters
+    ----------
+    out : path
+        The folder, which appears whole or not at all.
+    with_drift : bool
+        Write the POS error that was estimated along with the mounting as trajectory.csv.
+    clouds : bool
+        Write the clouds as the calibrated mounting (and trajectory) puts them; survey.toml
+        then names these.
+    overwrite : bool
+    progress : function, optional
+
+    Returns
+    -------
+    dict
+        The document of calibration.json.
+
+    Raises
+    ------
+    ValueError, OSError
+        As ``CorrectedSurvey.write`` does.
+    """
+    from mlscorr.report.calibration_page import calibration_page
+
+    survey, parts = self.survey, self.by_scanner
+    content = document("calibration", self.report(with_drift))
+    calibrations = {name: part.calibration for name, part in parts.items()}
+    files = [[written_name(file.path) for file in p.survey.clouds] for p in parts.values()]
+    with output_folder(out, survey.inputs, overwrite) as folder:
+        write_json(folder / "calibration.json", content)
+        calibration_page(content).write(folder / "calibration.html")
+        if with_drift:  # the one of all
+            drift = next(iter(calibrations.values())).drift
+            write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
+        if clouds:
+            done = (progress or silent)("Writing the cloud", survey.points)
+            moved = {
+                name: c.correction_with_drift if with_drift else c.correction()
+                for name, c in calibrations.items()
+            }
+            write_clouds(survey, folder, moved, done)
+        write_survey_copy(
+            survey.path,
+            folder / FILE_NAME,
+            out,
+            [calibration.lsc.mounting for calibration in calibrations.values()],
+            files if clouds else (),
+            "trajectory.csv" if clouds and with_drift else None,
+            [
+                *survey.corrected_by,
+                *(name for part in parts.values() for name in part.used.name),
+            ],
+        )
+    return content
+
 
 @dataclass(frozen=True, repr=False)
 class CalibratedSurvey(Summary):
@@ -52,6 +120,13 @@ class CalibratedSurvey(Summary):
     matched_check: Matched
     missing: list[TargetRow] = field(default_factory=list)
     warnings: tuple[str, ...] = ()
+
+    write = write_calibration
+
+    @property
+    def by_scanner(self) -> dict[str, CalibratedSurvey]:
+        """Itself alone, under no name."""
+        return {"": self}
 
     @property
     def components(self) -> list[dict]:
@@ -78,43 +153,6 @@ class CalibratedSurvey(Summary):
             doubt = "" if row["determined"] else "not determined by this site"
             rows.append((row["component"], *numbers, row["unit"], doubt))
         return [(f"{self.survey.name}: what the recorded mounting lacks",), *rows]
-
-    def write(
-        self,
-        out: str | Path,
-        with_drift: bool = False,
-        clouds: bool = False,
-        overwrite: bool = False,
-        progress: Callable | None = None,
-    ) -> dict:
-        """Write calibration.json, its page, and survey.toml with the calibrated mounting.
-
-        Parameters
-        ----------
-        out : path
-            The folder, which appears whole or not at all.
-        with_drift : bool
-            Write the POS error that was estimated along with the mounting as trajectory.csv.
-        clouds : bool
-            Write the clouds as the calibrated mounting (and trajectory) puts them; survey.toml
-            then names these.
-        overwrite : bool
-        progress : function, optional
-
-        Returns
-        -------
-        dict
-            The document of calibration.json.
-
-        Raises
-        ------
-        ValueError, OSError
-            As ``CorrectedSurvey.write`` does.
-        """
-        parts, content = {"": self}, self.report(with_drift)
-        return write_calibrated(
-            self.survey, parts, content, out, with_drift, clouds, overwrite, progress
-        )
 
     def report(self, with_drift: bool = False) -> dict[str, object]:
         """The content of calibration.json, of one scanner.
@@ -165,9 +203,14 @@ class CalibratedSurvey(Summary):
             "check": self._statistics("check", correction),
         }
 
+    @property
+    def used(self) -> Matched:
+        """The control points that took part."""
+        return self.matched_control[self.calibration.used]
+
     def _statistics(self, role, correction):
-        used = self.matched_control[self.calibration.used]
-        return score(self.matched_check if role == "check" else used, correction).document()
+        points = self.matched_check if role == "check" else self.used
+        return score(points, correction).document()
 
     def _rows(self, correction):
         """Rows of every surveyed point and pass."""
@@ -188,58 +231,6 @@ def estimate_section(correction: np.ndarray, sigma: np.ndarray) -> dict[str, obj
         "lever_arm": {name: value[:3].tolist() for name, value in values.items()},
         "boresight": {name: np.degrees(value[3:]).tolist() for name, value in values.items()},
     }
-
-
-def write_calibrated(
-    survey: Survey,
-    parts: Mapping[str, CalibratedSurvey],
-    content: dict[str, object],
-    out: str | Path,
-    with_drift: bool,
-    clouds: bool,
-    overwrite: bool,
-    progress: Callable | None,
-) -> dict:
-    """Write calibration.json, its page, and survey.toml with the mountings of all scanners.
-
-    Parameters
-    ----------
-    survey : Survey
-    parts : dict
-        CalibratedSurvey by the scanner's name.
-    content : dict
-        Of calibration.json.
-    out, with_drift, clouds, overwrite, progress
-        As of ``CalibratedSurvey.write``.
-    """
-    from mlscorr.report.calibration_page import calibration_page
-
-    content = document("calibration", content)
-    calibrations = {name: part.calibration for name, part in parts.items()}
-    with output_folder(out, survey.inputs, overwrite) as folder:
-        write_json(folder / "calibration.json", content)
-        calibration_page(content).write(folder / "calibration.html")
-        if with_drift:  # the one of all
-            drift = next(iter(calibrations.values())).drift
-            write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
-        if clouds:
-            done = (progress or silent)("Writing the cloud", survey.points)
-            moved = {
-                name: c.correction_with_drift if with_drift else c.correction()
-                for name, c in calibrations.items()
-            }
-            write_clouds(survey, folder, moved, done)
-        write_survey_copy(
-            survey.path,
-            folder / FILE_NAME,
-            out,
-            [calibration.lsc.mounting for calibration in calibrations.values()],
-            [[written_name(file.path) for file in part.survey.clouds] for part in parts.values()]
-            if clouds
-            else (),
-            "trajectory.csv" if clouds and with_drift else None,
-        )
-    return content
 
 
 def _mounting(mounting):

@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -16,11 +15,8 @@ from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.evaluate.ties import misfit_section
 from mlscorr.io.las import sample_gps_times
 from mlscorr.matching import Refusal
-from mlscorr.pipeline.calibrated_survey import (
-    CalibratedSurvey,
-    estimate_section,
-    write_calibrated,
-)
+from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, estimate_section, write_calibration
+from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
 from mlscorr.survey import Survey, check_survey
@@ -116,7 +112,7 @@ def _parts(survey, control, check, finding, calibration):
         scanned = finding.scanned.difference(others)
         missing = unseen_rows(part, refusals, finding.candidates, scanned)
         view = calibration.of(number, control.scanner)
-        sentences = view.own_warnings if name else view.warnings
+        sentences = *(view.own_warnings if name else view.warnings), *reuse_warnings(survey)
         parts[name] = CalibratedSurvey(part, view, *matched, missing, sentences)
     return parts
 
@@ -138,35 +134,7 @@ class CalibratedScanners(Summary):
     calibration: Calibration
     by_scanner: dict[str, CalibratedSurvey]
 
-    def write(
-        self,
-        out: str | Path,
-        with_drift: bool = False,
-        clouds: bool = False,
-        overwrite: bool = False,
-        progress: Callable | None = None,
-    ) -> dict:
-        """Write calibration.json, and survey.toml with all calibrated mountings, into a folder.
-
-        Parameters
-        ----------
-        out, with_drift, clouds, overwrite, progress
-            As of ``CalibratedSurvey.write``.
-
-        Returns
-        -------
-        dict
-            The document of calibration.json.
-
-        Raises
-        ------
-        ValueError, OSError
-            As ``CalibratedSurvey.write`` does.
-        """
-        parts, content = self.by_scanner, self.report(with_drift)
-        return write_calibrated(
-            self.survey, parts, content, out, with_drift, clouds, overwrite, progress
-        )
+    write = write_calibration
 
     def report(self, with_drift: bool = False) -> dict[str, object]:
         """The content of calibration.json: by scanner what it is of one, and what all share.

@@ -19,7 +19,7 @@ from mlscorr.io.preparation import glance
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline import needs
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
-from mlscorr.pipeline.near_points import check_control, no_control
+from mlscorr.pipeline.near_points import check_control, no_control, reuse_warnings
 from mlscorr.pipeline.quick_look import QuickLook, look_near_control
 from mlscorr.survey import Survey
 
@@ -182,6 +182,7 @@ def _looked(
     if needs_control:
         faults.of("data", check_control, survey)
         faults.warn(*few_targets(len(survey.control)))
+    faults.warn(*reuse_warnings(survey))
     if not len(survey.surveyed):
         return None, [], ("Targets in the cloud: the survey has no control.",)
     if parts := [file.path.name for file in survey.clouds if read_in_part(file.path)]:

@@ -15,6 +15,7 @@ from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.pipeline.compared_survey import ComparedSurvey
 from mlscorr.pipeline.finding import find_control, silent
 from mlscorr.pipeline.methods import METHODS, load_open3d
+from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, check_survey
 
@@ -57,6 +58,8 @@ def compare(
     """
     check_survey(survey)
     control, check, finding = find_control(survey, rng, progress)
+    for sentence in reuse_warnings(survey):
+        warnings.warn(sentence, stacklevel=2)
     candidates = finding.candidates
     load_open3d()  # takes seconds, which are not the method's
     is_few = len(set(check.name)) < SETTINGS.check_points

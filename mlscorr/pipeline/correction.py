@@ -13,6 +13,7 @@ from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.finding import Finding
+from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.pipeline.tying import TieUse, estimate_survey
 from mlscorr.survey import Matched, Survey, check_survey
 
@@ -98,5 +99,5 @@ def corrected_fields(
             survey, finding.matches.refusals, finding.candidates, finding.scanned
         ),
         "fitted": finding.fitted,
-        "warnings": (*finding.warnings, *datum),
+        "warnings": (*finding.warnings, *datum, *reuse_warnings(survey)),
     }

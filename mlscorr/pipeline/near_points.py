@@ -1,8 +1,9 @@
-"""What lies near surveyed points, and sentences where no control is given or none found there."""
+"""What lies near surveyed points; sentences where control is lacking, not found, or used before."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -95,6 +96,24 @@ def check_control(survey: Survey) -> None:
         raise ValueError(
             f"{survey.path} names {counted(len(survey.check), 'check point')} and no control "
             "point: check points never enter an estimate. Give some of them the role control."
+        )
+
+
+def reuse_warnings(survey: Survey) -> Iterator[str]:
+    """A sentence on control points by which the trajectory was corrected before.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    names = [name for name in survey.control.name if name in survey.corrected_by]
+    if names:
+        yield (
+            f"{len(names)} of {len(survey.control)} control points (first: {names[0]}) have "
+            f"corrected the trajectory of {survey.path} before (calibrate --with-drift), and count "
+            "twice: sigmas, and what remains at points left out in turn, are too small. Check "
+            "points alone can judge the result. Give calibrate --clouds without --with-drift and "
+            "correct that survey, or other control points."
         )
 
 

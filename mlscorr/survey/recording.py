@@ -87,6 +87,8 @@ class Survey(Summary):
     scanners : tuple of MountedScanner
         Where there are several; each cloud file is of one of them, and a file with the points of
         several is among the clouds once for each.
+    corrected_by : tuple of str
+        Names of the control points by which the trajectory, and the clouds, were corrected before.
     """
 
     name: str
@@ -106,6 +108,7 @@ class Survey(Summary):
     layouts: tuple[str, ...] = ()
     inputs: tuple[InputFile, ...] = ()
     scanners: tuple[MountedScanner, ...] = ()
+    corrected_by: tuple[str, ...] = ()
 
     @cached_property
     def surveyed(self) -> ControlPoints:

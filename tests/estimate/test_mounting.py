@@ -13,6 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mlscorr
+from mlscorr.effects import make_effect
 from mlscorr.estimate import estimate_mounting
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.evaluate.scores import misclosures
@@ -26,6 +27,7 @@ from mlscorr.frames import (
 from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.io.survey_file import read_survey_file
 from mlscorr.pipeline.calibration import warn_of_scanners
+from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import Matched, Mounting, Trajectory
 from tests.beds.discs import observed_discs, surveyed_discs
@@ -417,6 +419,23 @@ def test_the_survey_it_writes_can_be_calibrated_again(street, commanded):
     with warnings.catch_warnings(action="ignore"):
         again = mlscorr.calibrate(new, ties=False).calibration
     assert (np.abs(again.lsc.correction) < 1.5 * again.lsc.sigma).all()
+
+
+def test_control_that_corrected_the_trajectory_does_not_count_again_in_silence(commanded, tmp_path):
+    "A correction and a check say how many points count twice; of other points nobody complains"
+    survey = mlscorr.read_survey(commanded[1])
+    used = json.loads((commanded[1] / "calibration.json").read_text())["lsc"]["control"]["n"]
+    assert set(survey.corrected_by) == set(survey.control.name) and used
+    words = f"{len(survey.control)} of {len(survey.control)} control points"
+    with pytest.warns(UserWarning, match=f"{words} .*count twice.*--with-drift"):
+        result = mlscorr.correct(survey)
+    report = result.write(tmp_path / "out", page=False)
+    assert any("count twice" in sentence for sentence in report["model"]["warnings"])
+    assert any("count twice" in sentence for sentence in mlscorr.check(survey.path).warnings)
+    mlscorr.apply(survey, [make_effect("time_offset", magnitude=1e-3)]).write(tmp_path / "applied")
+    assert mlscorr.read_survey(tmp_path / "applied").corrected_by == survey.corrected_by
+    others = replace(survey.control, name=tuple(f"new {name}" for name in survey.control.name))
+    assert not list(reuse_warnings(replace(survey, control=others)))
 
 
 def test_check_points_take_no_part(street, commanded, tmp_path):
