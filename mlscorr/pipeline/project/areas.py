@@ -93,9 +93,9 @@ def places_each_second(drives: Sequence[FoundDrive]) -> np.ndarray:
     ----------
     drives : sequence of FoundDrive
     """
-    seen = [drive.features for drive in drives]
-    first = [np.unique(np.floor(part.gps_time), return_index=True)[1] for part in seen]
-    return np.vstack([part.centre[rows] for part, rows in zip(seen, first, strict=True)])
+    features = [drive.features for drive in drives]
+    first = [np.unique(np.floor(part.gps_time), return_index=True)[1] for part in features]
+    return np.vstack([part.centre[rows] for part, rows in zip(features, first, strict=True)])
 
 
 def areas_of(places: np.ndarray, limit: int, margin: float) -> list[Area]:
