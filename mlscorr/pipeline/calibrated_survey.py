@@ -30,77 +30,94 @@ from mlscorr.survey.summary import Summary
 if TYPE_CHECKING:
     import pandas
 
-    from mlscorr.pipeline.calibration import CalibratedScanners
 
-
-def write_calibration(
-    self: CalibratedSurvey | CalibratedScanners,
-    out: str | Path,
-    with_drift: bool = False,
-    clouds: bool = False,
-    overwrite: bool = False,
-    progress: Callable | None = None,
-) -> dict:
-    """Write calibration.json, its page, and survey.toml with the calibrated mountings.
+class WritableCalibration(Summary):
+    """What is written of a calibration, of one scanner or of those calibrated together.
 
     Parameters
     ----------
-    out : path
-        The folder, which appears whole or not at all.
-    with_drift : bool
-        Write the POS error that was estimated along with the mounting as trajectory.csv.
-    clouds : bool
-        Write the clouds as the calibrated mounting (and trajectory) puts them; survey.toml
-        then names these.
-    overwrite : bool
-    progress : function, optional
-
-    Returns
-    -------
-    dict
-        The document of calibration.json.
-
-    Raises
-    ------
-    ValueError, OSError
-        As ``CorrectedSurvey.write`` does.
+    survey : Survey
     """
-    from mlscorr.report.calibration_page import calibration_page
 
-    survey, parts = self.survey, self.by_scanner
-    content = document("calibration", self.report(with_drift))
-    calibrations = {name: part.calibration for name, part in parts.items()}
-    files = [[written_name(file.path) for file in p.survey.clouds] for p in parts.values()]
-    with output_folder(out, survey.inputs, overwrite) as folder:
-        write_json(folder / "calibration.json", content)
-        calibration_page(content).write(folder / "calibration.html")
-        if with_drift:  # the one of all
-            drift = next(iter(calibrations.values())).drift
-            write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
-        if clouds:
-            done = (progress or silent)("Writing the cloud", survey.points)
-            moved = {
-                name: c.correction_with_drift if with_drift else c.correction()
-                for name, c in calibrations.items()
-            }
-            write_clouds(survey, folder, moved, done)
-        write_survey_copy(
-            survey.path,
-            folder / FILE_NAME,
-            out,
-            [calibration.lsc.mounting for calibration in calibrations.values()],
-            files if clouds else (),
-            "trajectory.csv" if clouds and with_drift else None,
-            [
-                *survey.corrected_by,
-                *(name for part in parts.values() for name in part.used.name),
-            ],
-        )
-    return content
+    survey: Survey
+
+    @property
+    def parts(self) -> dict[str, CalibratedSurvey]:
+        """The calibration of each scanner by its name."""
+        raise NotImplementedError
+
+    def report(self, with_drift: bool = False) -> dict[str, object]:
+        """The content of calibration.json."""
+        raise NotImplementedError
+
+    def write(
+        self,
+        out: str | Path,
+        with_drift: bool = False,
+        clouds: bool = False,
+        overwrite: bool = False,
+        progress: Callable | None = None,
+    ) -> dict:
+        """Write calibration.json, its page, and survey.toml with the calibrated mountings.
+
+        Parameters
+        ----------
+        out : path
+            The folder, which appears whole or not at all.
+        with_drift : bool
+            Write the POS error that was estimated along with the mounting as trajectory.csv.
+        clouds : bool
+            Write the clouds as the calibrated mounting (and trajectory) puts them; survey.toml
+            then names these.
+        overwrite : bool
+        progress : function, optional
+
+        Returns
+        -------
+        dict
+            The document of calibration.json.
+
+        Raises
+        ------
+        ValueError, OSError
+            As ``CorrectedSurvey.write`` does.
+        """
+        from mlscorr.report.calibration_page import calibration_page
+
+        survey, parts = self.survey, self.parts
+        content = document("calibration", self.report(with_drift))
+        calibrations = {name: part.calibration for name, part in parts.items()}
+        files = [[written_name(file.path) for file in p.survey.clouds] for p in parts.values()]
+        with output_folder(out, survey.inputs, overwrite) as folder:
+            write_json(folder / "calibration.json", content)
+            calibration_page(content).write(folder / "calibration.html")
+            if with_drift:  # the one of all
+                drift = next(iter(calibrations.values())).drift
+                write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
+            if clouds:
+                done = (progress or silent)("Writing the cloud", survey.points)
+                moved = {
+                    name: c.correction_with_drift if with_drift else c.correction()
+                    for name, c in calibrations.items()
+                }
+                write_clouds(survey, folder, moved, done)
+            write_survey_copy(
+                survey.path,
+                folder / FILE_NAME,
+                out,
+                [calibration.lsc.mounting for calibration in calibrations.values()],
+                files if clouds else (),
+                "trajectory.csv" if clouds and with_drift else None,
+                [
+                    *survey.corrected_by,
+                    *(name for part in parts.values() for name in part.used.name),
+                ],
+            )
+        return content
 
 
 @dataclass(frozen=True, repr=False)
-class CalibratedSurvey(Summary):
+class CalibratedSurvey(WritableCalibration):
     """A calibrated survey: the calibration, the targets, and ``write``.
 
     Parameters
@@ -121,10 +138,8 @@ class CalibratedSurvey(Summary):
     missing: list[TargetRow] = field(default_factory=list)
     warnings: tuple[str, ...] = ()
 
-    write = write_calibration
-
     @property
-    def by_scanner(self) -> dict[str, CalibratedSurvey]:
+    def parts(self) -> dict[str, CalibratedSurvey]:
         """Itself alone, under no name."""
         return {"": self}
 

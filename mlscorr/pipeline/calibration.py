@@ -15,12 +15,15 @@ from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.evaluate.ties import misfit_section
 from mlscorr.io.las import sample_gps_times
 from mlscorr.matching import Refusal
-from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, estimate_section, write_calibration
+from mlscorr.pipeline.calibrated_survey import (
+    CalibratedSurvey,
+    WritableCalibration,
+    estimate_section,
+)
 from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
 from mlscorr.survey import Survey, check_survey
-from mlscorr.survey.summary import Summary
 
 
 def calibrate(
@@ -118,7 +121,7 @@ def _parts(survey, control, check, finding, calibration):
 
 
 @dataclass(frozen=True, repr=False)
-class CalibratedScanners(Summary):
+class CalibratedScanners(WritableCalibration):
     """A survey whose scanners were calibrated together, and ``write``.
 
     Parameters
@@ -134,7 +137,10 @@ class CalibratedScanners(Summary):
     calibration: Calibration
     by_scanner: dict[str, CalibratedSurvey]
 
-    write = write_calibration
+    @property
+    def parts(self) -> dict[str, CalibratedSurvey]:
+        """Those of ``by_scanner``."""
+        return self.by_scanner
 
     def report(self, with_drift: bool = False) -> dict[str, object]:
         """The content of calibration.json: by scanner what it is of one, and what all share.
