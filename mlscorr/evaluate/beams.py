@@ -1,7 +1,5 @@
 """Beams that no scanner on this vehicle measured: points of another survey, times that run back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Control in another datum or scale: the cloud would follow it by more than the POS allows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

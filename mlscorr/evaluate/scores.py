@@ -1,7 +1,5 @@
 """What remains at surveyed points before and after a correction, and what it tells of it."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rows of every surveyed point and pass, as report.json has them."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterable, Sequence
 
 import numpy as np

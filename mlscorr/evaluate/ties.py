@@ -1,7 +1,5 @@
 """The sections of report.json and calibration.json on what two passes both saw."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mlscorr.estimate import Estimate, TieResiduals, tie_value

@@ -1,7 +1,5 @@
 """How far observed things lie from where they belong, beside what the accuracies state."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The LAZ stands in a folder for temporary files (which TMPDIR names), and goes wh
 What is corrected is written as LAZ.
 """
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The octree of a COPC file, as its hierarchy states it (COPC 1.0, copc.io)."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator, Sequence
 from typing import BinaryIO

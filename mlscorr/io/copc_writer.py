@@ -1,7 +1,5 @@
 """Writing points as a COPC file: LAZ in chunks, each a node of an octree (COPC 1.0, copc.io)."""
 
-from __future__ import annotations
-
 import io
 import struct
 from collections.abc import Iterator

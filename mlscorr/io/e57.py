@@ -5,8 +5,6 @@ seconds of the GPS week all the same. They count from the start where they fit b
 acquisitionEnd, or into a day where none is given.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from functools import cached_property, partial

@@ -1,7 +1,5 @@
 """New LAS and LAZ files whose head and tail are those of another one."""
 
-from __future__ import annotations
-
 import io
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Decoders of LAS points beside those of lazrs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, BinaryIO

@@ -7,8 +7,6 @@ these are taken one by one in an order in which each cube above closes as soon a
 that memory holds the points of one such cube and of the nodes above it.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Files open for reading: those of a store by ranges through fsspec, those of a disk as ever."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

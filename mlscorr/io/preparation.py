@@ -1,7 +1,5 @@
 """Clouds whose points must be put into another file before they are read: how many, where to."""
 
-from __future__ import annotations
-
 import atexit
 import shutil
 import tempfile

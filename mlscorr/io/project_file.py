@@ -1,7 +1,5 @@
 """project.toml: several drives, one control list, and what is believed of all of them."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path

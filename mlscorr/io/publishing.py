@@ -1,7 +1,5 @@
 """What is written into a folder of a disk or of a store: whole files or none, and a lock."""
 
-from __future__ import annotations
-
 import io
 import os
 import secrets

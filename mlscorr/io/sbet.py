@@ -15,8 +15,6 @@ over trial headings is least 0.13 deg (sigma 0.22 deg) from the heading read her
 wander angle the heading is 1.02 deg off (4 sigma), without the convergence 1.24 deg (6 sigma).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

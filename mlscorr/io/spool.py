@@ -1,7 +1,5 @@
 """Point records parted into groups on disk, where memory does not hold them."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path

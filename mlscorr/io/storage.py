@@ -5,8 +5,6 @@ imported before there is a URL. Settings of a store (endpoint, credentials) are 
 tools and of fsspec, in the environment, so that workers have them too.
 """
 
-from __future__ import annotations
-
 import glob
 import os
 import posixpath

@@ -1,7 +1,5 @@
 """Results of tasks as files, each named by the hash of what it was made of."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

@@ -6,8 +6,6 @@ files (which TMPDIR names). It stays until another file is put in order and nobo
 Memory holds a chunk, or the points of one second where these are more.
 """
 
-from __future__ import annotations
-
 import tempfile
 import weakref
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One trajectory of several files: sessions of the POS, joined in order of time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

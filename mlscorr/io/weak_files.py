@@ -1,7 +1,5 @@
 """The weak stretches of a correction as files that a GIS or a spreadsheet opens."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``check``: all that is wrong with a survey before it is corrected, and what that will take."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which control and CRS are meant in a folder: one is taken, two are named."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from pathlib import Path

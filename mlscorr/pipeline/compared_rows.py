@@ -1,7 +1,5 @@
 """What a survey observed, against what is believed or what a simulator made of it, as rows."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace

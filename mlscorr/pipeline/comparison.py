@@ -1,7 +1,5 @@
 """``compare``: every method on the same control and check points."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from time import perf_counter

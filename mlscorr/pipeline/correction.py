@@ -1,7 +1,5 @@
 """``correct``: from a survey to corrected clouds, trajectory and report."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from typing import Any

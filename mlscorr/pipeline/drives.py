@@ -1,7 +1,5 @@
 """Which clouds and which trajectory are meant in a folder: one is taken, two are named."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

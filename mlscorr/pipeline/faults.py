@@ -1,7 +1,5 @@
 """All that is wrong with the files of a survey at once, where reading them stops at the first."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What one cloud file holds of targets and ties, and the findings of several files as one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

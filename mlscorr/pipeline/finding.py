@@ -1,7 +1,5 @@
 """From cloud files to matched targets: read, fit, match."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """How many lines a scanner drew in a second, by the directions of its beams over time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mlscorr.pipeline.settings import SETTINGS

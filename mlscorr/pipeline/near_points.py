@@ -1,7 +1,5 @@
 """What lies near surveyed points; sentences where control is lacking, not found, or used before."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """What a correction will read and write, and the time and memory that it takes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter

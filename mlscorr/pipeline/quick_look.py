@@ -1,7 +1,5 @@
 """Some surveyed targets looked for where the vehicle passed them, before the clouds are read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter

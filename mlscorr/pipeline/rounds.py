@@ -1,7 +1,5 @@
 """``diagnose --until-none``: effect after effect into the simulator, until nothing is left."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path

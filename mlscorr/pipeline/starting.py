@@ -1,7 +1,5 @@
 """``init``: a survey.toml of what lies in a folder; what is ambiguous is named, never guessed."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections import Counter

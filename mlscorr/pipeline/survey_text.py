@@ -1,7 +1,5 @@
 """The text of a survey.toml: what is known with why, what is not known as comments."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Ties for a calibration: paired while mountings may be wrong by degrees, and paired again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

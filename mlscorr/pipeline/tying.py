@@ -1,7 +1,5 @@
 """Ties for a correction: paired, corrected, and paired again as the passes come together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, get_args

@@ -1,7 +1,5 @@
 """When the drift of a trajectory starts anew, and when it is said to grow."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from weakref import WeakValueDictionary
 

@@ -1,7 +1,5 @@
 """Steps of the recorded position that no vehicle drives."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

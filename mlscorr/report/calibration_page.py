@@ -1,7 +1,5 @@
 """The page of a calibration, and what it says first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a comparison of methods says first: in the terminal, in compare.json and on its page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

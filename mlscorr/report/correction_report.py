@@ -1,7 +1,5 @@
 """The report of a correction: what report.json holds, and pages and figures show."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a correction says first, wherever it is read: terminal, report.json and page."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

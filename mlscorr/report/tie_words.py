@@ -1,7 +1,5 @@
 """What ties between passes did, in sentences for a reader who never heard of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mlscorr.report.tables import length_in_words, percent, thousands

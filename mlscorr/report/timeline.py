@@ -1,7 +1,5 @@
 """The correction over time: position with the misclosures it rests on, and attitude."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D

@@ -5,8 +5,6 @@ No library knows them. Pairs of direction and covariate are split by a hash: wha
 anything takes one half, what grades a diagnosis takes the other, and no pair is in both.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 from collections.abc import Callable, Iterable

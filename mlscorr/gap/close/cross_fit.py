@@ -4,8 +4,6 @@ Innovations are independent of each other under V, drift and all: what is found 
 says nothing of the noise of the others.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of bins with honest sigmas: what lies in one block of the ground goes together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

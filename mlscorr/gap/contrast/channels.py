@@ -1,7 +1,5 @@
 """Channels of a real cloud beside those of a simulated one, by range, incidence and reflectance."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Each stands beside what it is between two halves of one simulation: zero looks l
 estimators of energy distance and MMD have no bias, so that they may be negative.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ both surfaces with one pulse, as long as its footprint lies on both: their numbe
 between pulses is the width of the edge.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

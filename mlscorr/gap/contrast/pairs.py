@@ -4,8 +4,6 @@ Range, slant and brightness of a cell are those of both together: whatever is ch
 chosen from both alike, so that twins differ by chance alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

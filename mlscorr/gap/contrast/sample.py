@@ -1,7 +1,5 @@
 """What is kept of a cloud while it is read, so that its channels can be compared."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce

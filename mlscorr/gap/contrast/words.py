@@ -1,7 +1,5 @@
 """What a channel's table says where real and simulated cloud differ, in plain sentences."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mlscorr.gap.contrast.blocks import with_sigma

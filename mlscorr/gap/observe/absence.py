@@ -1,7 +1,5 @@
 """Surveyed targets that should have been seen and were not: what they say is said by no row."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby

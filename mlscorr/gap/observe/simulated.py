@@ -5,8 +5,6 @@ beams that went elsewhere, as under another clock, is compared with the simulate
 place.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

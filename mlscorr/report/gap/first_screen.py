@@ -1,7 +1,5 @@
 """What a diagnosis says first, in terminal, gap.json and page: two answers, and what is open."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import groupby
 
