@@ -59,9 +59,6 @@ class _Ranges(io.RawIOBase):
     def seekable(self):
         return True
 
-    def tell(self):
-        return self._file.tell()
-
     def seek(self, offset, whence=io.SEEK_SET):
         return self._file.seek(offset, whence)
 

@@ -4,7 +4,7 @@ import atexit
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from functools import cache
 from typing import Any
@@ -16,17 +16,21 @@ _progress: ContextVar[Any] = ContextVar("progress", default=None)
 
 
 @contextmanager
-def glance() -> Iterator[None]:
-    """Take the first points of large files only, for what must be done in seconds."""
-    token = _limit.set(SETTINGS.glanced_points)
+def _holding(variable: ContextVar, value: Any) -> Iterator[None]:
+    """Give a variable a value until the block ends."""
+    token = variable.set(value)
     try:
         yield
     finally:
-        _limit.reset(token)
+        variable.reset(token)
 
 
-@contextmanager
-def announced(progress: Any) -> Iterator[None]:
+def glance() -> AbstractContextManager[None]:
+    """Take the first points of large files only, for what must be done in seconds."""
+    return _holding(_limit, SETTINGS.glanced_points)
+
+
+def announced(progress: Any) -> AbstractContextManager[None]:
     """Say how far conversions have come.
 
     Parameters
@@ -34,11 +38,7 @@ def announced(progress: Any) -> Iterator[None]:
     progress : function
         progress(title, total) gives a function of the number of points just done.
     """
-    token = _progress.set(progress)
-    try:
-        yield
-    finally:
-        _progress.reset(token)
+    return _holding(_progress, progress)
 
 
 def looked_points() -> int | None:
