@@ -198,18 +198,13 @@ class _Ruler:
         drawn = np.sqrt(rows.noise)[:, None] * rng.standard_normal((len(rows), replicas))
         values = np.column_stack([rows.residual, drawn])
         if self.kind == "scatter":
-            held = Predicted(nothing.shift, self._held(folds, "growth"), nothing.extra)
+            held = Predicted(nothing.shift, folds.held("growth"), nothing.extra)
             before = scatter_terms(rows, nothing, values)
             after = scatter_terms(rows, held, values[:, :1])
         else:
-            before, after = values, (rows.residual - self._held(folds, "shift"))[:, None]
+            before, after = values, (rows.residual - folds.held("shift"))[:, None]
         before, place = before[of_kind], np.flatnonzero(of_kind)
         return before[:, 0], after[of_kind, 0], before[:, 1:], place
-
-    def _held(self, folds, name):
-        """What each row's own fold predicts (m,)."""
-        each = np.array([getattr(predicted, name) for predicted in folds.predicted])
-        return each[folds.of_rows, np.arange(len(folds.fold))]
 
 
 def _jackknife(both, block, square):

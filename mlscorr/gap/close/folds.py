@@ -60,6 +60,11 @@ class Folds:
         """Which of `predicted` (m,) is compared with each row where one must be."""
         return np.clip(self.fold, 0, len(self.predicted) - 1)
 
+    def held(self, name: str) -> np.ndarray:
+        """A column (m,) of Predicted by its name, of each row as of its own fold."""
+        each = np.array([getattr(predicted, name) for predicted in self.predicted])
+        return each[self.of_rows, np.arange(len(self.fold))]
+
 
 @dataclass(frozen=True)
 class FoundCause:
@@ -213,7 +218,7 @@ def _trained(case, observations, model, used, rng):
     names, part = cause.effect.split("+"), case.rows.select(used)
     of_part = select([sign for sign in case.signatures if sign.name in names], used)
     anew = weigh_labels(part, background(part, survey), survey, of_part, rng, 0)
-    best = {name: _likeliest(evidence, name) for name in names}
+    best = {name: evidence.likeliest_noise(name) for name in names}
     noise = [each for each in anew.noise if _is_alike(each, best.get(each.label))]
     anew = replace(anew, noise=tuple(noise))
     if not set(names) <= anew.noisy:  # without these rows nothing shows it
@@ -233,11 +238,6 @@ def _with_factor(observations, model, residual):
 
     widest = np.log(max(INFERENCE.window_factors) / min(INFERENCE.window_factors))
     return windows(minimize_scalar(score, bounds=(-widest, widest), method="bounded").x)
-
-
-def _likeliest(evidence, name):
-    """The NoiseEvidence of a label that explains most."""
-    return max((e for e in evidence.noise if e.label == name), key=lambda each: each.gain[0])
 
 
 def _is_alike(noise, other):

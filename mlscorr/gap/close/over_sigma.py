@@ -54,8 +54,7 @@ def errors_over_sigma(
     """
     o, after = observations, folds.whole
     residual = rows.residual[:, None]
-    held = np.array([predicted.shift for predicted in folds.predicted])
-    shift = held[folds.of_rows, np.arange(len(rows))][:, None]
+    shift = folds.held("shift")[:, None]
     nothing = Predicted.nothing(rows)
     scaled = [
         o.columns(values) / _sigma(o, predicted)[:, None]

@@ -240,8 +240,7 @@ def cause_of(
 
 def _with_noise(cause, rows, signatures, evidence, name):
     """The cause with one noise class beside."""
-    classes = [each for each in evidence.noise if each.label == name]
-    best = max(classes, key=lambda each: each.gain[0])
+    best = evidence.likeliest_noise(name)
     if isinstance(best, WindowEvidence):
         more, model = window_parameters(best.windows), replace(cause.model, windows=best.windows)
         return replace(cause, parameters=cause.parameters + more, model=model)
