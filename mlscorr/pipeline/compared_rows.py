@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.effects import Effect
-from mlscorr.estimate import COMPONENTS
 from mlscorr.gap.close import Beams, BeamSimulator, Surroundings, collect_beams
 from mlscorr.gap.contrast import (
     Contrast,
@@ -35,7 +34,7 @@ from mlscorr.gap.observe import (
 from mlscorr.gap.signatures import expected, without_effects
 from mlscorr.io.simulated_clouds import simulated_survey
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_into
-from mlscorr.pipeline.planning import too_little
+from mlscorr.pipeline.planning import check_enough
 from mlscorr.survey import Survey, TargetObservations
 
 LINEAR = (
@@ -155,9 +154,7 @@ def compare_with_clouds(
         compared.append(rows)
         notes = (*notes, sentence)
     first, *following = without_unpaired(compared)
-    views = len(np.unique(first.item[first.metric]))
-    if views < len(COMPONENTS):  # of the pose: with fewer, nothing is said
-        raise ValueError(too_little(survey, first, views, library, notes))
+    check_enough(survey, first, library, notes)
     if not first.residual.any():
         raise ValueError(
             f"The clouds of {folders[0]} are the survey's own: none of {len(first)} differences is "
@@ -241,9 +238,7 @@ def _observed(
     absence = find_absence(believed, finding.matches)
     finding = _with_moved(finding, believed)
     pairing = build_rows(believed, finding.matches.matched, finding.candidates, patches)
-    views = len(np.unique(pairing.rows.item[pairing.rows.metric]))
-    if views < len(COMPONENTS):  # of the pose: with fewer, nothing is said
-        raise ValueError(too_little(survey, pairing.rows, views, library, notes))
+    check_enough(survey, pairing.rows, library, notes)
     pairing = replace(pairing, notes=(*notes, *pairing.notes))
     rows = Rows.concatenate([pairing.rows, pairing.check])
     beams = collect_beams(believed, rows, finding, patches, surroundings)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mlscorr.effects import Effect, known_effects
 from mlscorr.effects.labels import lowered, parameter_title, titles
-from mlscorr.estimate import PlannedAccuracy, predict_accuracy
+from mlscorr.estimate import COMPONENTS, PlannedAccuracy, predict_accuracy
 from mlscorr.gap.document import map_document, separability_document
 from mlscorr.gap.infer import Observations, Separability, compare_signatures
 from mlscorr.gap.observe import Rows, background
@@ -233,21 +233,27 @@ class PlannedSurvey(Summary):
         return content
 
 
-def too_little(
-    survey: Survey, rows: Rows, items: int, library: Iterable[type[Effect]], notes: tuple[str, ...]
-) -> str:
-    """The sentence for a survey that shows too little: what is missing, and the plan.
+def check_enough(
+    survey: Survey, rows: Rows, library: Iterable[type[Effect]], notes: tuple[str, ...]
+) -> None:
+    """Refuse a survey that shows too little: what is missing, and the plan.
 
     Parameters
     ----------
     survey : Survey
     rows : Rows
-    items : int
-        Things seen with a residual in m.
     library : iterable of Effect classes
     notes : tuple of str
         Sentences that come first.
+
+    Raises
+    ------
+    ValueError
+        Where fewer things have a residual in m than the pose has components.
     """
+    items = len(np.unique(rows.item[rows.metric]))
+    if items >= len(COMPONENTS):  # of the pose: with fewer, nothing is said
+        return
     sentence = (
         f"{survey.path} shows {items} things with a residual in m, and the POS's error alone has 6 "
         "unknowns: no cause can be told from it. Survey at least 12 targets along the way, better "
@@ -255,7 +261,7 @@ def too_little(
     )
     sentence = " ".join([*notes, sentence])
     if survey.mounting is None or items == 0:
-        return sentence
+        raise ValueError(sentence)
     signs, _ = signatures(rows, survey, library)
     compared = compare_signatures(Observations.of(rows, background(rows, survey)), signs)
     sizes = [
@@ -264,7 +270,7 @@ def too_little(
             compared.names, compared.units, compared.detectable, strict=True
         )
     ]
-    return (
+    raise ValueError(
         f"{sentence} As it is, the smallest effects that could be seen, were nothing else wrong, "
         f"are: {', '.join(sizes[:6])}. mlscorr plan tells the same of any survey before "
         "it is driven."

@@ -19,7 +19,7 @@ from mlscorr.survey import Survey
 from mlscorr.targets import SETTINGS as TARGETS
 
 
-def planned_rows(survey: Survey, rng: np.random.Generator | None = None) -> Rows:
+def planned_rows(survey: Survey) -> Rows:
     """Rows of targets, and of a reference surface where there is one, as they will be seen.
 
     Each is seen once a pass, when the scan plane sweeps over it near enough; the residuals are
@@ -29,8 +29,6 @@ def planned_rows(survey: Survey, rng: np.random.Generator | None = None) -> Rows
     ----------
     survey : Survey
         With a mounting, and a planned or recorded trajectory.
-    rng : numpy.random.Generator, optional
-        Chooses among the facets of the reference.
 
     Raises
     ------
@@ -47,16 +45,16 @@ def planned_rows(survey: Survey, rng: np.random.Generator | None = None) -> Rows
     if len(targets):
         parts.append(_targets(survey, targets))
     if survey.reference is not None:
-        parts.append(_facets(survey, np.random.default_rng(0) if rng is None else rng))
-    rows = Rows.concatenate([part for part in parts if len(part)]) if any(map(len, parts)) else None
-    if rows is None:
+        parts.append(_facets(survey, np.random.default_rng(0)))
+    parts = [part for part in parts if len(part)]
+    if not parts:
         raise ValueError(
             f"None of {len(targets)} targets will come within {SETTINGS.farthest:.0f} m before the "
             f"scanner on this trajectory, and {'the' if survey.reference else 'no'} [scene] "
             f"reference {'is out of its sight' if survey.reference else 'is given'}. Are "
             "control and trajectory in the same CRS?"
         )
-    return rows
+    return Rows.concatenate(parts)
 
 
 def _targets(survey, targets):
