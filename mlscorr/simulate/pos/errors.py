@@ -81,15 +81,13 @@ def given_error(trajectory: Trajectory, series: PosErrorSeries, rng: Generator) 
     begin = series.gps_time[0] + rng.uniform(0.0, spare)
     gps_time = np.minimum(begin + trajectory.gps_time - trajectory.gps_time[0], series.gps_time[-1])
     smallest = SETTINGS.smallest_position_sigma, SETTINGS.smallest_attitude_sigma
-    columns = (
-        series.position,
-        series.attitude,
-        *(
-            np.maximum(_local_rms(series.gps_time, values), floor)
-            for values, floor in zip((series.position, series.attitude), smallest, strict=True)
-        ),
-    )
-    return PosError(*(interpolate(gps_time, series.gps_time, column) for column in columns))
+    errors = series.position, series.attitude
+    sigmas = [
+        np.maximum(_local_rms(series.gps_time, values), floor)
+        for values, floor in zip(errors, smallest, strict=True)
+    ]
+    columns = (interpolate(gps_time, series.gps_time, values) for values in (*errors, *sigmas))
+    return PosError(*columns)
 
 
 def record(trajectory: Trajectory, error: PosError) -> Trajectory:

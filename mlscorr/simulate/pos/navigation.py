@@ -1,5 +1,6 @@
 """Free inertial navigation, its aid by GNSS and odometer, and what filter and smoother leave."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -150,23 +151,21 @@ def navigate(
         process, fix_scale = SETTINGS.mistuning ** belief_rng.uniform(-1.0, 1.0, 2)
         process *= SETTINGS.unmodelled
     noise = process**2 * imu.densities**2 * moved.step
-    measurements = _measurements(error[::every, POSITION], fixes, fix_scale, wheels)
-    measurements = {every * i: measurement for i, measurement in measurements.items()}
+    at_fixes = _measurements(error[::every, POSITION], fixes, fix_scale, wheels)
+    measurements = dict(zip(range(0, len(error), every), at_fixes, strict=True))
     filtered, predicted = kalman_filter(transition, noise, start_sigma(imu) ** 2, measurements)
     return Navigation(gps_time, attitude, error, transition, filtered, predicted, fix_time, fixes)
 
 
-def _measurements(position_error, fixes, fix_scale, wheels):
-    """What the filter gets at each epoch of GNSS: a dict of epoch -> list of Measurement."""
-    measurements = {}
+def _measurements(position_error, fixes, fix_scale, wheels) -> Iterator[list[Measurement]]:
+    """What the filter gets at each epoch of GNSS: a list of Measurement."""
     for i in range(len(position_error)):
         at_epoch = [] if wheels is None else [wheels[i]]
         if fixes.valid[i]:
             measured = position_error[i] - fixes.error[i]
             covariance = fix_scale**2 * fixes.covariance[i]
             at_epoch.append(Measurement(np.eye(3, STATES), measured, covariance))
-        measurements[i] = at_epoch
-    return measurements
+        yield at_epoch
 
 
 def filter_epochs(trajectory: Trajectory, gnss_rate: float) -> tuple[np.ndarray, int]:
