@@ -87,12 +87,9 @@ class AnsweredCase:
         if self.kind == "outside":
             return self.named == "unknown"
         if self.kind == "withheld":
-            return self.named == "unknown" or self._is_random or self.resemblance > SETTINGS.same
+            is_random = set(self.named.split("+")) <= set(RANDOM)
+            return self.named == "unknown" or is_random or self.resemblance > SETTINGS.same
         return self.names(self.named, by_class=True)
-
-    @property
-    def _is_random(self):
-        return set(self.named.split("+")) <= set(RANDOM)
 
     @property
     def leads(self) -> bool:

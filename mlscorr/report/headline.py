@@ -250,11 +250,10 @@ def _sigma(report) -> Iterator[Statement]:
             "corrected position."
         )
         stated = sigma.get("stated", np.inf)
-        if sigma["median"] <= stated:
-            yield Statement("Sigma", "green", sentence)
-        else:
+        is_larger = sigma["median"] > stated
+        if is_larger:
             sentence += f" The POS states {length_in_words(stated)} of the recorded one."
-            yield Statement("Sigma", "amber", sentence)
+        yield Statement("Sigma", "amber" if is_larger else "green", sentence)
 
 
 def warning_statements(warnings: Iterable[str]) -> Iterator[Statement]:
