@@ -1,19 +1,10 @@
 """What remains at surveyed points before and after a correction, and what it tells of it."""
 
-from typing import Protocol
-
 import numpy as np
 
 from mlscorr.evaluate.accuracy import positional_accuracy
 from mlscorr.evaluate.rows import Score, Statistics
-from mlscorr.survey import Matched, PointCloud
-
-
-class Correcting(Protocol):
-    """Anything that moves points is a correction, a baseline too."""
-
-    def apply(self, cloud: PointCloud) -> PointCloud:
-        """The PointCloud, corrected."""
+from mlscorr.survey import Correcting, Matched, PointCloud
 
 
 def misclosures(matched: Matched, correction: Correcting | None = None) -> np.ndarray:

@@ -6,9 +6,9 @@ import numpy as np
 
 from mlscorr.estimate import Outlier
 from mlscorr.evaluate.rows import CHECK_REASON, TargetRow
-from mlscorr.evaluate.scores import Correcting, misclosures
+from mlscorr.evaluate.scores import misclosures
 from mlscorr.matching import Refusal
-from mlscorr.survey import ControlPoints, Matched, Survey
+from mlscorr.survey import ControlPoints, Correcting, Matched, Survey
 from mlscorr.targets import Candidates, search_radius
 
 

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -21,14 +20,7 @@ from mlscorr.io.opening import open_file
 from mlscorr.io.output import PART, output_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import is_remote
-from mlscorr.survey import CloudFile, PointCloud
-
-
-class SupportsApply(Protocol):
-    """A correction, or any other method that moves points."""
-
-    def apply(self, cloud: PointCloud) -> PointCloud:
-        """The cloud with other coordinates."""
+from mlscorr.survey import CloudFile, Correcting, PointCloud
 
 
 @dataclass(frozen=True)
@@ -47,7 +39,7 @@ class CorrectedPart:
     """
 
     file: CloudFile
-    correction: SupportsApply
+    correction: Correcting
     sigma: PointSigma | None = None
     watch: Callable[[np.ndarray], object] | None = None
 

@@ -10,11 +10,10 @@ import numpy as np
 
 from mlscorr.correction import Correction, PointSigma
 from mlscorr.estimate import Support
-from mlscorr.evaluate.scores import Correcting
 from mlscorr.io.conversion import written_name
 from mlscorr.io.las import sha256
 from mlscorr.io.las_copy import CorrectedPart, write_parts
-from mlscorr.survey import Survey
+from mlscorr.survey import Correcting, Survey
 
 
 def write_clouds(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -24,6 +25,13 @@ class PointCloud(Columns):
     xyz: np.ndarray
     gps_time: np.ndarray
     intensity: np.ndarray
+
+
+class Correcting(Protocol):
+    """Anything that moves points is a correction, a baseline too."""
+
+    def apply(self, cloud: PointCloud) -> PointCloud:
+        """The PointCloud, corrected."""
 
 
 @dataclass(frozen=True)
