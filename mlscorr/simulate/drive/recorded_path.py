@@ -55,14 +55,7 @@ def _piece(poses, piece, start_time, start, pose_rate):
     return elapsed, position, attitude
 
 
-def smooth(
-    time: np.ndarray,
-    position: np.ndarray,
-    elapsed: np.ndarray,
-    share: float = 0.38,
-    height: float = 3.0,
-    rate: float = 20.0,
-) -> np.ndarray:
+def smooth(time: np.ndarray, position: np.ndarray, elapsed: np.ndarray) -> np.ndarray:
     """Positions (m, 3) at times (m,) by smoothing splines through positions (n, 3).
 
     Parameters
@@ -71,13 +64,10 @@ def smooth(
         Units: s.
     position : (n, 3) array
         Units: m.
-    share : float
-        Of the step between sparse positions: smooths 1 cm of a car's path at 1 Hz.
-    height : float
-        Times slower in height, in which roads change less and GNSS is worse.
-    rate : float
-        Beyond which positions tell nothing more of a vehicle's path. Units: Hz.
     """
+    share = 0.38  # of the step between sparse positions: smooths 1 cm of a car's path at 1 Hz
+    height = 3.0  # times slower in height, in which roads change less and GNSS is worse
+    rate = 20.0  # Hz, beyond which positions tell nothing more of a vehicle's path
     step = np.median(np.diff(time))
     stride = max(1, int(1.0 / (rate * step)))
     rows = np.unique(np.append(np.arange(0, len(time), stride), len(time) - 1))

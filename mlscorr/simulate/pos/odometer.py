@@ -35,12 +35,11 @@ class Odometer:
     direction: float = np.radians(0.1)
 
 
+SENSOR = Odometer()
+
+
 def odometer(
-    error: np.ndarray,
-    velocity: np.ndarray,
-    attitude: Rotation,
-    rng: Generator,
-    sensor: Odometer = Odometer(),
+    error: np.ndarray, velocity: np.ndarray, attitude: Rotation, rng: Generator
 ) -> list[Measurement]:
     """Measurements of the error state, one at each of n epochs: a list.
 
@@ -53,21 +52,20 @@ def odometer(
     attitude : Rotation
         n true rotations R_P^G.
     rng : Generator
-    sensor : Odometer
     """
-    direction = sensor.direction * rng.standard_normal(2)
-    wheel = 1 + sensor.wheel * rng.standard_normal()
+    direction = SENSOR.direction * rng.standard_normal(2)
+    wheel = 1 + SENSOR.wheel * rng.standard_normal()
     body = attitude.inv().apply(velocity)
     forward = body[:, 1]
     measured = np.column_stack([0 * forward, wheel * forward, 0 * forward])
     measured[:, [0, 2]] += forward[:, None] * direction
-    measured += sensor.noise * rng.standard_normal(measured.shape)
+    measured += SENSOR.noise * rng.standard_normal(measured.shape)
 
     # v_body = R^T v, so that its error is R^T (velocity error + v x attitude error).
     to_body = attitude.inv().as_matrix()
     design = np.zeros((len(forward), 3, STATES))
     design[:, :, VELOCITY] = to_body
     design[:, :, ATTITUDE] = to_body @ skew(velocity)
-    noise = sensor.noise**2 * np.eye(3)
+    noise = SENSOR.noise**2 * np.eye(3)
     misclosure = np.einsum("nij,nj->ni", design, error) + body - measured
     return [Measurement(*row, noise) for row in zip(design, misclosure, strict=True)]

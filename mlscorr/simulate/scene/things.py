@@ -47,9 +47,7 @@ def facade(
     height: float,
     inward: np.ndarray,
     reflectance: float,
-    ground: float = 3.2,
-    storey: float = 3.0,
-    bay: float = 2.6,
+    ground: float,
 ) -> Mesh:
     """Mesh of a house front with a plain ground floor and rows of recessed windows above.
 
@@ -65,9 +63,8 @@ def facade(
         Unit normal into the house.
     ground : float
         Height of the ground floor. Units: m.
-    storey, bay : float
-        Height and width of what holds a window. Units: m.
     """
+    storey, bay = 3.0, 2.6  # m: height and width of what holds a window
     rows = max(0, int((height - ground) // storey))
     if rows == 0:
         return quads(corner, along, height * UP, reflectance)
@@ -105,14 +102,7 @@ def _windows(cell, u, v, depth, reflectance, glass=0.1):
 
 
 def house(
-    near: np.ndarray,
-    far: np.ndarray,
-    inward: np.ndarray,
-    height: float,
-    reflectance: float,
-    depth: float = 8.0,
-    ridge: float = 2.5,
-    lowest: float = 5.0,
+    near: np.ndarray, far: np.ndarray, inward: np.ndarray, height: float, reflectance: float
 ) -> Mesh:
     """Mesh of a house, or of a plain wall where it is low.
 
@@ -131,17 +121,12 @@ def house(
     height : float
         Of the eaves above the lower corner. Units: m.
     reflectance : float
-    depth : float
-        Units: m.
-    ridge : float
-        Of the roof above the eaves. Units: m.
-    lowest : float
-        Height from which it is a house and no wall. Units: m.
     """
+    depth, ridge = 8.0, 2.5  # m: from front to back, and of the roof above the eaves
     base = np.array([near[0], near[1], min(near[2], far[2]) - 0.5])
     along = (far - near) * [1.0, 1.0, 0.0]
     height = height + 0.5
-    is_house = height - 0.5 >= lowest
+    is_house = height - 0.5 >= 5.0  # m; a lower one is a wall
     back = (depth if is_house else 0.3) * inward
     ends = quads(np.array([base, base + along]), back, height * UP, reflectance)
     if not is_house:
@@ -157,12 +142,7 @@ def house(
 
 
 def leaves(
-    centre: np.ndarray,
-    radii: np.ndarray,
-    forward: np.ndarray,
-    count: int,
-    rng: Generator,
-    edge: float = 0.2,
+    centre: np.ndarray, radii: np.ndarray, forward: np.ndarray, count: int, rng: Generator
 ) -> Mesh:
     """Mesh of leaves scattered in a crown, so that a beam returns from any depth of it.
 
@@ -175,9 +155,9 @@ def leaves(
     forward : (3,) array
         Horizontal unit vector.
     count : int
-    edge : float
-        Of a leaf: a bunch of real ones, so that hundreds fill a crown. Units: m.
+    rng : Generator
     """
+    edge = 0.2  # m, of a leaf: a bunch of real ones, so that hundreds fill a crown
     place = rng.standard_normal((count, 3))
     place *= rng.uniform(0.1, 1.0, (count, 1)) ** (1 / 3) / np.linalg.norm(
         place, axis=1, keepdims=True
@@ -191,14 +171,7 @@ def leaves(
     return Mesh(middle[:, None] + 0.58 * corners, reflectance)
 
 
-def tree(
-    foot: np.ndarray,
-    forward: np.ndarray,
-    crown: np.ndarray,
-    rng: Generator,
-    most_leaves: int = 1500,
-    bark: float = 0.25,
-) -> Mesh:
+def tree(foot: np.ndarray, forward: np.ndarray, crown: np.ndarray, rng: Generator) -> Mesh:
     """Mesh of a tree from its foot (3,): a trunk, and leaves above the height of a vehicle.
 
     crown (3,): half axes of the crown along the unit vector `forward`, across it, upright. m.
@@ -212,13 +185,11 @@ def tree(
     crown : (3,) array
         Half axes along forward, across it, upright. Units: m.
     rng : Generator
-    most_leaves : int
-    bark : float
-        Reflectance.
     """
+    bark = 0.25  # reflectance
     trunk = rng.uniform(2.9, 3.4)
     middle = foot + (trunk + crown[2]) * UP
-    count = int(min(most_leaves, rng.uniform(150.0, 320.0) * np.prod(crown)))
+    count = int(min(1500, rng.uniform(150.0, 320.0) * np.prod(crown)))
     return join(
         [
             post(foot - 0.3 * UP, trunk + 0.3 + crown[2], rng.uniform(0.18, 0.3), bark),
@@ -242,13 +213,7 @@ def lamp(foot: np.ndarray, towards: np.ndarray) -> Mesh:
     return join([post(foot - 0.3 * UP, 6.3, 0.14, 0.3), arm])
 
 
-def car(
-    place: np.ndarray,
-    forward: np.ndarray,
-    right: np.ndarray,
-    reflectance: float,
-    width: float = 1.7,
-) -> Mesh:
+def car(place: np.ndarray, forward: np.ndarray, right: np.ndarray, reflectance: float) -> Mesh:
     """Mesh of a parked car about the place (3,) on the ground under its middle.
 
     Parameters
@@ -258,9 +223,8 @@ def car(
     forward, right : (3,) array
         Unit vector.
     reflectance : float
-    width : float
-        Units: m.
     """
+    width = 1.7  # m
     ahead = np.array([-2.1, 2.1, 2.1, 1.15, 0.45, -1.1, -1.8, -2.1])[:, None]  # m from its middle
     above = np.array([0.25, 0.25, 0.65, 0.85, 1.4, 1.42, 0.95, 0.85])[:, None]  # m, of the ground
     outline = place + ahead * forward + above * UP
