@@ -33,11 +33,10 @@ TUM = ("gps_time", *AXES, *QUATERNION)
 INERTIAL_EXPLORER = ("hell", "hdngsd")  # names of columns that no other program writes
 HINTS = {
     ("easting", "x"): " Say under [trajectory.columns] in survey.toml which of X and Y is easting.",
-    (
-        "heading",
-        "yaw",
-    ): " Its yaw is a heading by convention only: say under [trajectory] in survey.toml how "
-    f'it counts, as heading = "counterclockwise from east" or "{GRID}".',
+    ("heading", "yaw"): (
+        " Its yaw is a heading by convention only: say under [trajectory] in survey.toml how "
+        f'it counts, as heading = "counterclockwise from east" or "{GRID}".'
+    ),
 }
 
 

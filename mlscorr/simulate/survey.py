@@ -10,17 +10,8 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.effects import Reference, apply_effects, effect_streams
+from mlscorr.simulate import recording
 from mlscorr.simulate.drive import drive
-from mlscorr.simulate.recording import (
-    disturb,
-    join_passes,
-    recorded_passes,
-    split_passes,
-    spread_checks,
-    streams_by_file,
-    surveyed_targets,
-    true_mounting,
-)
 from mlscorr.simulate.scan import MeasuredPulses, Platform, Surfaces, pulses_of_a_pass, shoot
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene import Mesh, Scene, build_scene, static_scan
@@ -92,12 +83,12 @@ class SimulatedSurvey(Summary):
     @cached_property
     def true_trajectory(self) -> Trajectory:
         """The true trajectory of all passes; between them are gaps."""
-        return join_passes(self.true_passes)
+        return recording.join_passes(self.true_passes)
 
     @cached_property
     def trajectory(self) -> Trajectory:
         """The recorded trajectory of all passes; between them are gaps."""
-        return join_passes(self.passes)
+        return recording.join_passes(self.passes)
 
     @property
     def mounting(self) -> Mounting:
@@ -149,7 +140,7 @@ class SimulatedSurvey(Summary):
             divergence,
             **size,
         ):
-            shots = disturb(undisturbed, self.effects, self.reference, streams)
+            shots = recording.disturb(undisturbed, self.effects, self.reference, streams)
             # what a wrong clock puts outside the trajectory, no one can georeference
             shots.kept[recorded.outside(shots.gps_time)] = False
             pulses = shots.pulses()
@@ -242,22 +233,24 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     def with_effects(stage, value):
         return apply_effects(effects, stage, value, reference, streams)
 
-    recorded = join_passes(recorded_passes(scenario, scene, true_passes, pos_rng))
-    mountings = tuple(true_mounting(scanner) for scanner in scenario.scanner)
-    targets = surveyed_targets(scene.targets, centre, scenario.targets, control_rng)
+    recorded = recording.join_passes(
+        recording.recorded_passes(scenario, scene, true_passes, pos_rng)
+    )
+    mountings = tuple(recording.true_mounting(scanner) for scanner in scenario.scanner)
+    targets = recording.surveyed_targets(scene.targets, centre, scenario.targets, control_rng)
     return SimulatedSurvey(
         scenario=scenario,
         scene=scene,
         true_passes=true_passes,
-        passes=split_passes(with_effects("pos", recorded), map(len, true_passes)),
+        passes=recording.split_passes(with_effects("pos", recorded), map(len, true_passes)),
         true_mountings=mountings,
         mountings=tuple(with_effects("mounting", mounting) for mounting in mountings),
         targets=with_effects("control", targets),
-        is_check=spread_checks(len(targets), scenario.targets),
+        is_check=recording.spread_checks(len(targets), scenario.targets),
         true_centre=centre,
         effects=effects,
         reference=reference,
-        streams=streams_by_file(len(true_passes), len(mountings), scan_rng, effect_rng),
+        streams=recording.streams_by_file(len(true_passes), len(mountings), scan_rng, effect_rng),
         beam_streams=streams,
         seed=seed if isinstance(seed, int) else None,
         static_scan=static_scan(scene, static_rng) if scenario.scene.reference else None,
