@@ -50,13 +50,6 @@ class Signature:
         return self.kind.name
 
     @property
-    def label(self) -> str:
-        """Name, and what is fixed: "position_bump, time 20, width 5"."""
-        fixed = self.fixed.items()
-        parts = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in fixed]
-        return ", ".join([self.name, *parts])
-
-    @property
     def is_noise(self) -> bool:
         """Whether it shows in the rows' variance."""
         return bool(self.variance.any() or self.growth.any())
