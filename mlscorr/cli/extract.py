@@ -17,11 +17,6 @@ def extract(
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.extract(recorded, progress=progress).write(out, overwrite)
     print_json(content, as_json)
-    _tell(content, out)
-
-
-def _tell(content, out):
-    """How many objects were found and matched, and where the results lie."""
     from mlscorr.survey.summary import counted
 
     targets = content["targets"]

@@ -17,11 +17,6 @@ def ties(
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.find_ties(recorded, progress=progress).write(out, overwrite)
     print_json(content, as_json)
-    _tell(content, out)
-
-
-def _tell(content, out):
-    """How many ties there are, how far apart passes lie, and where the results are."""
     features = content["features"]
     say(
         f"{content['ties']} ties between {features['plane']} planes, {features['pole']} poles, "

@@ -136,18 +136,15 @@ class ComparedSurvey(Summary):
         from mlscorr.report.comparison_page import write_comparison
 
         for name in clouds:
-            self._check_cloud(name)
+            why = self.row(method_named(name).name)["why"]
+            if why is not None:
+                raise ValueError(f"The method {name} has no cloud to write: {why}")
         content = self.document
         with output_folder(out, self.survey.inputs, overwrite) as folder:
             content["files"] = self._write_clouds(folder, clouds, progress or silent)
             write_json(folder / "compare.json", content)
             write_comparison(folder / "compare.html", content)
         return content
-
-    def _check_cloud(self, name):
-        why = self.row(method_named(name).name)["why"]
-        if why is not None:
-            raise ValueError(f"The method {name} has no cloud to write: {why}")
 
     def _write_clouds(self, folder, names, progress):
         """Rows on the files that were written."""
