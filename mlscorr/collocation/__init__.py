@@ -3,21 +3,18 @@
 - model: signals, noise, the least squares of the trend, and the result
 - markov: linear in observations and epochs, by recursion and interpolation between them
 - dense: the same by the formula written out, with work that grows as the observations cubed
+- slopes: how the likelihood by that formula changes with the signals
 - linked: of rows that see two epochs and more, and errors that any number of them share
 - whitening: V of scalar observations, factored once for thousands of columns
 - literal: the paper's own predictor, whose covariances don't fit each other
 """
 
-from mlscorr.collocation.dense import (
-    collocate_dense,
-    collocate_rows_dense,
-    covariance_given,
-    likelihood_changes,
-)
+from mlscorr.collocation.dense import collocate_dense, collocate_rows_dense, covariance_given
 from mlscorr.collocation.information import InformationSolver
 from mlscorr.collocation.linked import LeftOut, collocate_rows, leave_each_out, reweight
 from mlscorr.collocation.literal import LiteralCollocation, LiteralSignal, collocate_literal
 from mlscorr.collocation.markov import collocate
 from mlscorr.collocation.model import Collocation, Noise, Signal
+from mlscorr.collocation.slopes import likelihood_changes
 from mlscorr.collocation.sparse_rows import SparseRows
 from mlscorr.collocation.whitening import Whitened, Whitener, factor

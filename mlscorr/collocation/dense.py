@@ -7,7 +7,7 @@ is correlated in any manner, and the fastest for a few hundred rows of which eac
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -85,57 +85,6 @@ def collocate_rows_dense(rows: Sequence[SparseRows]) -> Collocation:
     return _collocate(rows, block_diag(*(part.noise.matrix for part in rows)))
 
 
-def likelihood_changes(
-    solved: Collocation, rows: Sequence[SparseRows], changed: Sequence[Sequence[SparseRows]]
-) -> np.ndarray:
-    r"""How the restricted log-likelihood (k,) changes with the signals, of first order in dV.
-
-    d log L = (w^T dV w - tr(P dV)) / 2 with w = V^-1 (l - A x) and P = V^-1 less the trend's part
-    (Rasmussen and Williams 2006, Eq. 5.9): one factor of V for any number of parameters.
-
-    Parameters
-    ----------
-    solved : Collocation
-        By ``collocate_rows_dense``.
-    rows : sequence of SparseRows
-        That it solved.
-    changed : sequence of k sequences of SparseRows
-        The same with signals that are a little different.
-    """
-    slope = np.outer(solved.weights, solved.weights)
-    slope -= solved.precision_of(np.arange(len(slope)))
-    slope = np.tril(slope) - np.diag(np.diag(slope) / 2)  # each of a pair counts a half
-    before: dict[tuple, np.ndarray] = {}
-    changes = []
-    for other in changed:
-        numbers = _differing(rows, other)
-        if numbers not in before:
-            before[numbers] = _of_signals(rows, numbers)
-        changes.append(np.vdot(slope, _of_signals(other, numbers) - before[numbers]))
-    return np.array(changes)
-
-
-def _differing(rows, others):
-    """Numbers of the signals that differ in other rows."""
-    same = [
-        [
-            here.covariance == there.covariance
-            and np.array_equal(here.mixing, there.mixing)
-            and np.array_equal(here.clock, there.clock)
-            for here, there in zip(part.signals, other.signals, strict=True)
-        ]
-        for part, other in zip(rows, others, strict=True)
-    ]
-    return tuple(np.flatnonzero(~np.all(same, axis=0)).tolist())
-
-
-def _of_signals(rows, numbers):
-    """The part (m, m) of some signals in V, by its lower triangle."""
-    parts = [replace(part, signals=[part.signals[k] for k in numbers]) for part in rows]
-    size = sum(part.misclosure.size for part in rows)
-    return _covariance(_all_sides(parts), np.zeros((size, size)))
-
-
 def covariance_given(
     observations: Sequence[SparseRows], sought: Sequence[SparseRows]
 ) -> np.ndarray:
@@ -169,8 +118,7 @@ def covariance_given(
     """
     solved = collocate_rows_dense(observations)
     m = len(solved.misclosure)
-    size = m + sum(part.misclosure.size for part in sought)
-    total = _covariance(_all_sides([*observations, *sought]), np.zeros((size, size)))
+    total = signal_covariance([*observations, *sought])
     half = solved.solver.whiten(total[m:, :m].T)
     trend = solved.solver.whiten(solved.design)
     left = (_design(sought) - half.T @ trend) @ solved.trend_root
@@ -198,6 +146,12 @@ def _collocate(rows, noise):
     return solve_trend(
         solver, np.concatenate([np.ravel(p.misclosure) for p in rows]), _design(rows)
     )
+
+
+def signal_covariance(rows: Sequence[SparseRows]) -> np.ndarray:
+    """The part (m, m) of the signals in V of SparseRows, by its lower triangle."""
+    size = sum(part.misclosure.size for part in rows)
+    return _covariance(_all_sides(rows), np.zeros((size, size)))
 
 
 class _Sides(NamedTuple):

@@ -15,8 +15,7 @@ SMALLEST_INFORMATION = 1e-9  # least share of the trend's information left witho
 LARGEST_ERROR = 0.01  # of the log-likelihood by rounding: parameters differ by more than that
 NOT_POSITIVE = (
     "The covariance of the {} misclosures is not positive definite: two observations of one time "
-    "without noise, or a sigma of zero. Give each observation and control point the sigma that it "
-    "has."
+    "without noise, or a sigma of zero. Give each observation and control point the sigma it has."
 )
 
 
@@ -221,9 +220,8 @@ class Collocation:
     def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
         basis, limit = self._leverage[rows], 1.0 - SMALLEST_INFORMATION
-        if np.sum(basis**2) < limit:  # of all singular values, which is quick
-            return True
-        return bool(np.linalg.svd(basis, compute_uv=False)[0] ** 2 < limit)
+        is_small = np.sum(basis**2) < limit  # of all singular values, which is quick
+        return bool(is_small or np.linalg.svd(basis, compute_uv=False)[0] ** 2 < limit)
 
     def leave_out(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the other observations say of some: residuals (l - prediction) and covariance.

@@ -101,7 +101,10 @@ def _check_control(project, checked, faults):
             f"{len(far)} of the {len(names)} surveyed points of {project.path} lie near no cloud "
             f"by the headers (first: {far[0]})."
         )
-        faults.warn(sentence) if held else faults.add("data", sentence)
+        if held:
+            faults.warn(sentence)
+        else:
+            faults.add("data", sentence)
 
 
 def _all(what: str, checked: Sequence[tuple[Survey, CheckedSurvey]]) -> Iterable[str]:

@@ -1,0 +1,62 @@
+"""How a likelihood changes with the signals, for the search of their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mlscorr.collocation.dense import signal_covariance
+from mlscorr.collocation.model import Collocation
+from mlscorr.collocation.sparse_rows import SparseRows
+
+
+def likelihood_changes(
+    solved: Collocation, rows: Sequence[SparseRows], changed: Sequence[Sequence[SparseRows]]
+) -> np.ndarray:
+    r"""How the restricted log-likelihood (k,) changes with the signals, of first order in dV.
+
+    d log L = (w^T dV w - tr(P dV)) / 2 with w = V^-1 (l - A x) and P = V^-1 less the trend's part
+    (Rasmussen and Williams 2006, Eq. 5.9): one factor of V for any number of parameters.
+
+    Parameters
+    ----------
+    solved : Collocation
+        By ``collocate_rows_dense``.
+    rows : sequence of SparseRows
+        That it solved.
+    changed : sequence of k sequences of SparseRows
+        The same with signals that are a little different.
+    """
+    slope = np.outer(solved.weights, solved.weights)
+    slope -= solved.precision_of(np.arange(len(slope)))
+    slope = np.tril(slope) - np.diag(np.diag(slope) / 2)  # each of a pair counts a half
+    before: dict[tuple, np.ndarray] = {}
+    changes = []
+    for other in changed:
+        numbers = _differing(rows, other)
+        if numbers not in before:
+            before[numbers] = signal_covariance(_with_signals(rows, numbers))
+        after = signal_covariance(_with_signals(other, numbers))
+        changes.append(np.vdot(slope, after - before[numbers]))
+    return np.array(changes)
+
+
+def _differing(rows, others):
+    """Numbers of the signals that differ in other rows."""
+    same = [
+        [
+            here.covariance == there.covariance
+            and np.array_equal(here.mixing, there.mixing)
+            and np.array_equal(here.clock, there.clock)
+            for here, there in zip(part.signals, other.signals, strict=True)
+        ]
+        for part, other in zip(rows, others, strict=True)
+    ]
+    return tuple(np.flatnonzero(~np.all(same, axis=0)).tolist())
+
+
+def _with_signals(rows, numbers):
+    """The rows with some of their signals alone."""
+    return [replace(part, signals=[part.signals[k] for k in numbers]) for part in rows]
