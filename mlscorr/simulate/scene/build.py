@@ -81,9 +81,7 @@ def _yaw(scanners):
     return float(np.mean(turns))
 
 
-def sky_elevation(
-    scene: Scene, trajectory: Trajectory, origin: np.ndarray, rate: float = 2.0
-) -> np.ndarray:
+def sky_elevation(scene: Scene, trajectory: Trajectory, origin: np.ndarray) -> np.ndarray:
     """Elevation (n, 2) below which the sky is hidden to the left and the right. Units: rad.
 
     Parameters
@@ -93,9 +91,8 @@ def sky_elevation(
         A true one, in map coordinates.
     origin : (3,) array
         Map coordinates of the scene's local origin. Units: m.
-    rate : float
-        At which it is looked at, to be interpolated. Units: Hz.
     """
+    rate = 2.0  # Hz, at which it is looked at, to be interpolated
     fan = np.radians([-40.0, -20.0, 0.0, 20.0, 40.0])  # about right and left; the median counts
     elevation = np.radians(np.arange(0.5, 90.0))
     start, end = trajectory.gps_time[[0, -1]]

@@ -7,9 +7,7 @@ from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, join, pos
 from mlscorr.simulate.settings import SETTINGS
 
 
-def target(
-    kind: str, centre: np.ndarray, u: np.ndarray, v: np.ndarray, size: float, segments: int = 64
-) -> Mesh:
+def target(kind: str, centre: np.ndarray, u: np.ndarray, v: np.ndarray, size: float) -> Mesh:
     """Mesh of a target about its centre (3,), in the plane of the unit vectors u, v (3,).
 
     A circle is a bright disc of diameter `size` within a darker square board of the same plane;
@@ -26,11 +24,10 @@ def target(
         Unit vector in its plane.
     size : float
         Units: m.
-    segments : int
-        Of a disc.
     """
     if kind == "square":
         return quads(centre - size / 2 * (u + v), size * u, size * v, SETTINGS.white)
+    segments = 64  # of a disc
     angle = np.linspace(0.0, 2 * np.pi, segments + 1)
     ray = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
     to_edge = 1 / np.maximum(abs(np.cos(angle)), abs(np.sin(angle)))[:, None]
