@@ -119,7 +119,7 @@ def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) 
     Parameters
     ----------
     axes : Axes
-        Of a map, with its stars: where one stands, a name goes to the other side.
+        Of a map, with its stars: where one or a name stands, a name goes to the other side.
     names : mapping
         To easting and northing (m), and to 1 for a name right of the mark, -1 for one left of it.
     width : float
@@ -134,8 +134,8 @@ def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) 
         boxes = {
             s: [*np.add(place, [s * (half[0] + letter[0]), 0.0]), *half] for s in (side, -side)
         }
-        free = [s for s in boxes if not _covers(boxes[s], stars)][:1]
-        if not free or _covers(boxes[free[0]], taken):
+        free = [s for s in boxes if not _covers(boxes[s], [*stars, *taken])]
+        if not free:
             continue
         taken.append(boxes[free[0]])
         axes.annotate(
