@@ -28,6 +28,22 @@ def likelihood_changes(
         That it solved.
     changed : sequence of k sequences of SparseRows
         The same with signals that are a little different.
+
+    Examples
+    --------
+    A misclosure of 2 m where 1 m is believed: with a thousandth more its log-likelihood rises by
+    (4 - 1) / 2 of dV, 0.002 m^2.
+
+    >>> from mlscorr.collocation import Noise, Signal, SparseRows
+    >>> from mlscorr.collocation import collocate_rows_dense, likelihood_changes
+    >>> from mlscorr.collocation.covariance import Covariance
+    >>> noise, none = Noise(np.full((1, 1, 1), 1e-6)), np.zeros((1, 1, 0))
+    >>> drift = Covariance("exponential", 30.0)
+    >>> scales = [Signal(np.full((1, 1, 1), scale), drift) for scale in (1.0, 1.001)]
+    >>> rows, more = ([SparseRows(np.zeros((1, 1)), np.full((1, 1), 2.0), noise, none, [signal])]
+    ...               for signal in scales)
+    >>> likelihood_changes(collocate_rows_dense(rows), rows, [more]).round(4)
+    array([0.003])
     """
     slope = np.outer(solved.weights, solved.weights)
     slope -= solved.precision_of(np.arange(len(slope)))

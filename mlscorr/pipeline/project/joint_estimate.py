@@ -38,8 +38,8 @@ def estimate_group(
 ) -> list[JointEstimate]:
     """The POS errors of drives near each other, of those together that ties join.
 
-    Where ties part them, those with all of the control stay as they are: what has neither moved
-    nothing. Others are estimated anew, without a shift in common with control that isn't theirs.
+    Where ties part them, those with all of the control keep their estimate, which the others have
+    not moved. These are estimated anew, without a shift in common with control that isn't theirs.
 
     Parameters
     ----------
