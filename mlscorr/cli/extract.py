@@ -14,11 +14,11 @@ def extract(
 ) -> None:
     """List all target-like objects in the cloud of a survey, with or without control points."""
     with work(out, overwrite, survey) as progress:
+        from mlscorr.survey.summary import counted
+
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.extract(recorded, progress=progress).write(out, overwrite)
     print_json(content, as_json)
-    from mlscorr.survey.summary import counted
-
     targets = content["targets"]
     matched = sum(row["matched"] for row in targets)
     passes = counted(len({row["pass"] for row in targets}), "pass")

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import pandas
 
 
-class WritableCalibration(Summary):
+class CalibrationResult(Summary):
     """What is written of a calibration, of one scanner or of those calibrated together.
 
     Parameters
@@ -117,7 +117,7 @@ class WritableCalibration(Summary):
 
 
 @dataclass(frozen=True, repr=False)
-class CalibratedSurvey(WritableCalibration):
+class CalibratedSurvey(CalibrationResult):
     """A calibrated survey: the calibration, the targets, and ``write``.
 
     Parameters

@@ -15,11 +15,7 @@ from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.evaluate.ties import misfit_section
 from mlscorr.io.las import sample_gps_times
 from mlscorr.matching import Refusal
-from mlscorr.pipeline.calibrated_survey import (
-    CalibratedSurvey,
-    WritableCalibration,
-    estimate_section,
-)
+from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
 from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
@@ -121,7 +117,7 @@ def _parts(survey, control, check, finding, calibration):
 
 
 @dataclass(frozen=True, repr=False)
-class CalibratedScanners(WritableCalibration):
+class CalibratedScanners(CalibrationResult):
     """A survey whose scanners were calibrated together, and ``write``.
 
     Parameters

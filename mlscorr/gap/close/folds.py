@@ -218,7 +218,7 @@ def _trained(case, observations, model, used, rng):
     names, part = cause.effect.split("+"), case.rows.select(used)
     of_part = select([sign for sign in case.signatures if sign.name in names], used)
     anew = weigh_labels(part, background(part, survey), survey, of_part, rng, 0)
-    best = {name: evidence.likeliest_noise(name) for name in names}
+    best = {name: _likeliest(evidence, name) for name in names}
     noise = [each for each in anew.noise if _is_alike(each, best.get(each.label))]
     anew = replace(anew, noise=tuple(noise))
     if not set(names) <= anew.noisy:  # without these rows nothing shows it
@@ -238,6 +238,11 @@ def _with_factor(observations, model, residual):
 
     widest = np.log(max(INFERENCE.window_factors) / min(INFERENCE.window_factors))
     return windows(minimize_scalar(score, bounds=(-widest, widest), method="bounded").x)
+
+
+def _likeliest(evidence, name):
+    """The NoiseEvidence of a label that explains most."""
+    return max((e for e in evidence.noise if e.label == name), key=lambda each: each.gain[0])
 
 
 def _is_alike(noise, other):

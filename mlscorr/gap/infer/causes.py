@@ -240,7 +240,8 @@ def cause_of(
 
 def _with_noise(cause, rows, signatures, evidence, name):
     """The cause with one noise class beside."""
-    best = evidence.likeliest_noise(name)
+    classes = [each for each in evidence.noise if each.label == name]
+    best = max(classes, key=lambda each: each.gain[0])
     if isinstance(best, WindowEvidence):
         more, model = window_parameters(best.windows), replace(cause.model, windows=best.windows)
         return replace(cause, parameters=cause.parameters + more, model=model)

@@ -5,6 +5,8 @@ all that its evidence allows for: another drift, rows that are noisier, roughnes
 that are off everywhere. It is large where it can't be taken for these.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

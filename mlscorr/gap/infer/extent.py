@@ -5,6 +5,8 @@ told by the fitted signature: the interval inside and outside of which its ampli
 described by one mean each (the cut of largest variance between two classes, Otsu 1979).
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

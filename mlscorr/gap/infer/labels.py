@@ -64,10 +64,6 @@ class LabelEvidence:
         """Labels of noise classes."""
         return {each.label for each in self.noise}
 
-    def likeliest_noise(self, label: str) -> NoiseEvidence:
-        """The noise class of a label that explains the residuals best."""
-        return max((e for e in self.noise if e.label == label), key=lambda each: each.gain[0])
-
     def best(self, label: str) -> int:
         """Number of the block of a label that explains the residuals best."""
         return self.table.best(label, self.blocks.gain[:, 0])

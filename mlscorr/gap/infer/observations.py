@@ -50,6 +50,11 @@ class Errors(Columns):
     growth: np.ndarray
     raised: np.ndarray
 
+    @property
+    def position_variance(self) -> np.ndarray:
+        """Stated variance by the POS's position: (n,), m^2."""
+        return (self.position**2).sum(axis=1)
+
     def raised_position(self, factors: tuple[float, ...]) -> np.ndarray:
         """Mixing (n, 3) of the position with a factor on each stretch in which sigma is raised.
 
@@ -147,11 +152,15 @@ class Observations(Columns):
     @property
     def sigma(self) -> np.ndarray:
         """Stated sigma (m,) of the rows by the POS's position. Units: m."""
-        return np.sqrt(np.bincount(self.row, (self.errors.position**2).sum(axis=1), self.rows))
+        return np.sqrt(np.bincount(self.row, self.errors.position_variance, self.rows))
 
     def with_shared(self, columns: np.ndarray) -> Observations:
         """The same with causes that are accepted, as nuisance: columns (n, k) of free size."""
         return replace(self, shared=np.hstack([self.shared, SETTINGS.free_sigma * columns]))
+
+    def with_own(self, own: np.ndarray) -> Observations:
+        """The same with other variances (n,) of the observations' own noise."""
+        return replace(self, errors=replace(self.errors, own=own))
 
     def whitener(self, model: ErrorModel = STATED, extra: np.ndarray | float = 0.0) -> Whitener:
         """V under a model, factored.

@@ -1,6 +1,6 @@
 """Heavy tails: single odd values are allowed for, so that no effect is found to explain them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -44,8 +44,7 @@ def without_tails(
         is_odd &= np.abs(score) >= np.sort(np.abs(score[is_odd]))[-max(1, int(limit))]
     excess = np.where(is_odd, ((score / SETTINGS.tail_left) ** 2 - 1) / precision, 0.0)
     odd_rows = np.unique(observations.row[is_odd])
-    errors = replace(observations.errors, own=observations.errors.own + excess)
-    return replace(observations, errors=errors), odd_rows
+    return observations.with_own(observations.errors.own + excess), odd_rows
 
 
 def _odd_target(observations, rows, score):

@@ -1,5 +1,7 @@
 """The verdict: none, a noise class, an effect, two of them, or unknown; with what probability."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

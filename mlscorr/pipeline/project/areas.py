@@ -126,6 +126,18 @@ def areas_of(places: np.ndarray, limit: int, margin: float) -> list[Area]:
     return areas
 
 
+def drive_areas(drives: Sequence[FoundDrive], limit: int) -> list[Area]:
+    """Areas in which drives spend so many seconds at most, those in their margins too.
+
+    Parameters
+    ----------
+    drives : sequence of FoundDrive
+    limit : int
+        Units: s.
+    """
+    return areas_of(places_each_second(drives), limit, margin_of(drives))
+
+
 @dataclass(frozen=True)
 class Piece:
     """What of a drive lies in an area and its margin.

@@ -10,14 +10,7 @@ import numpy as np
 
 from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
-from mlscorr.pipeline.project.areas import (
-    Area,
-    Piece,
-    areas_of,
-    margin_of,
-    pieces_of,
-    places_each_second,
-)
+from mlscorr.pipeline.project.areas import Area, Piece, drive_areas, pieces_of
 from mlscorr.pipeline.project.corrected import DriveState, corrected_drives
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive
 from mlscorr.pipeline.project.joint import FoundDrive
@@ -111,7 +104,7 @@ def project_drives(
     """
     groups = near_drives(drives) if with_ties else [[drive] for drive in drives]
     for group in groups:
-        areas = areas_of(places_each_second(group), limit, margin_of(group))
+        areas = drive_areas(group, limit)
         if with_ties and len(areas) > 1:
             yield from drives_by_areas(group, areas, order, origin, work)
             continue

@@ -1,5 +1,8 @@
 """What is learned from records is right as often as it says."""
 
+import json
+from importlib.resources import files
+
 import numpy as np
 import pytest
 
@@ -59,6 +62,12 @@ def test_hashes_tell_what_made_them():
     "Another order is another hash; that of the code is the same each time"
     assert hash_of(["a", "b"]) != hash_of(["b", "a"])
     assert code_hash() == code_hash()
+
+
+def test_the_shipped_decision_was_learned_on_the_evidence_of_today():
+    "The code that makes evidence is that of decision.json: who changes it has to learn anew"
+    shipped = json.loads(files("mlscorr.gap.infer").joinpath("decision.json").read_text())
+    assert shipped["made_of"]["code"] == code_hash()
 
 
 def test_calibration_is_the_distance_of_stated_from_reached():
