@@ -58,7 +58,7 @@ class Costs:
     Parameters
     ----------
     false_alarm : float
-        Of a cause, or unknown, where nothing or noise alone is there.
+        Of a cause, or unknown, where nothing is wrong.
     miss : float
         Of none, or noise, where a cause is there.
     unknown : float
@@ -247,13 +247,15 @@ def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs
     costs : Costs
     """
     calm = {n: kind_of(n, noisy) in ("none", "noise") for n in probability}
-    nothing = sum(p for name, p in probability.items() if calm[name])
+    no_cause = sum(p for name, p in probability.items() if calm[name])
+    noise = no_cause - probability["none"]
 
     def cost(label):
         right = probability[label]
         if calm[label]:
-            return costs.miss * (1 - nothing) + nothing - right
+            return costs.miss * (1 - no_cause) + no_cause - right
         wrong = costs.unknown if label == "unknown" else 1.0
-        return costs.false_alarm * nothing + wrong * (1 - nothing - right)
+        cause = wrong * (1 - no_cause - right)
+        return costs.false_alarm * probability["none"] + noise + cause
 
     return min(probability, key=cost)

@@ -7,6 +7,7 @@ smoother; survey and extraction errors often have heavier tails than assumed.
 import numpy as np
 from numpy.random import Generator
 
+from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.survey import Scanner
@@ -46,6 +47,8 @@ def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
 def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:
     """Errors (m,) of the survey of targets and of each row's own.
 
+    No target is off by as much as an outlier, which is an effect: else what is called clean is not.
+
     Parameters
     ----------
     rows : Rows
@@ -57,7 +60,7 @@ def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:
     def draw(n):
         return rng.standard_t(5, n) * np.sqrt(3 / 5) if heavy else rng.standard_normal(n)
 
-    survey = draw(3 * len(rows.targets))
+    survey = np.clip(draw(3 * len(rows.targets)), -INFERENCE.outlier, INFERENCE.outlier)
     own = draw(len(rows)) * np.sqrt(rows.noise)
     rough = rows.channel == "roughness"
     own[rough] = np.log(rng.chisquare(77, rough.sum()) / 77) + 1 / 77

@@ -73,3 +73,11 @@ def test_the_label_is_the_one_that_costs_least():
     either = {"range_bias": 0.4, "time_offset": 0.35, "unknown": 0.2, "none": 0.05}
     assert cheapest(either, NOISY, Costs(1.0, 1.0, 1.0)) == "range_bias"
     assert cheapest(either, NOISY, Costs(1.0, 1.0, 0.1)) == "unknown"
+
+
+def test_a_cause_is_no_false_alarm_where_noise_is_the_other_answer():
+    "Something is wrong in any case: the more probable of noise and effect is named, as a name"
+    probability = {"range_bias": 0.6, "range_noise": 0.38, "none": 0.02}
+    assert cheapest(probability, NOISY, Costs()) == "range_bias"
+    swapped = {"range_noise": 0.6, "range_bias": 0.38, "none": 0.02}
+    assert cheapest(swapped, NOISY, Costs()) == "range_noise"

@@ -1,9 +1,12 @@
 """Errors of made-up surveys."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from feature_errors import errors
 
+from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.train.errors import odd_patches, process, scatter
 from mlscorr.gap.train.features import geometry
 
@@ -39,6 +42,14 @@ def test_scatter_has_its_stated_variance_with_light_and_heavy_tails(small):
         rng = np.random.default_rng(1)
         drawn = [scatter(small.rows, rng, heavy)[target] for _ in range(200)]
         assert np.std(drawn) == pytest.approx(stated, rel=0.1)
+
+
+def test_no_survey_error_is_as_large_as_that_of_an_outlier(small):
+    "Of 8000 coordinates with heavy tails none is off by more than 4 sigma, and some come near"
+    rows = replace(small.rows, noise=np.zeros(len(small.rows)))
+    use, rng = (rows.channel == "target") & (rows.survey > 0), np.random.default_rng(1)
+    drawn = [scatter(rows, rng)[use] / np.sqrt(rows.survey[use]) for _ in range(200)]
+    assert 3.5 < np.max(np.abs(drawn)) < SETTINGS.outlier + 1e-9
 
 
 def test_odd_patches_are_rougher_or_lose_more_and_no_length_changes(small):
