@@ -73,7 +73,9 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
     from mlscorr.simulate.random_survey import random_survey
 
     survey, rng = random_survey((*entropy, 0), name), np.random.default_rng((*entropy, 1))
+    pos = survey.scenario.pos
     label = {
+        "sky": "bad" if pos.outages or pos.canyons else "open",
         "kind": case.kind, "names": [], "mdb": [], "without": case.without, "effects": [],
         "parameters": {}, "normal": {}, "likeness": {}, "mechanism": None,
     }  # fmt: skip

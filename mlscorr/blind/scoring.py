@@ -1,9 +1,7 @@
 """How often a diagnosis was right: answers against labels, with intervals and goals."""
 
-from collections.abc import Callable, Sequence
-
 import numpy as np
-from scipy.stats import binomtest, bootstrap
+from scipy.stats import binomtest, bootstrap, kstest
 
 from mlscorr.blind.answers import AnsweredCase
 from mlscorr.blind.settings import SETTINGS
@@ -41,6 +39,9 @@ def _rates(answered):
         for kind in ("clean", "noise", "single", "pair", "withheld", "outside")
     )
     yield _share("clean: a cause claimed", [not case.is_noise for case in clean], maximum=0.01)
+    for sky in ("open", "bad"):
+        alarms = [not case.is_noise for case in clean if case.label.get("sky") == sky]
+        yield _share(f"clean, {sky} sky: a cause claimed", alarms, maximum=0.01)
     yield _share("clean: noise claimed", [case.is_only_noise for case in clean])
     yield _share("noise: a cause claimed", [not case.is_noise for case in noise])
     yield _share("noise: named", [case.names(case.named) for case in noise])
@@ -87,17 +88,15 @@ def _figures(answered):
     yield _figure(
         "gap closed at 3 MDB and more, p10", closed, lambda values: np.quantile(values, 0.1), 0.95
     )
-    impostors = [_closed(case) for case in answered if case.kind == "withheld"]
-    yield _figure("withheld: gap closed by the best known effect, median", impostors, np.median)
     at_3 = [case for case in clear if case.goal_size == 3 and case.names(case.named)]
     error = [e for e in map(_error, at_3) if e is not None]
     yield _figure("error of the parameters at 3 MDB, median", error, np.median, maximum=0.08)
-    stated = [case for case in answered if case.document]
-    probability = [case.verdict["probability"] for case in stated]
-    right = [case.is_right for case in stated]
+    pairs = [(case.verdict["probability"], case.is_right) for case in answered if case.document]
     name = "calibration error of the probability"
-    pairs = list(zip(probability, right, strict=True))
     yield _figure(name, pairs, lambda values: calibration_error(*values.T), maximum=0.04)
+    stated = [c.verdict["p_value"] for c in answered if c.kind == "clean" and c.document]
+    name = "clean: p of their p-values being even (Kolmogorov-Smirnov)"
+    yield _figure(name, stated, lambda values: kstest(values, "uniform").pvalue, minimum=0.01)
 
 
 def _share(name, hits, minimum=None, maximum=None):
@@ -110,9 +109,8 @@ def _share(name, hits, minimum=None, maximum=None):
     return _row(name, len(hits), float(np.mean(hits)), interval, minimum, maximum)
 
 
-def _figure(
-    name: str, values: Sequence, statistic: Callable, minimum: float | None = None, maximum=None
-):
+def _figure(name, values, statistic, minimum=None, maximum=None):
+    """Row of what is no share; its interval is a bootstrap's."""
     if not values:
         return None
     values = np.array(values, dtype=float)
@@ -161,11 +159,10 @@ def _inside(case):
     estimates, true = _estimates(case), case.label["parameters"]
     if estimates is None:
         return []
-    pairs = [(estimates[n], v) for n, v in true[case.named].items() if n in estimates]
     return [
-        abs(p["estimate"] - v) <= INFERENCE.quantile * p["sigma"]
-        for p, v in pairs
-        if p["sigma"] is not None
+        abs(estimates[n]["estimate"] - v) <= INFERENCE.quantile * estimates[n]["sigma"]
+        for n, v in true[case.named].items()
+        if n in estimates and estimates[n]["sigma"] is not None
     ]
 
 

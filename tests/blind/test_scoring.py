@@ -1,13 +1,15 @@
 """Scores of hand-made answers are right."""
 
+import numpy as np
 import pytest
 
 from mlscorr.blind.scoring import score
 
 
-def label(kind, *names, mdb=3.0, likeness=None, without="range_bias", mechanism=None):
+def label(kind, *names, mdb=3.0, likeness=None, without="range_bias", mechanism=None, sky="open"):
     "A label of effects whose magnitude is 0.01"
     return {
+        "sky": sky,
         "kind": kind,
         "names": list(names),
         "mdb": [mdb] * max(len(names), kind == "outside"),
@@ -20,7 +22,16 @@ def label(kind, *names, mdb=3.0, likeness=None, without="range_bias", mechanism=
     }
 
 
-def answer(said, probability=1.0, several=None, lead="", shrink=None, estimate=0.01, sigma=1e-3):
+def answer(
+    said,
+    probability=1.0,
+    several=None,
+    lead="",
+    shrink=None,
+    estimate=0.01,
+    sigma=1e-3,
+    p_value=0.5,
+):
     "An answer as gap.json has it"
     parameter = {"name": "magnitude", "unit": "m", "estimate": estimate, "sigma": sigma}
     return {
@@ -29,7 +40,7 @@ def answer(said, probability=1.0, several=None, lead="", shrink=None, estimate=0
                 "label": said,
                 "probability": probability,
                 "set": several or [said],
-                "p_value": 0.5,
+                "p_value": p_value,
                 "lead": lead,
             },
             "closure": {"shrink": shrink},
@@ -58,6 +69,28 @@ def test_recovers_the_rates_of_hand_made_answers():
     assert rows["gap closed at 3 MDB and more, median"]["value"] == 0.98
     assert rows["gap closed at 3 MDB and more, p10"]["value"] == 0.98
     assert [one["said"] for one in told["wrong"]] == ["lever_arm", "range_noise", "none", "none"]
+
+
+def test_skies_are_told_apart():
+    "One alarm in four surveys under a bad sky, none in five under an open one"
+    said = ("lever_arm", *["none"] * 3)
+    rows, _ = scored(
+        *((label("clean", sky="bad"), answer(name)) for name in said),
+        *[(label("clean"), answer("none"))] * 5,
+    )
+    assert rows["clean, bad sky: a cause claimed"]["value"] == 0.25
+    assert rows["clean, open sky: a cause claimed"]["value"] == 0.0
+    assert rows["clean: a cause claimed"]["value"] == pytest.approx(1 / 9)
+
+
+@pytest.mark.parametrize(("power", "is_even"), [(1.0, True), (0.3, False)])
+def test_p_values_of_clean_surveys_are_even_or_not(power, is_even):
+    "Even ones are called so; their power of 0.3, mostly near one, is not"
+    even = (np.arange(60) + 0.5) / 60
+    rows, _ = scored(*((label("clean"), answer("none", p_value=p)) for p in even**power))
+    row = rows["clean: p of their p-values being even (Kolmogorov-Smirnov)"]
+    assert row["cases"] == 60
+    assert row["reached"] is is_even
 
 
 def test_what_a_geometry_cannot_tell_apart_is_right_by_class():

@@ -247,15 +247,13 @@ def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs
     costs : Costs
     """
     calm = {n: kind_of(n, noisy) in ("none", "noise") for n in probability}
-    no_cause = sum(p for name, p in probability.items() if calm[name])
-    noise = no_cause - probability["none"]
+    none, no_cause = probability["none"], sum(p for name, p in probability.items() if calm[name])
 
     def cost(label):
         right = probability[label]
         if calm[label]:
             return costs.miss * (1 - no_cause) + no_cause - right
         wrong = costs.unknown if label == "unknown" else 1.0
-        cause = wrong * (1 - no_cause - right)
-        return costs.false_alarm * probability["none"] + noise + cause
+        return costs.false_alarm * none + no_cause - none + wrong * (1 - no_cause - right)
 
     return min(probability, key=cost)

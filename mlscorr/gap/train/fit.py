@@ -123,8 +123,7 @@ def _of_p_values(records):
     p = np.array([r.p_value for r in records if r.kind == "clean" and r.p_value is not None])
     if len(p) < 2 * BINS:
         return 1.0, 1.0
-    mean, variance = p.mean(), p.var()
-    count = mean * (1 - mean) / variance - 1
+    count = (mean := p.mean()) * (1 - mean) / p.var() - 1
     return float(mean * count), float((1 - mean) * count)
 
 

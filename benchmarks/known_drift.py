@@ -1,0 +1,133 @@
+"""How often an effect is named rightly where the covariance of all errors is known: the limit.
+
+    OMP_NUM_THREADS=1 python benchmarks/known_drift.py [--seed 20000] [--worlds 40] [--cases 24]
+
+Made-up surveys of features whose errors are drawn from what the POS, the survey and the extraction
+state, which no real POS grants. The posterior of nothing, 18 effects and unknown, as it is, without
+anything learned, is worked out twice: by that covariance, and by the family of those that a
+diagnosis averages over, since it doesn't know it. MDB is the minimal detectable bias by the known
+one. Noise and pairs are neither drawn nor tried.
+"""
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+
+from mlscorr.effects import effect_class
+from mlscorr.effects.catalogue import SYSTEMATIC
+from mlscorr.gap.infer.columns import column_table
+from mlscorr.gap.infer.decision import Costs, cheapest
+from mlscorr.gap.infer.error_models import STATED, error_models
+from mlscorr.gap.infer.events import refine_events
+from mlscorr.gap.infer.evidence import suited_models, weigh_blocks, without_known
+from mlscorr.gap.infer.labels import block_scores
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.infer.unknown import unknown_blocks
+from mlscorr.gap.observe.rows import background
+from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.train.features import geometry
+from mlscorr.gap.train.sizing import Ruler, draw_effect
+
+CLEAN = 0.3  # share of cases in which nothing acts
+SIZES = (1.0, 8.0)  # MDB, between which sizes are drawn evenly by their logs, as in training
+
+
+class Bed:
+    """A geometry with all that is weighed in it."""
+
+    def __init__(self, seed):
+        rng = np.random.default_rng([seed, 0])
+        targets, passes = int(rng.integers(14, 45)), int(rng.integers(1, 3))
+        patches = int(np.exp(rng.uniform(*np.log((60, 600)))))
+        made = geometry(seed, targets, patches, passes, duration=float(rng.uniform(45.0, 80.0)))
+        self.rows, self.survey = made.rows, made.survey
+        self.observations = Observations.of(made.rows, background(made.rows, made.survey))
+        self.signatures, _ = signatures(made.rows, made.survey)
+        unknown = unknown_blocks(self.rows, self.survey)
+        table = column_table(self.rows, self.signatures, unknown, self.observations.sigma)
+        self.table = without_known(self.observations, table)
+        known = self.observations.whitener(STATED)
+        self.ruler = Ruler(self.rows, self.survey, self.observations, known)
+
+    def case(self, rng):
+        """Rows with drawn errors, the effect that acts on them, and its size in MDB."""
+        drawn, sized = self.observations.whitener(STATED).draw(rng, 1)[:, 0], None
+        residual = np.zeros(len(self.rows))
+        residual[self.observations.row] = drawn
+        if rng.random() > CLEAN:
+            size = float(np.exp(rng.uniform(*np.log(SIZES))))
+            kind = effect_class(str(rng.choice(SYSTEMATIC)))
+            sized = draw_effect(self.ruler, kind, size, rng)
+        if sized is None:
+            return replace(self.rows, residual=residual), "none", 0.0
+        return replace(self.rows, residual=residual + sized.shift), sized.effect.name, sized.mdb
+
+    def label(self, rows, is_known):
+        """The cheapest label by the posterior, of rows in which something may act."""
+        observations, prior = self.observations, dict(SETTINGS.prior)
+        residual = observations.columns(rows.residual[:, None])
+        models = (STATED,)
+        if not is_known:
+            models = suited_models(observations, self.table, error_models(), residual)
+        blocks = weigh_blocks(observations, models, residual, self.table)
+        share = prior["effect"] / len(self.table.effects)
+        scores = block_scores(self.table, blocks, share, prior)
+        events = refine_events(
+            rows, self.survey, observations, self.table, blocks, self.signatures
+        )
+        score = {name: values[0] for name, values in scores.items()}
+        score |= {
+            name: np.logaddexp(score[name], np.log(share) + event.gain)
+            for name, event in events.items()
+        }
+        score["none"] = np.log(prior["none"])
+        total = np.logaddexp.reduce(list(score.values()))
+        order = sorted(score, key=lambda name: -score[name])
+        return cheapest({name: float(np.exp(score[name] - total)) for name in order}, (), Costs())
+
+
+def figures(results):
+    """Shares by what they are of, each of results (truth, mdb, labels by both)."""
+
+    def rate(good, some):
+        hits = [[good(truth, label) for label in labels] for truth, mdb, labels in results
+                if some(truth, mdb)]  # fmt: skip
+        return (*np.mean(hits, axis=0), len(hits))
+
+    def right(truth, label):
+        return truth == label
+
+    def is_event(name):
+        return name != "none" and bool(effect_class(name).moment())
+
+    return {
+        "clean: a cause claimed": rate(lambda _, n: n != "none", lambda t, _: t == "none"),
+        "right at 1.6 to 2.5 MDB": rate(right, lambda _, mdb: 1.6 <= mdb < 2.5),
+        "right at 3 MDB and more": rate(right, lambda _, mdb: mdb >= 3.0),
+        "of these, events": rate(right, lambda t, mdb: mdb >= 3.0 and is_event(t)),
+        "of these, all others": rate(right, lambda t, mdb: mdb >= 3.0 and not is_event(t)),
+    }
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=20000)
+    parser.add_argument("--worlds", type=int, default=40)
+    parser.add_argument("--cases", type=int, default=24)
+    given = parser.parse_args()
+    results = []
+    for seed in range(given.seed, given.seed + given.worlds):
+        bed = Bed(seed)
+        for number in range(given.cases):
+            rows, truth, mdb = bed.case(np.random.default_rng([seed, 1, number]))
+            results.append((truth, mdb, [bed.label(rows, is_known) for is_known in (True, False)]))
+    print("| | cases | covariance known | averaged over |\n|---|---|---|---|")
+    for name, (known, averaged, count) in figures(results).items():
+        print(f"| {name} | {count} | {100 * known:.0f} % | {100 * averaged:.0f} % |")
+
+
+if __name__ == "__main__":
+    main()
