@@ -117,6 +117,7 @@ def unannotated(path):
     ]
 
 
+@cache
 def figures():
     "room -> Counter of code lines, constants, public definitions, documented and unannotated ones"
     rooms = {}

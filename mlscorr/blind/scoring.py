@@ -38,11 +38,7 @@ def _rates(answered):
         [case for case in answered if case.kind == kind]
         for kind in ("clean", "noise", "single", "pair", "withheld", "outside")
     )
-    yield _share("clean: a cause claimed", [not case.is_noise for case in clean], maximum=0.01)
-    for sky in ("open", "bad"):
-        alarms = [not case.is_noise for case in clean if case.label.get("sky") == sky]
-        yield _share(f"clean, {sky} sky: a cause claimed", alarms, maximum=0.01)
-    yield _share("clean: noise claimed", [case.is_only_noise for case in clean])
+    yield from _alarms(clean)
     yield _share("noise: a cause claimed", [not case.is_noise for case in noise])
     yield _share("noise: named", [case.names(case.named) for case in noise])
     at_2 = [case for case in single if case.goal_size == 2]
@@ -77,6 +73,15 @@ def _rates(answered):
     yield _share("95 % intervals hold the parameter", inside, 0.93, 0.97)
 
 
+def _alarms(clean):
+    """Rows of surveys in which nothing acts."""
+    yield _share("clean: a cause claimed", [not case.is_noise for case in clean], maximum=0.01)
+    for sky in ("open", "bad"):
+        alarms = [not case.is_noise for case in clean if case.label.get("sky") == sky]
+        yield _share(f"clean, {sky} sky: a cause claimed", alarms, maximum=0.01)
+    yield _share("clean: noise claimed", [case.is_only_noise for case in clean])
+
+
 def _figures(answered):
     """Rows that are no shares: of them the interval is a bootstrap's."""
     single = [case for case in answered if case.kind == "single"]
@@ -95,8 +100,7 @@ def _figures(answered):
     name = "calibration error of the probability"
     yield _figure(name, pairs, lambda values: calibration_error(*values.T), maximum=0.04)
     stated = [c.verdict["p_value"] for c in answered if c.kind == "clean" and c.document]
-    name = "clean: p of their p-values being even (Kolmogorov-Smirnov)"
-    yield _figure(name, stated, lambda values: kstest(values, "uniform").pvalue, minimum=0.01)
+    yield _figure("clean: p-values even (KS)", stated, lambda p: kstest(p, "uniform").pvalue, 0.01)
 
 
 def _share(name, hits, minimum=None, maximum=None):

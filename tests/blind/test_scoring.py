@@ -88,7 +88,7 @@ def test_p_values_of_clean_surveys_are_even_or_not(power, is_even):
     "Even ones are called so; their power of 0.3, mostly near one, is not"
     even = (np.arange(60) + 0.5) / 60
     rows, _ = scored(*((label("clean"), answer("none", p_value=p)) for p in even**power))
-    row = rows["clean: p of their p-values being even (Kolmogorov-Smirnov)"]
+    row = rows["clean: p-values even (KS)"]
     assert row["cases"] == 60
     assert row["reached"] is is_even
 
