@@ -127,10 +127,8 @@ def features(joint: JointScore) -> dict[str, float]:
         "cause to unknown": cause - unknown,
     }
     bent = {n: float(np.arcsinh(v / BEND)) for n, v in (evidence | joint.facts).items()}
-    # evidence of an event is worth less: it may be drift, which is larger where sigma is raised
-    for fact in ("event", "event in raised"):
-        for name in ("effect", "cause to noise", "effect to unknown"):
-            bent[f"{name}: {fact}"] = bent[name] * joint.facts[fact]
+    # evidence of an event is worth less: it may be drift
+    bent["effect: event"] = bent["effect"] * joint.facts["event"]
     return bent
 
 
