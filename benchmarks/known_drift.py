@@ -74,9 +74,7 @@ class Bed:
         blocks = weigh_blocks(observations, models, residual, self.table)
         share = prior["effect"] / len(self.table.effects)
         scores = block_scores(self.table, blocks, share, prior)
-        events = refine_events(
-            rows, self.survey, observations, self.table, blocks, self.signatures
-        )
+        events = refine_events(rows, self.survey, observations, self.table, blocks, self.signatures)
         score = {name: values[0] for name, values in scores.items()}
         score |= {
             name: np.logaddexp(score[name], np.log(share) + event.gain)
