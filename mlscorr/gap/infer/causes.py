@@ -10,7 +10,7 @@ from mlscorr.effects import Effect
 from mlscorr.effects.vehicle import PositionNoise
 from mlscorr.gap.infer.decision import Costs, JointScore, learned
 from mlscorr.gap.infer.detectable import detectable_size
-from mlscorr.gap.infer.error_models import STATED, ErrorModel, error_models
+from mlscorr.gap.infer.error_models import STATED, ErrorModel, error_models, shares
 from mlscorr.gap.infer.labels import LabelEvidence, weigh_labels
 from mlscorr.gap.infer.observations import model_likelihood
 from mlscorr.gap.infer.parameters import (
@@ -191,7 +191,7 @@ def _likely_models(evidence, residual, rng, number, windows):
         model_likelihood(evidence.observations, replace(model, windows=windows), columns)
         for model in models
     ])  # fmt: skip
-    count = rng.multinomial(number, np.exp(score - np.logaddexp.reduce(score)))
+    count = rng.multinomial(number, shares(score))
     return [model for model, times in zip(models, count, strict=True) for _ in range(times)]
 
 

@@ -59,6 +59,17 @@ class ErrorModel:
 STATED = ErrorModel()
 
 
+def shares(score: np.ndarray) -> np.ndarray:
+    """Probabilities (n,) that add up to one, of their logs up to a constant of any size.
+
+    Parameters
+    ----------
+    score : (n,) array
+    """
+    share = np.exp(score - score.max())
+    return share / share.sum()
+
+
 def window_growth(
     windows: Sequence[tuple[float, float, float, str]], gps_time: np.ndarray
 ) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.gap.infer.columns import ColumnTable, column_table
-from mlscorr.gap.infer.error_models import ErrorModel, error_models
+from mlscorr.gap.infer.error_models import ErrorModel, error_models, shares
 from mlscorr.gap.infer.events import RefinedEvent, refine_events
 from mlscorr.gap.infer.evidence import (
     BlockEvidence,
@@ -140,8 +140,7 @@ def _replicas(observations, models, residual, rng, number):
     tails as these have.
     """
     score = np.array([model_likelihood(observations, model, residual)[0] for model in models])
-    share = np.exp(score - np.logaddexp.reduce(score))
-    count = rng.multinomial(number, share / share.sum())
+    count = rng.multinomial(number, shares(score))
     best = observations.whitener(models[int(np.argmax(score))])
     tails = best.innovations(residual)[0][:, 0]
     replicas = [
