@@ -252,6 +252,7 @@ def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs
         if calm[label]:
             return costs.miss * (1 - no_cause) + no_cause - right
         wrong = costs.unknown if label == "unknown" else 1.0
+        # where noise is the truth something is wrong: a cause there is a wrong name, no false alarm
         return costs.false_alarm * none + no_cause - none + wrong * (1 - no_cause - right)
 
     return min(probability, key=cost)
