@@ -1,14 +1,15 @@
 """What ties between passes add through files: clouds there and back, targets and ties found.
 
 python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--scanners 2] [--elsewhere]
-    [--road [--without-paint]]
+    [--spinning] [--passes 1] [--road [--without-paint]]
 
 RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
 far apart the trajectories of both passes are left in a place. Without control only the latter is
 claimed. Drives are the simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each
 pass of 150 s alone: its smoothed drift is 0.6 to 1 m. With --elsewhere each pass loses it once, for
-70 to 120 s from a random moment. A second scanner is turned to the other side. With --road the
-scanner sees the road alone, which has a dashed middle line and lines along the kerbs.
+70 to 120 s from a random moment. A second scanner is turned to the other side. With --spinning
+it has 16 rings and an axis that leans back by 30 deg, so that a pass sees a thing for seconds. With
+--road it sees the road alone, which has a dashed middle line and lines along the kerbs.
 """
 
 import argparse
@@ -34,17 +35,24 @@ DURATION = 150.0  # s of each pass
 GNSS = 5.0  # s, at both ends of a pass
 OUTAGE = 70.0, 120.0  # s: shortest and longest of a pass, where passes lose GNSS by themselves
 DOWNWARD = (-150.0, -30.0)  # deg, scan angles that meet the road or what stands less than 2 m high
+SPINNING = {
+    "kind": "spinning",
+    "rings": tuple(np.linspace(-15.0, 15.0, 16)),  # deg: of the usual small ones
+    "lines_per_second": 10.0,
+    "points_per_line": 400,
+    "boresight": (-30.0, 0.0, 0.0),
+}
 NEAREST = 5.0  # m between two passes that are compared in a place
 
 
-def scenario(scanners=1, duration=DURATION, rng=None, road=False):
+def scenario(scanners=1, duration=DURATION, rng=None, road=False, spinning=False, passes=2):
     """The canyon as a MEMS unit records it, with GNSS at the ends of the passes alone.
 
     With a generator of random numbers, without it once in each pass; or its painted road alone.
     """
     canyon = read_scenario(FOLDER / "canyon.toml")
     outages = []
-    for start in (0.0, duration + canyon.drive.passes[1].pause):
+    for start in (0.0, duration + canyon.drive.passes[1].pause)[:passes]:
         length = duration - 2 * GNSS if rng is None else rng.uniform(*OUTAGE)
         latest = duration - GNSS - length
         begin = GNSS if rng is None else rng.uniform(GNSS, latest)
@@ -53,14 +61,20 @@ def scenario(scanners=1, duration=DURATION, rng=None, road=False):
     seen = {"points_per_line": POINTS_PER_LINE}
     if road:  # as many points as a scanner has that sees paint
         seen = {"points_per_line": 4 * POINTS_PER_LINE, "field_of_view": DOWNWARD}
-    first = canyon.scanner[0].model_copy(update=seen)
+    first = canyon.scanner[0].model_copy(update=SPINNING if spinning else seen)
     turn = np.array([1.0, 1.0, -1.0])
     second = first.model_copy(update={"boresight": tuple(turn * first.boresight)})
     return canyon.model_copy(
         update={
             "scene": canyon.scene.model_copy(update={"markings": road}),
             "pos": canyon.pos.model_copy(update=pos),
-            "drive": canyon.drive.model_copy(update={"duration": duration, "stops": ()}),
+            "drive": canyon.drive.model_copy(
+                update={
+                    "duration": duration,
+                    "stops": (),
+                    "passes": canyon.drive.passes[:passes],
+                }
+            ),
             "scanner": (first, second)[:scanners],
             "targets": canyon.targets.model_copy(update={"control": 16, "check": 4}),
         }
@@ -98,7 +112,9 @@ def measure(true, estimate):
 
 
 def _apart(true, gps_time, left):
-    """RMS (m) of the difference between what is left in two passes of one place."""
+    """RMS (m) of the difference between what is left in two passes of one place; NaN of one."""
+    if len(true.passes) < 2:
+        return np.nan
     (first, last), (begin, end) = true.passes[:2]
     place = true.at(gps_time).position
     there, back = (
@@ -120,6 +136,8 @@ def main():
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scanners", type=int, choices=(1, 2), default=1)
+    parser.add_argument("--spinning", action="store_true", help="a scanner of 16 rings")
+    parser.add_argument("--passes", type=int, choices=(1, 2), default=2)
     parser.add_argument("--elsewhere", action="store_true", help="outages by pass")
     parser.add_argument("--road", action="store_true", help="nothing but a painted road")
     parser.add_argument("--without-paint", action="store_true", help="ties of planes and poles")
@@ -129,7 +147,13 @@ def main():
     ratios = {number: [] for number in arguments.control}
     for seed in range(arguments.first, arguments.first + arguments.seeds):
         rng = np.random.default_rng([seed, 1]) if arguments.elsewhere else None
-        drive = scenario(arguments.scanners, rng=rng, road=arguments.road)
+        drive = scenario(
+            arguments.scanners,
+            rng=rng,
+            road=arguments.road,
+            spinning=arguments.spinning,
+            passes=arguments.passes,
+        )
         with tempfile.TemporaryDirectory() as folder:
             simulated = simulate(drive, np.random.default_rng(seed))
             simulated.write(Path(folder) / "survey")

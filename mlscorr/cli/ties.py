@@ -29,5 +29,7 @@ def ties(
             for axis, misfit in pair["misfit"].items()
             if misfit["n"]
         ]
-        say(f"Passes {pair['passes'][0]} and {pair['passes'][1]}: rms {', '.join(parts)}.")
+        first, second = pair["passes"]
+        which = f"Pass {first} by itself" if first == second else f"Passes {first} and {second}"
+        say(f"{which}: rms {', '.join(parts)}.")
     say(f"Ties: {out / 'ties.csv'} and {out / 'ties.json'}")

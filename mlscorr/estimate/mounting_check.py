@@ -88,22 +88,21 @@ def find_mounting_error(
 
 
 def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
-    """Sentences on scanners that see the street elsewhere than the first, as ties tell it.
+    """Sentences on scanners that see the street elsewhere than the first, as ties tell it; on the
+    only one where it sees a thing elsewhere from ahead than from behind.
 
     Parameters
     ----------
     estimate : Estimate
-        With ties between scanners.
+        With ties between scanners, or between views of one at a visit.
     names : sequence of str
         Of all scanners.
     """
     equations = estimate.equations
-    if equations.ties is None or equations.mounting is None:
-        return
     solved = equations.solve(estimate.parameters)
     scale = np.append(np.full(3, 1000.0), np.full(3, np.degrees(1.0)))
     least = np.repeat(SETTINGS.determined_sigma, 3)
-    for number, name in enumerate(names[1:]):
+    for number, name in enumerate(names[1:] or names):
         of_it = slice(6 * number, 6 * number + 6)
         lacks, covariance = solved.trend[of_it], solved.trend_covariance[of_it, of_it]
         sigma = np.sqrt(np.diag(covariance))
@@ -113,9 +112,11 @@ def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
             both = list(zip(scale * lacks, scale * sigma, strict=True))
             arm = ", ".join(f"{a:.0f} ± {s:.0f}" for a, s in both[:3])
             turn = ", ".join(f"{a:.2f} ± {s:.2f}" for a, s in both[3:])
+            who = "The scanner puts what it sees twice elsewhere the second time"
+            if len(names) > 1:
+                who = f"Scanner {name} puts what both see elsewhere than {names[0]} does: beside it"
             yield (
-                f"Scanner {name} puts what both see elsewhere than {names[0]} does: beside that "
-                f"its lever arm lacks {arm} mm to the right, forward, up, and its boresight "
+                f"{who}, its lever arm lacks {arm} mm to the right, forward, up, and its boresight "
                 f"{turn} deg about them. No drift is made of it, "
                 "but its points keep it. Run mlscorr calibrate first, and correct with the "
                 "mountings that it writes."

@@ -193,7 +193,8 @@ def with_ties(estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
     ties : Ties
     mountings : sequence of Mounting
         Of all scanners where ties between two of them are among these: what each lacks beside the
-        first is estimated with the drift, so that it doesn't pass for drift.
+        first is estimated with the drift, so that it doesn't pass for drift. Of the one scanner
+        where it saw things again at one visit: likewise what that lacks.
     """
     before, rows = _tie_equations(estimate.equations, ties, mountings)
     predictions, screening, is_used = screen_with_ties(before, estimate.screening, rows)
@@ -228,15 +229,18 @@ def previewed_correction(
 
 
 def _tie_equations(equations, ties, mountings):
-    """Equations with all mountings but the first, and TieEquations with the same drift."""
-    others = dict(enumerate(mountings[1:], start=1))
-    rows = TieEquations.of(equations.trajectory, equations.pos, ties, equations.stated, others)
-    if not others:
+    """Equations with all mountings but the first, or the only one, and TieEquations with the same
+    drift.
+    """
+    first = min(len(mountings) - 1, 1)
+    free = {number: mountings[number] for number in range(max(first, 0), len(mountings))}
+    rows = TieEquations.of(equations.trajectory, equations.pos, ties, equations.stated, free)
+    if not free:
         return equations, rows
     sigma = np.array([prior_sigma(mounting) for mounting in mountings])
-    between = np.hypot(sigma[0], sigma[1:]).ravel()
-    nothing = np.zeros((len(equations.names), 3, len(between)))
-    return with_mountings(equations, nothing, np.zeros(len(between)), between), rows
+    sigma = np.hypot(sigma[1:], sigma[0]).ravel() if first else sigma[0]
+    nothing = np.zeros((len(equations.names), 3, len(sigma)))
+    return with_mountings(equations, nothing, np.zeros(len(sigma)), sigma), rows
 
 
 def _estimate(trajectory, names, predictions, screening, notes):

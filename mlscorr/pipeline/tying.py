@@ -28,6 +28,7 @@ from mlscorr.ties import (
     TieCollector,
     agreeing_ties,
     coarse_correction,
+    least_pause,
     pair_features,
     residuals,
     thinned_ties,
@@ -128,7 +129,7 @@ def estimate_together(
 
 def _with_mounting_checked(survey, estimate, control):
     """The estimate with a note where its ties tell of a wrong mounting."""
-    if survey.scanners:
+    if estimate.equations.mounting is not None:
         warned = scanner_warnings(estimate, list(survey.by_scanner))
         return replace(estimate, notes=(*estimate.notes, *warned))
     if survey.mounting is None:
@@ -157,10 +158,13 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
     limit = 0.0
     moved = _moved(correction, features)
+    pause = least_pause(survey, features)
     mountings = () if None in survey.mountings else survey.mountings
+    if not survey.scanners:
+        mountings = (survey.assumed_mounting,) if pause < SETTINGS.pause else ()
     moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
     while True:
-        pairs = pair_features(features, moved, sigma, radius)
+        pairs = pair_features(features, moved, sigma, radius, pause=pause)
         if not mountings:  # two scanners tell of their mountings, not of the drift
             pairs = pairs[pairs.scanner[:, 0] == pairs.scanner[:, 1]]
         ties = agreeing_ties(pairs, moved)

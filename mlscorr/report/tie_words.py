@@ -6,7 +6,7 @@ from mlscorr.report.tables import length_in_words, percent, thousands
 
 
 def tie_sentences(section: dict[str, Any] | None, control: int) -> list[str]:
-    """What two passes both saw, how far apart they are, and what that spares.
+    """What was seen twice, how far apart they are, and what that spares.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def tie_sentences(section: dict[str, Any] | None, control: int) -> list[str]:
         return [section["reason"]]
     if section["used"] == 0:
         return [
-            f"None of the {thousands(section['n'])} places that two passes both saw is used, since "
+            f"None of the {thousands(section['n'])} places that were seen twice is used, since "
             "more than half of them contradict the others: "
             + ("control points alone made the correction." if control else "passes stay apart.")
         ]
@@ -37,9 +37,9 @@ def _misfit(section):
     """How far apart passes lay and lie, and how many ties contradict the others."""
     before, after = (length_in_words(section[state]["median"]) for state in ("before", "after"))
     yield (
-        "Two passes both saw the same wall, road surface, pole or painted line in "
-        f"{thousands(section['n'])} places: there they lay {before} apart before the correction "
-        f"and lie {after} apart after it (median)."
+        "The same wall, road surface, pole or painted line was seen twice in "
+        f"{thousands(section['n'])} places: there both views lay {before} apart before the "
+        f"correction and lie {after} apart after it (median)."
     )
     wrong = section["n"] - section["used"]
     if wrong:

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Pos, Scanner
 from mlscorr.survey.clouds import CloudFile
@@ -145,9 +146,14 @@ class Survey(Summary):
         ]
 
     @property
+    def assumed_mounting(self) -> Mounting:
+        """The mounting; where none is known, beams are from the navigation centre, in body axes."""
+        return self.mounting or Mounting(np.zeros(3), Rotation.identity())
+
+    @property
     def lever_arm(self) -> np.ndarray:
         """The scanner (3,) in body axes; zero where no mounting is known. Units: m."""
-        return np.zeros(3) if self.mounting is None else self.mounting.lever_arm
+        return self.assumed_mounting.lever_arm
 
     @cached_property
     def by_scanner(self) -> dict[str, Survey]:

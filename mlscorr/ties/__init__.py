@@ -14,6 +14,6 @@ from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.coarse_mounting import coarse_mounting, remounted, turned_directions
 from mlscorr.ties.collector import TieCollector, join_features
 from mlscorr.ties.pairing import pair_features
-from mlscorr.ties.search import TieSearch, agreeing_ties, feature_sigma, search_ties
+from mlscorr.ties.search import TieSearch, agreeing_ties, feature_sigma, least_pause, search_ties
 from mlscorr.ties.settings import SETTINGS
 from mlscorr.ties.thinning import thinned_ties

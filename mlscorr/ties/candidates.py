@@ -18,6 +18,7 @@ def candidate_pairs(
     radius: float,
     angle: float = SETTINGS.parallel,
     shift: np.ndarray | None = None,
+    pause: float = SETTINGS.pause,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs (k, 2) of parallel features within their gates, and distances (k,) in such units.
 
@@ -25,7 +26,7 @@ def candidate_pairs(
 
     Parameters
     ----------
-    features, correction, sigma, radius, angle
+    features, correction, sigma, radius, angle, pause
         As of pair_features.
     shift : (n, 3) array, optional
         By which the later of two visits is displaced. Units: m.
@@ -45,7 +46,7 @@ def candidate_pairs(
         features.scanner, features.extent, features.variance, sigma**2 + features.variance,
     )  # fmt: skip
     limits = (
-        float(radius), np.cos(angle), SETTINGS.pause, SETTINGS.cell, SETTINGS.gate_sigmas,
+        float(radius), np.cos(angle), pause, SETTINGS.cell, SETTINGS.gate_sigmas,
         2 * SETTINGS.surface_sigma**2,
     )  # fmt: skip
     grid = cell[order], edge, visit_number(features), SETTINGS.neighbours
@@ -92,7 +93,7 @@ def _pairs_near(cells, edge, visit, number, side, views, limits):
     nearest to a view: of visits before where it is displaced to the side 1, of visits after where
     to the side -1, else of all others.
     """
-    points, shift = views[:2]
+    points, shift, gps_time, pause = views[0], views[1], views[4], limits[2]
     count, columns = len(points), float(1 << CELL_BITS)
     near, square, rank = np.empty(count, np.int64), np.empty(count), np.zeros(count, np.int64)
     pairs, distances = [], []
@@ -104,15 +105,19 @@ def _pairs_near(cells, edge, visit, number, side, views, limits):
             end = np.searchsorted(cells, cell + 1.0, "right")
             for i in range(np.searchsorted(cells, cell - 1.0), end):
                 later, total = visit[i] - visit[row], 0.0
+                if later == 0 and abs(gps_time[i] - gps_time[row]) <= pause:
+                    continue
                 for axis in range(point.size):
                     total += (points[i, axis] - point[axis]) ** 2
-                if total < edge**2 and later != 0 and later * side <= 0:
+                if total < edge**2 and later * side <= 0:
                     near[size], square[size] = i, total
                     size += 1
         for i in near[np.argsort(square[:size])]:
             rank[visit[i]] += 1
             if rank[visit[i]] <= number:
-                first, second = (i, row) if visit[i] < visit[row] else (row, i)
+                is_before = visit[i] < visit[row]
+                is_before |= visit[i] == visit[row] and gps_time[i] < gps_time[row]
+                first, second = (i, row) if is_before else (row, i)
                 distance = _distance(views, first, second, limits)
                 if distance < np.inf:
                     pairs.append(first * count + second)

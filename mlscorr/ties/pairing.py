@@ -18,13 +18,15 @@ def pair_features(
     radius: float,
     angle: float = SETTINGS.parallel,
     turned: np.ndarray | None = None,
+    pause: float = SETTINGS.pause,
 ) -> Ties:
     """Ties between features of two visits, or of two scanners that saw a thing on the same pass.
 
-    A feature has at most one partner in each other pass of each scanner, and one in its own at
-    another visit: the nearest whose direction is parallel, each the other's. Two passes have none
-    in a direction in which more than half as many pair when they are displaced by two gates: those
-    would be by chance; and paint has none where the next lane's is near enough to be taken for it.
+    A feature has at most one partner in each other pass of each scanner, one in its own at another
+    visit, and one at this visit where that counts: the nearest whose direction is parallel, each
+    the other's. Two passes have none in a direction in which more than half as many pair when they
+    are displaced by two gates: those would be by chance; and paint has none where the next lane's
+    is near enough to be taken for it.
     Call it again with a better correction, smaller sigma, radius and angle.
 
     Parameters
@@ -42,6 +44,9 @@ def pair_features(
 
     turned : (n, 3) array, optional
         The features' directions as the correction turns them; as recorded by default.
+    pause : float
+        Between two views of one scanner; below that of two visits, those of one visit count.
+        Units: s.
 
     Returns
     -------
@@ -49,8 +54,9 @@ def pair_features(
         Misclosures are of the recorded places, whatever the correction.
     """
     present = features if turned is None else replace(features, direction=turned)
-    pairs = _mutual(present, *candidate_pairs(present, correction, sigma, radius, angle))
-    pairs = pairs[_beyond_chance(present, correction, sigma, radius, angle, pairs)]
+    search = correction, sigma, radius, angle, None, pause
+    pairs = _mutual(present, *candidate_pairs(present, *search))
+    pairs = pairs[_beyond_chance(present, search, pairs)]
     pairs = pairs[_is_unique(present, features.centre + correction, sigma)[pairs].all(axis=1)]
     direction = np.add(*_directions(present, pairs))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -72,7 +78,7 @@ def pair_features(
     )
 
 
-def _beyond_chance(features, correction, sigma, radius, angle, pairs):
+def _beyond_chance(features, search, pairs):
     """Which pairs (k,) are no chance for the most part, as are all of both passes and a direction.
 
     Chance is judged within gates as wide as sigmas make them, whatever the radius, and displaced by
@@ -80,8 +86,8 @@ def _beyond_chance(features, correction, sigma, radius, angle, pairs):
     one of them is known: nearer, a rough surface pairs with itself. The correction chose the place
     where most agree: so of the displaced the fullest counts.
     """
-    radius = max(radius, SETTINGS.least_gate)
-    sigma = np.maximum(sigma, SETTINGS.roughest)
+    correction, sigma, radius, angle, _, pause = search
+    radius, sigma = max(radius, SETTINGS.least_gate), np.maximum(sigma, SETTINGS.roughest)
     widest = _largest_near(features.centre + correction, sigma, radius)
     variance = 2 * (widest**2 + features.variance + SETTINGS.surface_sigma**2)
     gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))
@@ -90,8 +96,8 @@ def _beyond_chance(features, correction, sigma, radius, angle, pairs):
     way[is_pole] = _across(way[is_pole])[0]
     way *= 2 * gate[:, None]
     here, *displaced = (
-        _mutual(features, *candidate_pairs(features, correction, sigma, radius, angle, shift))
-        for shift in (None, way, -way)
+        _mutual(features, *candidate_pairs(features, correction, sigma, radius, angle, s, pause))
+        for s in (None, way, -way)
     )
     is_chance = np.zeros(len(pairs), bool)
     for group in (_passes, _passes_and_direction):
@@ -139,9 +145,16 @@ def _largest_near(place, sigma, edge):
 
 
 def _passes(features, pairs):
-    """Number (k,) of both passes of pairs."""
-    first, second = features.pass_number[pairs].T
-    return first * (features.pass_number.max(initial=0) + 1) + second
+    """Number (k,) of both passes of pairs; views of one visit count as another pass."""
+    first = features.pass_number[pairs[:, 0]]
+    return first * (features.pass_number.max(initial=0) + 1) + _partner_pass(features, *pairs.T)
+
+
+def _partner_pass(features, own, partner):
+    """Pass (k,) of partners; zero, which is none, where a scanner sees a thing again at a visit."""
+    is_again = np.abs(features.gps_time[own] - features.gps_time[partner]) <= SETTINGS.pause
+    is_again &= features.scanner[own] == features.scanner[partner]
+    return np.where(is_again, 0, features.pass_number[partner])
 
 
 def _passes_and_direction(features, pairs):
@@ -173,11 +186,12 @@ def _directions(features, pairs):
 
 
 def _mutual(features, pairs, distance):
-    """Pairs (k, 2) of which each is the other's nearest in its pass."""
+    """Pairs (k, 2) of which each is the other's nearest in its pass, and at its visit."""
     pairs = pairs[np.argsort(distance, kind="stable")]
     nearest = np.ones(len(pairs), bool)
     for feature, partner in (pairs.T, pairs.T[::-1]):
-        key = feature * (features.pass_number.max(initial=0) + 1) + features.pass_number[partner]
+        passes = features.pass_number.max(initial=0) + 1
+        key = feature * passes + _partner_pass(features, feature, partner)
         is_first = np.zeros(len(pairs), bool)
         is_first[np.unique(key, return_index=True)[1]] = True
         nearest &= is_first

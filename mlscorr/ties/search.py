@@ -7,6 +7,7 @@ import numpy as np
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Survey, TieFeatures, Ties
 from mlscorr.ties.agreement import NORMAL_SCATTER, consistent_ties, residuals, weigh_by_time
+from mlscorr.ties.candidates import visit_number
 from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.pairing import pair_features
 from mlscorr.ties.settings import SETTINGS
@@ -47,14 +48,38 @@ def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
     sigma = feature_sigma(survey, features)
     radius = np.sqrt(2) * SETTINGS.gate_sigmas * float(sigma.max(initial=0.0))
     radius = min(max(radius, SETTINGS.least_gate), survey.search_radius)
-    correction = coarse_correction(features, radius)
+    correction, pause = coarse_correction(features, radius), least_pause(survey, features)
     for _ in range(2):  # what the first pairs leave tells how near partners are
-        ties = pair_features(features, correction, sigma, radius)
+        ties = pair_features(features, correction, sigma, radius, pause=pause)
         agree = consistent_ties(ties, correction)
         left = np.abs(residuals(ties[agree], correction))
         if len(left):
             sigma = np.minimum(sigma, 2 * NORMAL_SCATTER * np.median(left))
     return TieSearch(weigh_by_time(ties[agree]), ties[~agree], correction, radius)
+
+
+def least_pause(survey: Survey, features: TieFeatures) -> float:
+    """Seconds between two views of a thing by one scanner, from which on they are a tie.
+
+    Those between visits; but a moment where the only scanner sees things again at a visit, in most
+    moments of it, as one that spins does. A profile scanner does so where it stands or turns alone,
+    which tells too little of what its mounting lacks; and several see what others saw.
+
+    Parameters
+    ----------
+    survey : Survey
+    features : TieFeatures
+    """
+    cells = np.column_stack([np.floor(features.centre / SETTINGS.cell), visit_number(features)])
+    cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
+    order = np.lexsort((features.gps_time, cell))
+    begins = np.flatnonzero(np.diff(cell[order], prepend=-1))
+    time = features.gps_time[order]
+    last = time[np.append(begins[1:], len(time))[: len(begins)] - 1]
+    is_again = (last - time[begins] > SETTINGS.moment)[cell]
+    moments = np.floor(features.gps_time / SETTINGS.moment)
+    is_most = 2 * len(np.unique(moments[is_again])) > len(np.unique(moments))
+    return SETTINGS.moment if is_most and not survey.scanners else SETTINGS.pause
 
 
 def agreeing_ties(ties: Ties, correction: np.ndarray) -> Ties:

@@ -18,8 +18,8 @@ LEFT, RIGHT = (Mounting(ARM, Rotation.from_euler("Z", a, degrees=True)) for a in
 LACKS = np.append([0.01, -0.02, 0.015], np.radians([0.1, -0.05, 0.15]))  # m, rad
 
 
-def seen_twice(survey, lacks):
-    "Ties of the first pass by both scanners, 0.5 to 2 s apart; the second lacks something"
+def seen_twice(survey, lacks, scanners=(0, 1)):
+    "Ties of the first pass by two scanners or one, 0.5 to 2 s apart; the last lacks something"
     rng = np.random.default_rng(SEED)
     first = rng.uniform(2.0, LENGTH - 4.0, NUMBER)
     times = START + np.column_stack([first, first + rng.uniform(0.5, 2.0, NUMBER)])
@@ -27,9 +27,11 @@ def seen_twice(survey, lacks):
     place = np.column_stack([SPEED * first, across, 5 * rng.random(NUMBER)])
     normal = np.eye(3)[rng.integers(3, size=NUMBER)]
     views = np.stack([ORIGIN + place - drift(t - START, SEED) for t in times.T], axis=1)
-    pair = [corrected_mounting(RIGHT, lacks)], [RIGHT]
-    seen = views[:, 1], times[:, 1], np.zeros(NUMBER)
-    views[:, 1] = georeferenced_anew(survey.trajectory, *pair, *seen)
+    recorded = (LEFT, RIGHT)[scanners[1]]
+    pair = [corrected_mounting(recorded, lacks)], [recorded]
+    for view in np.flatnonzero(np.equal(scanners, scanners[1])):
+        seen = views[:, view], times[:, view], np.zeros(NUMBER)
+        views[:, view] = georeferenced_anew(survey.trajectory, *pair, *seen)
     views[:, 1] += NOISE * rng.standard_normal((NUMBER, 1)) * normal
     return replace(
         survey.ties[np.arange(NUMBER) % len(survey.ties)],
@@ -37,7 +39,7 @@ def seen_twice(survey, lacks):
         place=views,
         direction=normal,
         misclosure=np.einsum("ni,ni->n", normal, views[:, 1] - views[:, 0]),
-        scanner=np.tile([0, 1], (NUMBER, 1)),
+        scanner=np.tile(scanners, (NUMBER, 1)),
         feature=np.arange(2 * NUMBER).reshape(-1, 2),
     )
 
@@ -96,3 +98,28 @@ def test_a_second_scanner_that_lacks_something_is_named(tied):
     for sentence in sentences:
         assert sentence.startswith("Scanner right puts what both see elsewhere than left does")
         assert "mlscorr calibrate" in sentence
+
+
+@pytest.fixture(scope="module", params=[0.0, 1.0])
+def again(request, survey, alone):
+    "The estimate with ties of one scanner to itself, and what it lacks"
+    lacks = request.param * LACKS
+    return with_ties(alone, seen_twice(survey, lacks, (0, 0)), (LEFT,)), lacks
+
+
+def test_a_scanner_that_sees_things_again_carries_control_along_one_pass(survey, alone, again):
+    "With ties to itself 3 points leave not half of what they leave alone, whatever it lacks"
+    assert between_control(survey, again[0]) < between_control(survey, alone) / 2
+
+
+def test_what_such_a_scanner_lacks_is_estimated_and_named(again):
+    "Turns about right and up, which look like drift across the way, to 4 sigmas below 0.1 deg"
+    estimate, lacks = again
+    solved = estimate.equations.solve(estimate.parameters)
+    sigma = np.sqrt(np.diag(solved.trend_covariance)[:6])
+    assert (np.abs(solved.trend[:6] - lacks) < 4 * sigma).all()
+    assert (sigma[[3, 5]] < np.radians(0.1)).all()
+    sentences = list(scanner_warnings(estimate, [""]))
+    assert len(sentences) == bool(lacks.any())
+    for sentence in sentences:
+        assert sentence.startswith("The scanner puts what it sees twice elsewhere the second time")

@@ -79,7 +79,7 @@ def test_the_report_tells_what_ties_did(tied, tmp_path):
     """
     section = tied.write(tmp_path / "out")["ties"]
     text = words((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
-    assert "What two passes both saw" in text
+    assert "What was seen twice" in text
     assert "scanned by pass 1" in text and "scanned by pass 2" in text
     assert (tmp_path / "out" / "pictures" / "ties.png").exists()
     assert [row["passes"] for row in section["pairs"]] == [[1, 2]]

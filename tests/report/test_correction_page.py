@@ -146,11 +146,11 @@ def test_the_page_tells_what_two_passes_both_saw(tmp_path):
     write_report(path, survey, correction, report, ties=residuals)
     html = path.read_text(encoding="utf-8")
     text, (pair,) = words(html), report.ties["pairs"]
-    assert 'href="#ties"' in html and "What two passes both saw" in text
+    assert 'href="#ties"' in html and "What was seen twice" in text
     cells = [tables.millimetres(pair[state][key])
              for state in ("before", "after") for key in ("median", "rms")]  # fmt: skip
     assert " ".join(["1 and 2", str(pair["n"]), str(pair["used"]), *cells]) in text
     assert "Grey crosses are not used" in text
     nothing = {"n": 0, "used": 0, "reason": "Nothing was scanned twice."}
     text = words(page(tmp_path, survey, correction, replace(report, ties=nothing)))
-    assert "What two passes both saw" not in text
+    assert "What was seen twice" not in text

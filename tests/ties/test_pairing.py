@@ -80,6 +80,16 @@ def test_two_scanners_see_a_wall_on_the_same_pass():
     assert np.isclose(ties.misclosure, 0.1, atol=1e-9).all()
 
 
+def test_a_scanner_that_spins_sees_a_wall_again_at_a_visit():
+    "Seen after 1.5 s and a minute later: a tie to each, one of them only where visits are enough"
+    times = street.START + np.array([0.0, 1.5, 60.0])
+    features = walls([[0, 0, 0], [0.1, 0.2, 0.1], [0.4, 0.1, 0.0]], [1, 1, 1], time=times)
+    for pause, pairs in ((1.0, [[0, 1], [1, 2]]), (10.0, [[1, 2]])):
+        ties = pair(features, 0.1, pause=pause)
+        assert ties.feature.tolist() == pairs
+    assert len(pair(features[[0, 1]], 0.1, pause=2.0)) == 0
+
+
 def test_a_repeated_facade_is_not_paired_with_the_next_window():
     """Reveals 1.2 m apart, of which each pass sees every other: none is near enough where sigma is
     0.2 m, and where it is 0.6 m those beyond the next pair too

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.survey import Pos
-from mlscorr.ties import feature_sigma, residuals, search_ties
+from mlscorr.ties import SETTINGS, feature_sigma, least_pause, residuals, search_ties
 from tests.beds import tie_streets as street
 
 
@@ -36,3 +36,26 @@ def test_sigma_grows_with_the_distance():
     sigma = feature_sigma(survey, features)
     assert np.allclose(sigma[distance > 8], distance[distance > 8] * np.radians(10.0), rtol=0.01)
     assert sigma.min() > 0.4  # the mounting may be off
+
+
+def test_a_scanner_that_spins_is_tied_to_itself():
+    "Each wall seen again 1.5 s later: ties of one visit; not where it does so for a moment alone"
+    survey, once = street.survey(1), street.features(1, 1)
+    once = once[once.gps_time < survey.trajectory.gps_time[-1] - 1.6]
+    assert least_pause(survey, once) == SETTINGS.pause
+    later = replace(once, gps_time=once.gps_time + 1.5)
+    twice = type(once).concatenate([once, later])
+    assert least_pause(survey, twice) == SETTINGS.moment
+    ties = search_ties(survey, twice).ties
+    assert len(ties) > 100
+    assert (np.diff(ties.gps_time) < SETTINGS.pause).all()
+
+
+def test_a_profile_scanner_that_turns_is_not_tied_to_itself():
+    "Walls seen again 1.5 s later in one of 24 seconds: visits make its ties, as ever"
+    survey, once = street.survey(1), street.features(1, 1)
+    since = once.gps_time - street.START
+    slow = replace(once, gps_time=street.START + 6.0 * since)
+    turning = replace(slow, gps_time=slow.gps_time + 1.5)[6.0 * since < 1.0]
+    assert len(turning) > 10
+    assert least_pause(survey, type(once).concatenate([slow, turning])) == SETTINGS.pause

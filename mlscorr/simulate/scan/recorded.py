@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mlscorr.simulate.scan.rays import Platform
-from mlscorr.survey import Mounting, PointCloud, Survey
+from mlscorr.survey import PointCloud, Survey
 from mlscorr.survey.columns import Columns
-
-NO_MOUNTING = Mounting(np.zeros(3), Rotation.identity())  # beams from the navigation centre
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,17 +32,6 @@ class RecordedPulses(Columns):
     range: np.ndarray
     intensity: np.ndarray
     incidence: np.ndarray
-
-
-def recorded_mounting(survey: Survey) -> Mounting:
-    """The survey's mounting; where it is not known, beams are from the navigation centre, in the
-    body frame.
-
-    Parameters
-    ----------
-    survey : Survey
-    """
-    return NO_MOUNTING if survey.mounting is None else survey.mounting
 
 
 def aim(
@@ -77,7 +63,7 @@ def recorded_platform(survey: Survey, origin: np.ndarray) -> Platform:
     origin : (3,) array
         Map coordinates of the local origin. Units: m.
     """
-    return Platform.of(survey.trajectory, recorded_mounting(survey), np.asarray(origin, float))
+    return Platform.of(survey.trajectory, survey.assumed_mounting, np.asarray(origin, float))
 
 
 def recorded_pulses(

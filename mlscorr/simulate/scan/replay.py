@@ -19,7 +19,7 @@ from numpy.random import Generator
 
 from mlscorr.effects import Reference, Returns, apply_effects, effect_streams
 from mlscorr.simulate.scan.rays import Platform
-from mlscorr.simulate.scan.recorded import RecordedPulses, aim, recorded_mounting, recorded_platform
+from mlscorr.simulate.scan.recorded import RecordedPulses, aim, recorded_platform
 from mlscorr.survey import ControlPoints, Mounting, Survey, Trajectory
 from mlscorr.survey.columns import Columns
 
@@ -160,7 +160,7 @@ class Replay:
 
     @cached_property
     def _mounting(self):
-        recorded = recorded_mounting(self.survey)
+        recorded = self.survey.assumed_mounting
         return without(recorded, self.effects, "mounting", self.reference, _without_mount)
 
 
