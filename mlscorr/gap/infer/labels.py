@@ -124,8 +124,7 @@ def weigh_labels(
     blocks = weigh_blocks(observations, models, residual, table)
     channels = draw_channels(rows, rng, replicas)
     noise = weigh_noise(observations, rows, signatures, blocks, residual, channels)
-    if any(signature.is_common for signature in signatures):
-        noise += weigh_windows(observations, blocks, residual)
+    noise += weigh_windows(observations, signatures, blocks, residual, residual[:, :0])
     score = _scores(table, blocks, noise)
     p = p_value(score)  # before events are refined, as those of replicas are not
     refined = refine_events(rows, survey, observations, table, blocks, signatures)

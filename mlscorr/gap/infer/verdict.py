@@ -18,7 +18,7 @@ from mlscorr.gap.infer.evidence import suited_models, weigh_blocks
 from mlscorr.gap.infer.labels import LabelEvidence, block_scores, noise_scores
 from mlscorr.gap.infer.noise import draw_channels, noisy_pos_models, weigh_noise
 from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.infer.windows import models_with_windows
+from mlscorr.gap.infer.windows import models_with_windows, weigh_windows
 from mlscorr.gap.observe.absence import Absence
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.signatures.signatures import Signature
@@ -230,9 +230,8 @@ def _given(rows, survey, signatures, evidence, first):
         models = noisy_pos_models() + models_with_windows(evidence.noise)
         models = suited_models(observations, table, models, residual)
     else:
-        observations = observations.with_shared(
-            observations.columns(_best_columns(evidence, first))
-        )
+        columns = observations.columns(_best_columns(evidence, first))
+        observations = observations.with_shared(columns)
         models = suited_models(observations, table, error_models(), residual)
         regained = _regained(evidence, first, models, residual)
     blocks = weigh_blocks(observations, models, residual, table)
@@ -244,6 +243,8 @@ def _given(rows, survey, signatures, evidence, first):
     if not is_noise:
         channels = draw_channels(rows, None, 0)
         noise = weigh_noise(observations, rows, signatures, blocks, residual, channels)
+        accepted = SETTINGS.free_sigma * columns
+        noise += weigh_windows(observations, signatures, blocks, residual, accepted)
         scores |= noise_scores(noise, prior)
     return regained, {name: float(values[0]) for name, values in scores.items()}, events
 

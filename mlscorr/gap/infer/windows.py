@@ -7,7 +7,7 @@ others are looked for beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
@@ -20,6 +20,7 @@ from mlscorr.gap.infer.evidence import BlockEvidence
 from mlscorr.gap.infer.noise import NoiseEvidence
 from mlscorr.gap.infer.observations import Observations, model_likelihood
 from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.signatures.signatures import Signature
 
 # In real time an error grows until GNSS is back; smoothed, to the middle. A single one of the
 # latter is position_bump, an effect: as a cause of noise it counts beside other windows alone.
@@ -64,23 +65,33 @@ def models_with_windows(noise: Iterable[NoiseEvidence]) -> list[ErrorModel]:
 
 
 def weigh_windows(
-    observations: Observations, evidence: BlockEvidence, residual: np.ndarray
+    observations: Observations,
+    signatures: Sequence[Signature],
+    evidence: BlockEvidence,
+    residual: np.ndarray,
+    accepted: np.ndarray,
 ) -> tuple[WindowEvidence, ...]:
-    """Evidence of windows of a worse POS; empty where nothing can hold them.
+    """Evidence of windows of a worse POS; empty where nothing can hold or make them.
 
     Parameters
     ----------
     observations : Observations
+    signatures : sequence of Signature
     evidence : BlockEvidence
         Of the same residuals.
     residual : (n, k) array
         Units: m.
+    accepted : (n, q) array
+        Columns of ``observations.shared`` that are a cause: what it explains asks for no window.
     """
     bank = _bank(observations.errors.gps_time)
-    if not bank:
+    if not bank or not any(signature.is_common for signature in signatures):
         return ()
-    score = _excess(observations, residual, (), bank)
     base = evidence.models[int(np.argmax(evidence.none[:, 0]))]
+    whitener = observations.whitener(base)
+    size = whitener.whiten(accepted).product(whitener.whiten(residual))
+    left = residual - accepted @ size
+    score = _excess(observations, left, (), bank)
     largest = np.argsort(-score[:, 0], kind="stable")[: SETTINGS.shortlist]
     chosen = np.append(largest, np.setdiff1d(np.argmax(score, axis=0), largest))
     likelihood = np.array([
@@ -92,7 +103,7 @@ def weigh_windows(
     metric = np.logaddexp.reduce(likelihood - evidence.total, axis=1)
     metric -= np.log(len(bank) * len(SHAPES))
     if metric[:, 0].max() > SETTINGS.refinement:
-        windows, metric[:, 0] = _Search(observations, residual[:, :1], bank).best()
+        windows, metric[:, 0] = _Search(observations, residual[:, :1], left[:, :1], bank).best()
         metric[:, 0] -= evidence.total[0]
     nothing, size = np.zeros_like(metric), np.asarray(SETTINGS.window_factors)
     return (WindowEvidence(PositionNoise.name, -1, size, metric, nothing, windows),)
@@ -134,10 +145,11 @@ def _score(observations, residual, base, windows):
 
 @dataclass(frozen=True)
 class _Search:
-    """For the windows that explain one residual column (n, 1)."""
+    """For the windows that explain one residual column (n, 1), where its rest (n, 1) is large."""
 
     observations: Observations
     residual: np.ndarray
+    left: np.ndarray
     bank: list[Window]
 
     def score(self, base, windows):
@@ -151,7 +163,7 @@ class _Search:
         first = windows
         evidence = self.score(base, windows) + prior
         while True:
-            score = _excess(self.observations, self.residual, windows, self.bank)[:, 0]
+            score = _excess(self.observations, self.left, windows, self.bank)[:, 0]
             beside = [self.bank[i] for i in np.argsort(-score, kind="stable")]
             beside = [w for w in beside if not w.overlaps(windows)][: SETTINGS.shortlist]
             tries = [
@@ -181,7 +193,7 @@ class _Search:
         """Model and window that explain the column best, from the best of each length and shape,
         as each may stay where it is.
         """
-        excess = _excess(self.observations, self.residual, (), self.bank)[:, 0]
+        excess = _excess(self.observations, self.left, (), self.bank)[:, 0]
         results = []
         for length in SETTINGS.window_lengths:
             held = [i for i, window in enumerate(self.bank) if window.length == length]
