@@ -237,6 +237,8 @@ def _tie_equations(equations, ties, mountings):
     rows = TieEquations.of(equations.trajectory, equations.pos, ties, equations.stated, free)
     if not free:
         return equations, rows
+    if not first:  # what two visits of one scanner disagree by is drift
+        rows = replace(rows, mounting=rows.mounting * ties.is_of_visit[:, None])
     sigma = np.array([prior_sigma(mounting) for mounting in mountings])
     sigma = np.hypot(sigma[1:], sigma[0]).ravel() if first else sigma[0]
     nothing = np.zeros((len(equations.names), 3, len(sigma)))

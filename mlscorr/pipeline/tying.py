@@ -158,10 +158,8 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
     limit = 0.0
     moved = _moved(correction, features)
-    pause = least_pause(survey, features)
-    mountings = () if None in survey.mountings else survey.mountings
-    if not survey.scanners:
-        mountings = (survey.assumed_mounting,) if pause < SETTINGS.pause else ()
+    pause, least = SETTINGS.pause, least_pause(survey, features)
+    mountings = survey.mountings if survey.scanners and None not in survey.mountings else ()
     moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
     while True:
         pairs = pair_features(features, moved, sigma, radius, pause=pause)
@@ -169,7 +167,13 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
             pairs = pairs[pairs.scanner[:, 0] == pairs.scanner[:, 1]]
         ties = agreeing_ties(pairs, moved)
         if len(ties) == 0:
-            return _untied(estimate, features, radius)
+            estimate = _untied(estimate, features, radius)
+        if least < pause and (len(ties) == 0 or radius <= limit):
+            # visits come first: metres apart, they had no tie within the gates of a single one
+            pause, mountings = least, (survey.assumed_mounting,)
+            continue
+        if len(ties) == 0:
+            return estimate
         if radius <= limit:
             unheld = _unheld(estimate, features, ties)
             return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
@@ -232,6 +236,8 @@ def without_control(survey: Survey) -> Survey:
 
 def _untied(estimate, features, radius):
     """The estimate with the reason why nothing is tied, a warning where something should be."""
+    if estimate.untied:
+        return estimate
     passes, near = len(np.unique(features.pass_number)), _revisited(features, radius)
     what = (
         f"{near} of {len(features)} planes, poles and markings of {counted(passes, 'pass')} "

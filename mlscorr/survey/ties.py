@@ -10,6 +10,7 @@ from mlscorr.survey.columns import Columns
 
 PAINTED = ("line", "dash")  # on the road
 TIE_KINDS = ("plane", "pole", *PAINTED)  # of features
+PAUSE = 10.0  # s between two visits of one pass: until then the POS error is about one
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -169,6 +170,12 @@ class Ties(Columns):
     def sigma(self) -> np.ndarray:
         """One sigma (n,) of the noise. Units: m."""
         return np.sqrt(self.variance)
+
+    @property
+    def is_of_visit(self) -> np.ndarray:
+        """Whether one scanner saw a thing twice at one visit, as one that spins does: (n,) bool."""
+        first, second = self.gps_time.T
+        return (np.abs(second - first) <= PAUSE) & (self.scanner[:, 0] == self.scanner[:, 1])
 
 
 def _midway(features, pairs, place):

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from mlscorr.survey.ties import PAUSE
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -29,7 +31,7 @@ class Settings:
     coarse_features: int = 6000  # for six unknowns of a mounting; more cost time alone
     block: float = 4.0  # m: neighbours that are kept together, so that two passes keep the same
     # Pairs
-    pause: float = 10.0  # s between two visits of one pass: until then the POS error is about one
+    pause: float = PAUSE  # s between two visits of one pass
     parallel: float = 0.14  # rad, 8 deg: normals of few points, and a boresight off by 4 deg
     gate_sigmas: float = 3.0  # 3 in 1 000 normal errors lie beyond
     least_gate: float = 2.0  # m: a boresight off by 2 deg, of both passes, 30 m away
