@@ -1,4 +1,4 @@
-"""The map of what two passes both saw, coloured by how far apart they lie there."""
+"""The map of what was seen twice, coloured by how far apart they lie there."""
 
 import numpy as np
 from matplotlib.colors import ListedColormap, LogNorm
@@ -45,7 +45,7 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
         panel.set_title(title)
         panel.label_outer()
     bar = figure.colorbar(dots, ax=panels, pad=0.01, extend="min", format="%g")
-    bar.set_label("How far apart the two passes lie (mm)")
+    bar.set_label("How far apart both views lie (mm)")
     legend_above(figure, _legend(used))
     return figure
 
@@ -55,7 +55,7 @@ def _legend(used):
     handles = [Line2D([], [], label="Trajectory (corrected)", **TRACK)]
     dot = {"linestyle": "none", "marker": "o", "markersize": 3, "color": "#5b2a86"}
     if used.any():
-        handles.append(Line2D([], [], label="Seen by two passes", **dot))
+        handles.append(Line2D([], [], label="Seen twice", **dot))
     if not used.all():
         words = "Not used: contradicts the others"
         handles.append(Line2D([], [], linestyle="none", label=words, **MARKS["unused"]))

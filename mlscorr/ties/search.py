@@ -63,7 +63,8 @@ def least_pause(survey: Survey, features: TieFeatures) -> float:
 
     Those between visits; but a moment where the only scanner sees things again at a visit, in most
     moments of it, as one that spins does. A profile scanner does so where it stands or turns alone,
-    which tells too little of what its mounting lacks; and several see what others saw.
+    which tells too little of what its mounting lacks; several see what others saw; and of sessions
+    without a mounting nobody knows that they have the same.
 
     Parameters
     ----------
@@ -79,7 +80,9 @@ def least_pause(survey: Survey, features: TieFeatures) -> float:
     is_again = (last - time[begins] > SETTINGS.moment)[cell]
     moments = np.floor(features.gps_time / SETTINGS.moment)
     is_most = 2 * len(np.unique(moments[is_again])) > len(np.unique(moments))
-    return SETTINGS.moment if is_most and not survey.scanners else SETTINGS.pause
+    is_one = survey.mounting is not None or survey.trajectory.session is None
+    is_one &= not survey.scanners
+    return SETTINGS.moment if is_most and is_one else SETTINGS.pause
 
 
 def agreeing_ties(ties: Ties, correction: np.ndarray) -> Ties:

@@ -109,6 +109,25 @@ def test_one_pass_is_named_as_the_reason_in_terminal_report_and_page(commanded):
     assert reason in words((out / "report.html").read_text(encoding="utf-8"))
 
 
+def test_one_pass_of_a_scanner_that_spins_is_tied_to_itself(tmp_path):
+    "Things seen for seconds as it passes: ties of one visit, which agree to 6 mm"
+    rings = np.linspace(-15.0, 15.0, 16).tolist()
+    spinning = {"kind": "spinning", "rings": rings, "boresight": [-30.0, 0.0, 0.0]}
+    scenario = Scenario(
+        drive={"duration": 14.0, "speed": 6.0},
+        targets={"control": 3, "check": 1},
+        scanner=[{**spinning, "lines_per_second": 10.0, "points_per_line": 400}],
+    )
+    simulate(scenario, np.random.default_rng(5)).write(tmp_path)
+    result = mlscorr.correct(mlscorr.read_survey(tmp_path))
+    ties = result.estimate.ties
+    assert ties.used.sum() > 50
+    assert ties.ties.is_of_visit.all()
+    _, after = misfit(result)
+    assert after < 0.006  # m
+    assert (ties.ties.pass_number == 1).all()
+
+
 def tied_street(features):
     "The bed's street with some TieFeatures, under what its POS states"
     recorded = street_bed.survey()

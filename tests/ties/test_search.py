@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from mlscorr.survey import Pos
+from mlscorr.survey import Mounting, Pos
 from mlscorr.ties import SETTINGS, feature_sigma, least_pause, residuals, search_ties
 from tests.beds import tie_streets as street
 
@@ -46,9 +47,14 @@ def test_a_scanner_that_spins_is_tied_to_itself():
     later = replace(once, gps_time=once.gps_time + 1.5)
     twice = type(once).concatenate([once, later])
     assert least_pause(survey, twice) == SETTINGS.moment
+    session = np.zeros(len(survey.trajectory), int)
+    joined = replace(survey, trajectory=replace(survey.trajectory, session=session))
+    assert least_pause(joined, twice) == SETTINGS.pause  # of vehicles that may differ
+    same = replace(joined, mounting=Mounting(np.zeros(3), Rotation.identity()))
+    assert least_pause(same, twice) == SETTINGS.moment
     ties = search_ties(survey, twice).ties
     assert len(ties) > 100
-    assert (np.diff(ties.gps_time) < SETTINGS.pause).all()
+    assert ties.is_of_visit.all()
 
 
 def test_a_profile_scanner_that_turns_is_not_tied_to_itself():
