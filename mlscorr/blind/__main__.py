@@ -20,8 +20,7 @@ def main() -> None:
     seeds = range(given.first, given.first + given.worlds)
     mechanisms = outside_mechanisms()
     records = collect(given.folder, seeds, given.cases, mechanisms, given.replicas)
-    probabilities = [learned().probabilities(each.joint) for each in records]
-    print_figures(records, probabilities)
+    print_figures(records, [learned().probabilities(each.joint) for each in records])
     p = [learned().calibrated(r.p_value) for r in records if r.p_value is not None]
     if p:
         low = np.mean(np.array(p) < 0.05)

@@ -54,8 +54,7 @@ def _case(kind, turns, rng):
     elif kind != "clean":
         is_noise = kind == "noise"
         mdb = float(rng.uniform(*(SETTINGS.noise_sizes if is_noise else SETTINGS.clear_sizes)))
-    other = [name for name in SYSTEMATIC if name not in names]
-    without = str(rng.choice(other))
+    without = str(rng.choice([name for name in SYSTEMATIC if name not in names]))
     return Case(kind, names, mdb, names[0] if kind == "withheld" else without)
 
 

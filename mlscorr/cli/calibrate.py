@@ -16,9 +16,7 @@ def calibrate(
     with_drift: Annotated[
         bool, typer.Option("--with-drift", help="Estimate the POS error too; write trajectory.csv.")
     ] = False,
-    no_ties: Annotated[
-        bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")
-    ] = False,
+    no_ties: terminal.NoTies = False,
     clouds: Annotated[
         bool, typer.Option("--clouds", help="Write the clouds as the calibration puts them.")
     ] = False,

@@ -30,8 +30,7 @@ def compare(
 
         clouds = list(dict.fromkeys(method_named(name).name for name in clouds))
     with work(out, overwrite, survey) as progress:
-        recorded = mlscorr.read_survey(survey)
-        result = mlscorr.compare(recorded, progress=progress)
+        result = mlscorr.compare(mlscorr.read_survey(survey), progress=progress)
         report = result.write(out, clouds, overwrite, progress)
     print_json(report, as_json)
     _tell(report, out)

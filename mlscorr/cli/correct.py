@@ -26,9 +26,7 @@ def correct(
     sigma: Annotated[
         bool, typer.Option("--sigma", help="Add to each point one sigma of its E, N and H.")
     ] = False,
-    no_ties: Annotated[
-        bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")
-    ] = False,
+    no_ties: terminal.NoTies = False,
     ties_only: Annotated[
         bool, typer.Option("--ties-only", help="Bring passes together without any control point.")
     ] = False,

@@ -48,6 +48,7 @@ Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Print errors and warnings only.")
 ]
+NoTies = Annotated[bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 

@@ -43,8 +43,7 @@ def _gather(layout, i, states, same, following, columns, joint):
 
     Process by process, its states at i before those at i + 1; zeros where there is no node.
     """
-    n = states.shape[0]
-    has_left, has_right = i >= 0, i + 1 < n
+    has_left, has_right = i >= 0, i + 1 < states.shape[0]
     for j in range(layout.first.size):
         a, d = layout.first[j], layout.states[layout.signal[j]]
         for p in range(d):

@@ -182,7 +182,6 @@ def collocate_literal(
         factor = cholesky(blocks.reshape(n * r, n * r) + noise.matrix, lower=True)
     except LinAlgError as problem:
         raise ValueError(NOT_POSITIVE.format(n * r)) from problem
-    rows = np.arange(len(factor))
-    solver = DenseSolver(np.repeat(gps_time, r), (), (), rows, factor)
+    solver = DenseSolver(np.repeat(gps_time, r), (), (), np.arange(len(factor)), factor)
     solved = solve_trend(solver, misclosure.ravel(), design.reshape(n * r, -1))  # Eq. 13
     return LiteralCollocation(gps_time, misclosure, noise, design, tuple(signals), solved)

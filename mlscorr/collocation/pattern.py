@@ -65,8 +65,7 @@ class Pattern(NamedTuple):
         edges : (e, 2) int array
             Pairs of nodes, in any order and more than once.
         """
-        count = len(sizes)
-        place = _elimination_order(count, edges)
+        place = _elimination_order(len(sizes), edges)
         place = _postorder(*_filled(place, edges))[place]
         row, column = _filled(place, edges)
         ordered = np.asarray(sizes, dtype=np.int64)[np.argsort(place)]

@@ -47,8 +47,7 @@ class HeadingDrift(Effect):
     )
 
     def _change(self, value, reference, rng):
-        number = value.segment(value.gps_time)
-        start, end = value.passes[number].T
+        start, end = value.passes[value.segment(value.gps_time)].T
         share = (value.gps_time - start) / np.where(end > start, end - start, 1.0)
         turn = np.zeros((len(value), 3))
         turn[:, 2] = -np.radians(self.magnitude) * share  # heading is clockwise, Z is up

@@ -210,8 +210,7 @@ class Equations(Summary):
             signals = () if parameters is None else self._signals(parameters)
             return collocate(self.gps_time, self.misclosure, self.noise, self.design, signals)
         rows = self.rows(parameters)
-        near = None if like is None else like.solver
-        return collocate_rows(rows, near, self.tolerance)
+        return collocate_rows(rows, None if like is None else like.solver, self.tolerance)
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
         """As solve, for the likelihood alone: few rows with ties by their covariance matrix.

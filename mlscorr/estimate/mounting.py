@@ -37,10 +37,7 @@ from mlscorr.survey import SAME_EPOCH, Matched, Mounting, Pos, Trajectory
 # The matrices are small: on a busy machine threads would wait longer than they work
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def estimate_mounting(
-    trajectory: Trajectory,
-    mountings: Sequence[Mounting],
-    matched: Matched,
-    pos: Pos | None = None,
+    trajectory: Trajectory, mountings: Sequence[Mounting], matched: Matched, pos: Pos | None = None
 ) -> Calibration:
     """Estimate what recorded mountings lack from matched targets  (Mao et al. 2015, Eq. 16-18).
 
@@ -75,10 +72,7 @@ def estimate_mounting(
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def believed_mounting(
-    trajectory: Trajectory,
-    mountings: Sequence[Mounting],
-    matched: Matched,
-    pos: Pos | None = None,
+    trajectory: Trajectory, mountings: Sequence[Mounting], matched: Matched, pos: Pos | None = None
 ) -> Calibration:
     """What is known of mountings before ties, where control points can't tell them alone.
 

@@ -98,8 +98,7 @@ def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
     names : sequence of str
         Of all scanners.
     """
-    equations = estimate.equations
-    solved = equations.solve(estimate.parameters)
+    solved = estimate.equations.solve(estimate.parameters)
     scale = np.append(np.full(3, 1000.0), np.full(3, np.degrees(1.0)))
     least = np.repeat(SETTINGS.determined_sigma, 3)
     for number, name in enumerate(names[1:] or names):

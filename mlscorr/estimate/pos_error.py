@@ -150,8 +150,7 @@ def estimate_correction(
     filled, notes = checked_inputs(trajectory, matched, pos, order)
     equations, screening, windows = _screened(filled, matched, pos, order)
     kept = equations.without({outlier.name for outlier in screening.outliers})
-    sparse = sparse_warnings(kept, order, equations.order)
-    notes = (*notes, *map(str, windows), *sparse)
+    notes = (*notes, *map(str, windows), *sparse_warnings(kept, order, equations.order))
     return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes)
 
 

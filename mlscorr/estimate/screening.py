@@ -147,8 +147,7 @@ def _eliminate(equations, parameters, objective):
     yield names, score
     while may_go(equations, names | {""}):
         kept = equations.without(names)
-        solved = kept.solve(parameters)
-        gains = _gains(solved, kept.target_rows)
+        gains = _gains(kept.solve(parameters), kept.target_rows)
         worst = max(gains, key=gains.get, default=None)
         if worst is None or gains[worst] < -np.log(SETTINGS.strong_evidence):
             return

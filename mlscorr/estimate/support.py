@@ -145,8 +145,7 @@ def _reasons(equations, solved, parameters, corrected):
     time, control = trajectory.gps_time, np.sort(equations.observed)
     if len(control) == 0:
         return np.full(len(time), NO_CONTROL)
-    is_open = _is_drift_open(equations, solved, parameters, corrected)
-    codes = np.where(is_open, DRIFT, HELD)
+    codes = np.where(_is_drift_open(equations, solved, parameters, corrected), DRIFT, HELD)
     if equations.ties is not None:
         return codes
     for first, last in pairwise(equations.stated.history.edges):

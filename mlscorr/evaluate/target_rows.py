@@ -113,8 +113,7 @@ def unseen_rows(
 def _no_pose(point: ControlPoints, survey, candidates):
     """Why a target was not seen, when points near it have no pose; else None."""
     distance = np.linalg.norm(candidates.unplaced.xyz - point.position, axis=1)
-    radius = search_radius(survey, point)[0]
-    times = candidates.unplaced.gps_time[distance <= radius]
+    times = candidates.unplaced.gps_time[distance <= search_radius(survey, point)[0]]
     if len(times) == 0:
         return None
     return (

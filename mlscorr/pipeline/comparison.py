@@ -150,5 +150,4 @@ def _cross_validated(method, survey, control, candidates, groups, of_check, done
             why = f"Without {', '.join(sorted(group))}: {problem}"
         else:
             parts.append(misclosures(control[left_out], correction))
-    left = np.vstack(parts)
-    return {**_statistics(left, why is None and bool(groups)), "why": why}
+    return {**_statistics(np.vstack(parts), why is None and bool(groups)), "why": why}

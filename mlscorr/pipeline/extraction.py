@@ -14,13 +14,7 @@ import numpy as np
 from mlscorr.io.las import read_chunks
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_extracted_csv
-from mlscorr.pipeline.finding import (
-    Finding,
-    fit_while_reading,
-    match_targets,
-    silent,
-    unmatched,
-)
+from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, silent, unmatched
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, TargetObservations, check_survey
 from mlscorr.survey.data_frame import rows_frame

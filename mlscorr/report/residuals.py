@@ -60,8 +60,7 @@ def _column(panels, rows, name):
             at = np.flatnonzero(groups == group)
             style = {"linestyle": "none", "elinewidth": 0.9, **MARKS[group]}
             panel.errorbar(at, values[at, axis], sigma[at, axis], **style)
-    largest = np.nanmax(np.abs(values) + sigma, initial=0.0)
-    half = 1.08 * max(SETTINGS.difference, largest)
+    half = 1.08 * max(SETTINGS.difference, np.nanmax(np.abs(values) + sigma, initial=0.0))
     panels[0].set_ylim(-half, half)
     return half
 

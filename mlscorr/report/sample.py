@@ -105,5 +105,4 @@ def _is_near(chunk, cells):
     if len(cells) == 0:
         return np.zeros(len(chunk), bool)
     number = _number(*np.floor(chunk.xyz[:, :2] / SETTINGS.plan_cell).astype(np.int64).T)
-    place = np.minimum(np.searchsorted(cells, number), len(cells) - 1)
-    return cells[place] == number
+    return cells[np.minimum(np.searchsorted(cells, number), len(cells) - 1)] == number

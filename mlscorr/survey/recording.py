@@ -150,11 +150,6 @@ class Survey(Summary):
         """The mounting; where none is known, beams are from the navigation centre, in body axes."""
         return self.mounting or Mounting(np.zeros(3), Rotation.identity())
 
-    @property
-    def lever_arm(self) -> np.ndarray:
-        """The scanner (3,) in body axes; zero where no mounting is known. Units: m."""
-        return self.assumed_mounting.lever_arm
-
     @cached_property
     def by_scanner(self) -> dict[str, Survey]:
         """The survey of each scanner by its name: its files, its mounting, what is believed of it.

@@ -60,8 +60,7 @@ def bright_regions(xyz: np.ndarray, intensity: np.ndarray) -> list[BrightRegion]
     level = _levels(intensity)
     edge = 2 * SETTINGS.largest_size / 3  # of a third of a neighbourhood
     cell, keys_of, keys, number = number_voxels(xyz, low, edge)
-    dark = _background(cell, keys_of, keys, number, level)
-    bright = np.flatnonzero(level > dark[cell])
+    bright = np.flatnonzero(level > _background(cell, keys_of, keys, number, level)[cell])
     thick, long = SETTINGS.thickness, 1 / SETTINGS.smallest_width
     limits = SETTINGS.smallest_count, np.sqrt(2) * SETTINGS.largest_size, thick, long
     table = _component_tree(xyz[bright] - low, level[bright], SETTINGS.largest_size / 10, limits)

@@ -43,7 +43,7 @@ class ScannerPath:
         before = np.searchsorted(time, gps_time.min(), "right") - 1
         before = int(np.clip(before, 0, len(time) - 2))
         epochs = slice(before, max(before + 2, np.searchsorted(time, gps_time.max()) + 1))
-        arm = trajectory.attitude[epochs].apply(survey.lever_arm)
+        arm = trajectory.attitude[epochs].apply(survey.assumed_mounting.lever_arm)
         return cls(time[epochs], trajectory.position[epochs] + arm)
 
     def at(self, gps_time: np.ndarray) -> np.ndarray:

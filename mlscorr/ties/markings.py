@@ -73,8 +73,7 @@ def find_markings(crossings: Crossings, start: float) -> TieFeatures:
     since = crossings.gps_time - start
     whole = _connected(crossings, window_of(since))
     moment = np.floor(since / SETTINGS.moment)
-    cell = np.floor(crossings.place[:, :2] / SETTINGS.cell)
-    pieces = _numbered(whole, moment, cell)
+    pieces = _numbered(whole, moment, np.floor(crossings.place[:, :2] / SETTINGS.cell))
     dashes = _with_both_ends(fit_stripes(crossings, whole), start)
     return TieFeatures.concatenate([_lines(fit_stripes(crossings, pieces)), _dashes(dashes)])
 
@@ -83,8 +82,7 @@ def _lines(pieces):
     """Pieces of lines: where they are across."""
     # what all crossings share of their edges doesn't scatter; across the line it is less than along
     # the scan lines, but for those that cross straight
-    shared = np.maximum(pieces.edges - pieces.width, 0.0)
-    variance = shared + pieces.width / pieces.count
+    variance = np.maximum(pieces.edges - pieces.width, 0.0) + pieces.width / pieces.count
     across = np.cross(pieces.along, [0.0, 0.0, 1.0])
     return _features("line", pieces, pieces.centre, across, variance, np.sqrt(pieces.length))
 
@@ -135,8 +133,7 @@ def _with_both_ends(dashes, start):
 
 def _numbered(*columns):
     """Number (n,) from 0 of each different row of columns (n,) or (n, k)."""
-    keys = np.column_stack(columns)
-    return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    return np.unique(np.column_stack(columns), axis=0, return_inverse=True)[1].ravel()
 
 
 def _connected(crossings, window):

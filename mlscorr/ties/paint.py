@@ -44,8 +44,7 @@ def find_crossings(cloud: PointCloud, passes: np.ndarray, group: int) -> Crossin
         Of the first segment.
     """
     limits = np.array([SETTINGS.widest_paint, SETTINGS.contrast, SETTINGS.largest_lean])
-    rows = bright_runs(cloud.xyz, cloud.intensity, limits)
-    before, first, last, after = rows.T
+    before, first, last, after = bright_runs(cloud.xyz, cloud.intensity, limits).T
     edges = ((before, first), (last, after))
     gaps = [np.linalg.norm(cloud.xyz[a] - cloud.xyz[b], axis=1) for a, b in edges]
     time = (cloud.gps_time[first] + cloud.gps_time[last]) / 2

@@ -27,8 +27,10 @@ def test_points_of_all_files_are_counted():
 
 def test_without_a_mounting_the_scanner_stands_at_the_pos():
     "The lever arm of an unknown mounting is zero"
-    assert np.array_equal(SURVEY.lever_arm, MOUNTING.lever_arm)
-    assert not replace(SURVEY, mounting=None).lever_arm.any()  # m
+    assert SURVEY.assumed_mounting is MOUNTING
+    assumed = replace(SURVEY, mounting=None).assumed_mounting
+    assert not assumed.lever_arm.any()  # m
+    assert assumed.boresight.magnitude() == 0.0  # rad
 
 
 def with_scanners():

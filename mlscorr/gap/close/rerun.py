@@ -143,8 +143,7 @@ def _views_of(rows, beams):
         place = np.minimum(np.searchsorted(beams.item[numbers], rows.item), len(numbers) - 1)
         here = beams.item[numbers[place]] == rows.item
         views[here, column] = numbers[place[here]]
-    known = views[:, 0] >= 0
-    other = known & (beams.gps_time[views[:, 0]] != rows.gps_time)
+    other = (views[:, 0] >= 0) & (beams.gps_time[views[:, 0]] != rows.gps_time)
     if other.any():
         raise ValueError(
             f"{other.sum()} of {len(rows)} rows have another time than in the Beams: collect the "

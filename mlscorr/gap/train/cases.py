@@ -17,12 +17,7 @@ from mlscorr.gap.train.draws import draw_effects, draw_mechanism, names_to_try
 from mlscorr.gap.train.errors import process
 from mlscorr.gap.train.sizing import Ruler, draw_effect
 from mlscorr.gap.train.worlds import World
-from mlscorr.simulate.mechanisms import (
-    Described,
-    described,
-    load_mechanisms,
-    training_mechanisms,
-)
+from mlscorr.simulate.mechanisms import Described, described, load_mechanisms, training_mechanisms
 from mlscorr.simulate.pos import interpolate
 from mlscorr.survey import Survey
 

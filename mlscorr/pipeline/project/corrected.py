@@ -76,8 +76,7 @@ def corrected_drives(
     if joint.is_single and area is None:
         whole = CorrectedSurvey(**drive_fields(joint.drives[0], estimate))
         return [(whole, states[0])]
-    notes = [tied_sentence(state) for state in states]
-    estimates = drive_estimates(joint, estimate, notes)
+    estimates = drive_estimates(joint, estimate, [tied_sentence(state) for state in states])
     places = place_control(estimate)
     section = {} if area is not None else tie_section(estimate) or {}  # an area is no drive
     results = []

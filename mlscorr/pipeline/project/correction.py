@@ -156,8 +156,7 @@ class _Work:
     def result(self) -> ProjectResult:
         """The stages in their order."""
         planned = self._planned()
-        origin = np.floor(planned[0].survey.trajectory.position[0])
-        keys = self._estimated(planned, origin)
+        keys = self._estimated(planned, np.floor(planned[0].survey.trajectory.position[0]))
         clouds = self._clouds(planned, keys)
         drives = self._reports(planned, keys, clouds)
         older = older_clouds(self.out, clouds)

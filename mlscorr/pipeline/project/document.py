@@ -49,8 +49,7 @@ def drive_result(corrected: CorrectedSurvey, state: DriveState) -> DriveResult:
     """
     trajectory = corrected.trajectory
     sigma = np.linalg.norm(trajectory.position_sigma, axis=1)
-    seconds = np.floor(trajectory.gps_time)
-    rows = np.unique(seconds, return_index=True)[1]
+    rows = np.unique(np.floor(trajectory.gps_time), return_index=True)[1]
     parts = trajectory.segment(trajectory.gps_time[rows])
     track = np.column_stack([trajectory.position[rows, :2], sigma[rows]])
     track = np.insert(track, np.flatnonzero(np.diff(parts)) + 1, np.nan, axis=0)

@@ -117,8 +117,7 @@ def _part(joint, estimate, number, note):
 def _cut(correction, trajectory, shift):
     """The Correction of a drive's epochs, and the way before these (m)."""
     whole = correction.corrected
-    ends = trajectory.gps_time[[0, -1]] + shift
-    first, last = np.searchsorted(whole.gps_time, ends)
+    first, last = np.searchsorted(whole.gps_time, trajectory.gps_time[[0, -1]] + shift)
     rows, way = slice(first, last + 1), np.diff(whole.position[: first + 1], axis=0)
     chainage = float(np.linalg.norm(way, axis=1).sum())
     corrected = Trajectory(

@@ -76,8 +76,7 @@ class JointDrives:
     @property
     def bases(self) -> np.ndarray:
         """Number (k,) of the passes before those of each drive."""
-        counts = [drive.passes for drive in self.drives]
-        return np.cumsum([0, *counts[:-1]])
+        return np.cumsum([0, *(drive.passes for drive in self.drives[:-1])])
 
     def drive_numbers(self, pass_number: np.ndarray) -> np.ndarray:
         """Number of the drive of each pass, from 0.

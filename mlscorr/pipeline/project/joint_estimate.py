@@ -71,8 +71,7 @@ def _tied(joint, estimate):
     number = len(joint.drives)
     pairs = np.empty((2, 0), int)
     if estimate.ties is not None:
-        passes = estimate.ties.ties.pass_number[estimate.ties.used]
-        pairs = joint.drive_numbers(passes).T
+        pairs = joint.drive_numbers(estimate.ties.ties.pass_number[estimate.ties.used]).T
     graph = coo_array((np.ones(pairs.shape[1], bool), pairs), shape=(number, number))
     return _grouped(joint.drives, connected_components(graph, directed=False)[1])
 

@@ -161,8 +161,6 @@ def _passes(place, ties):
     """Pass of each visit by the nearest tie of its time; () where two visits are of one pass."""
     time, number = ties.gps_time.ravel(), ties.pass_number.ravel()
     away = np.linalg.norm(ties.place.reshape(-1, 3) - place.focus, axis=1)
-    visit, passes = np.searchsorted(place.splits, time), []
-    for k in range(len(place.splits) + 1):
-        near = np.where(visit == k, away, np.inf)
-        passes.append(int(number[near.argmin()]))
+    visit, visits = np.searchsorted(place.splits, time), range(len(place.splits) + 1)
+    passes = [int(number[np.where(visit == k, away, np.inf).argmin()]) for k in visits]
     return tuple(passes) if len(set(passes)) == len(passes) else ()

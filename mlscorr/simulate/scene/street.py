@@ -132,8 +132,7 @@ class Street:
         """
         on_road = np.abs(lateral) < self.section.half_width(s)
         earlier = self.line.distance_to_other_parts(middle, s, earlier=True)
-        any_part = self.line.distance_to_other_parts(middle, s)
-        other = np.where(on_road, earlier, any_part)
+        other = np.where(on_road, earlier, self.line.distance_to_other_parts(middle, s))
         folded = self.line.distance(middle) < np.abs(lateral) - self.section.clearance
         return (other > self.section.road) & ~folded
 

@@ -159,8 +159,7 @@ def leaves(
     place *= rng.uniform(0.1, 1.0, (count, 1)) ** (1 / 3) / np.linalg.norm(
         place, axis=1, keepdims=True
     )
-    axes = np.array([forward, np.cross(forward, UP), UP])
-    middle = centre + (place * radii) @ axes
+    middle = centre + (place * radii) @ np.array([forward, np.cross(forward, UP), UP])
     corners = rng.standard_normal((count, 3, 3))
     corners -= corners.mean(axis=1, keepdims=True)
     corners *= edge / np.linalg.norm(corners, axis=2, keepdims=True).mean(axis=1, keepdims=True)
