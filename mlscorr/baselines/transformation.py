@@ -111,8 +111,7 @@ def fit_rigid(matched: Matched) -> Transformation:
     surveyed = pairs.observed + pairs.misclosure - pairs.mean
     left, _, right = np.linalg.svd((pairs.weight * pairs.observed).T @ surveyed)
     sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    rotation = right.T @ sign @ left.T
-    return Transformation(pairs.origin, pairs.mean, rotation - np.eye(3))
+    return Transformation(pairs.origin, pairs.mean, right.T @ sign @ left.T - np.eye(3))
 
 
 def fit_affine(matched: Matched) -> Transformation:

@@ -77,8 +77,7 @@ class MapScale(Effect):
     )
 
     def _error(self, value, reference, rng):
-        arm = (value.position - reference.place) * [1.0, 1.0, 0.0]
-        return self.magnitude * arm
+        return self.magnitude * ((value.position - reference.place) * [1.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)

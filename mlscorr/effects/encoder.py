@@ -37,8 +37,7 @@ class AngleScale(Effect):
     )
 
     def _error(self, value, reference, rng):
-        from_zero = np.mod(value.angle + np.pi, 2 * np.pi) - np.pi
-        return self.magnitude * from_zero
+        return self.magnitude * (np.mod(value.angle + np.pi, 2 * np.pi) - np.pi)
 
 
 @dataclass(frozen=True)

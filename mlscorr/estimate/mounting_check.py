@@ -111,11 +111,13 @@ def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
             both = list(zip(scale * lacks, scale * sigma, strict=True))
             arm = ", ".join(f"{a:.0f} ± {s:.0f}" for a, s in both[:3])
             turn = ", ".join(f"{a:.2f} ± {s:.2f}" for a, s in both[3:])
-            who = "The scanner puts what it sees twice elsewhere the second time"
+            who = "The scanner puts what it sees twice elsewhere the second time:"
             if len(names) > 1:
-                who = f"Scanner {name} puts what both see elsewhere than {names[0]} does: beside it"
+                who = (
+                    f"Scanner {name} puts what both see elsewhere than {names[0]} does: beside it,"
+                )
             yield (
-                f"{who}, its lever arm lacks {arm} mm to the right, forward, up, and its boresight "
+                f"{who} its lever arm lacks {arm} mm to the right, forward, up, and its boresight "
                 f"{turn} deg about them. No drift is made of it, "
                 "but its points keep it. Run mlscorr calibrate first, and correct with the "
                 "mountings that it writes."

@@ -231,15 +231,18 @@ def _tie_equations(equations, ties, mountings):
     """Equations with all mountings but the first, or the only one, and TieEquations with the same
     drift.
     """
-    first = min(len(mountings) - 1, 1)
-    free = {number: mountings[number] for number in range(max(first, 0), len(mountings))}
+    free = dict(enumerate(mountings))
+    if len(free) > 1:
+        del free[0]  # which the others are compared with
     rows = TieEquations.of(equations.trajectory, equations.pos, ties, equations.stated, free)
     if not free:
         return equations, rows
-    if not first:  # what two visits of one scanner disagree by is drift
-        rows = replace(rows, mounting=rows.mounting * ties.is_of_visit[:, None])
     sigma = np.array([prior_sigma(mounting) for mounting in mountings])
-    sigma = np.hypot(sigma[1:], sigma[0]).ravel() if first else sigma[0]
+    if 0 in free:  # what two visits of one scanner disagree by is drift
+        rows = replace(rows, mounting=rows.mounting * ties.is_of_visit[:, None])
+    else:
+        sigma = np.hypot(sigma[1:], sigma[0])
+    sigma = sigma.ravel()
     nothing = np.zeros((len(equations.names), 3, len(sigma)))
     return with_mountings(equations, nothing, np.zeros(len(sigma)), sigma), rows
 

@@ -32,6 +32,7 @@ from mlscorr.ties import (
     pair_features,
     residuals,
     thinned_ties,
+    time_spans,
     unheld_directions,
     unheld_sentence,
 )
@@ -262,22 +263,14 @@ def _revisited(features, radius):
     """Number of features in cells as wide as a radius that were scanned at two visits."""
     cells = np.floor(features.centre / radius)
     cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
-    first, last = _spans(cell, features.gps_time)
+    first, last = time_spans(cell, features.gps_time)
     return int(np.count_nonzero((last - first)[cell] > SETTINGS.pause))
-
-
-def _spans(number, gps_time):
-    """First and last time (k,) of each number. Units: s."""
-    first, last = np.multiply.outer([np.inf, -np.inf], np.ones(number.max(initial=-1) + 1))
-    np.minimum.at(first, number, gps_time)
-    np.maximum.at(last, number, gps_time)
-    return first, last
 
 
 def _unheld(estimate, features, ties):
     """Sentences on passes between which neither ties nor control of both hold a direction."""
     control = estimate.equations.observed
-    first, last = _spans(features.pass_number, features.gps_time)
+    first, last = time_spans(features.pass_number, features.gps_time)
 
     def controlled(number):
         return ((control >= first[number]) & (control <= last[number])).any()

@@ -91,7 +91,7 @@ def _pairs_near(cells, edge, visit, number, side, views, limits):
 
     Views come in the order of the cells of an edge. Of each visit those of a number count that are
     nearest to a view: of visits before where it is displaced to the side 1, of visits after where
-    to the side -1, else of all others.
+    to the side -1, else of all others; of its own visit in each case, beyond the pause.
     """
     points, shift, gps_time, pause = views[0], views[1], views[4], limits[2]
     count, columns = len(points), float(1 << CELL_BITS)

@@ -11,7 +11,7 @@ from mlscorr.ties.candidates import visit_number
 from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.pairing import pair_features
 from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import thinned_ties
+from mlscorr.ties.thinning import thinned_ties, time_spans
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,9 @@ def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
     sigma = feature_sigma(survey, features)
     radius = np.sqrt(2) * SETTINGS.gate_sigmas * float(sigma.max(initial=0.0))
     radius = min(max(radius, SETTINGS.least_gate), survey.search_radius)
-    correction, pause = coarse_correction(features, radius), least_pause(survey, features)
-    for _ in range(2):  # what the first pairs leave tells how near partners are
+    correction = coarse_correction(features, radius)
+    # what the first pairs, of visits, leave tells how near partners are
+    for pause in (SETTINGS.pause, least_pause(survey, features)):
         ties = pair_features(features, correction, sigma, radius, pause=pause)
         agree = consistent_ties(ties, correction)
         left = np.abs(residuals(ties[agree], correction))
@@ -73,11 +74,8 @@ def least_pause(survey: Survey, features: TieFeatures) -> float:
     """
     cells = np.column_stack([np.floor(features.centre / SETTINGS.cell), visit_number(features)])
     cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
-    order = np.lexsort((features.gps_time, cell))
-    begins = np.flatnonzero(np.diff(cell[order], prepend=-1))
-    time = features.gps_time[order]
-    last = time[np.append(begins[1:], len(time))[: len(begins)] - 1]
-    is_again = (last - time[begins] > SETTINGS.moment)[cell]
+    first, last = time_spans(cell, features.gps_time)
+    is_again = (last - first > SETTINGS.moment)[cell]
     moments = np.floor(features.gps_time / SETTINGS.moment)
     is_most = 2 * len(np.unique(moments[is_again])) > len(np.unique(moments))
     is_one = survey.mounting is not None or survey.trajectory.session is None
