@@ -63,8 +63,8 @@ def least_pause(survey: Survey, features: TieFeatures) -> float:
     """Seconds between two views of a thing by one scanner, from which on they are a tie.
 
     Those between visits; but a moment where the only scanner sees things again at a visit, in most
-    moments of it, as one that spins does. A profile scanner does so where it stands or turns alone,
-    which tells too little of what its mounting lacks; several see what others saw; and of sessions
+    moments of it, as one that spins does. A profile scanner does so where it turns alone, which
+    tells too little of what its mounting lacks; several see what others saw; and of sessions
     without a mounting nobody knows that they have the same.
 
     Parameters
@@ -75,12 +75,14 @@ def least_pause(survey: Survey, features: TieFeatures) -> float:
     cells = np.column_stack([np.floor(features.centre / SETTINGS.cell), visit_number(features)])
     cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
     first, last = time_spans(cell, features.gps_time)
-    is_again = (last - first > SETTINGS.moment)[cell]
+    began, ended = (survey.trajectory.at(time).position for time in (first, last))
+    # a slow profile takes longer for a cell than a moment, too, but has hardly left it then
+    is_left = np.linalg.norm(ended - began, axis=1) > SETTINGS.cell
+    is_again = (is_left & (last - first > SETTINGS.moment))[cell]
     moments = np.floor(features.gps_time / SETTINGS.moment)
     is_most = 2 * len(np.unique(moments[is_again])) > len(np.unique(moments))
-    is_one = survey.mounting is not None or survey.trajectory.session is None
-    is_one &= not survey.scanners
-    return SETTINGS.moment if is_most and is_one else SETTINGS.pause
+    is_known = survey.mounting is not None or survey.trajectory.session is None
+    return SETTINGS.moment if is_most and is_known and not survey.scanners else SETTINGS.pause
 
 
 def agreeing_ties(ties: Ties, correction: np.ndarray) -> Ties:

@@ -57,11 +57,21 @@ def test_a_scanner_that_spins_is_tied_to_itself():
     assert ties.is_of_visit.all()
 
 
-def test_a_profile_scanner_that_turns_is_not_tied_to_itself():
-    "Walls seen again 1.5 s later in one of 24 seconds: visits make its ties, as ever"
+def slowed(times):
+    "A survey of one pass that takes so many times as long, and what it saw once"
     survey, once = street.survey(1), street.features(1, 1)
-    since = once.gps_time - street.START
-    slow = replace(once, gps_time=street.START + 6.0 * since)
-    turning = replace(slow, gps_time=slow.gps_time + 1.5)[6.0 * since < 1.0]
-    assert len(turning) > 10
-    assert least_pause(survey, type(once).concatenate([slow, turning])) == SETTINGS.pause
+    drive, seen = (
+        replace(part, gps_time=street.START + times * (part.gps_time - street.START))
+        for part in (survey.trajectory, once)
+    )
+    return replace(survey, trajectory=drive), seen
+
+
+@pytest.mark.parametrize(("times", "seconds"), [(6.0, 1.0), (20.0, 70.0)])
+def test_a_profile_scanner_is_not_tied_to_itself(times, seconds):
+    "Walls seen again 1.5 s later, in one of 24 seconds or on foot: visits make its ties, as ever"
+    survey, seen = slowed(times)
+    again = replace(seen, gps_time=seen.gps_time + 1.5)
+    again = again[seen.gps_time - street.START < seconds]
+    assert len(again) > 10
+    assert least_pause(survey, type(seen).concatenate([seen, again])) == SETTINGS.pause

@@ -192,5 +192,4 @@ def _extend(path):
     """A path of steps of a metre, longer by the margin at both ends."""
     steps = np.arange(1.0, SETTINGS.margin + 1.0)[:, None]
     before = path[0] - steps[::-1] * (path[5] - path[0]) / 5
-    after = path[-1] + steps * (path[-1] - path[-6]) / 5
-    return np.vstack([before, path, after])
+    return np.vstack([before, path, path[-1] + steps * (path[-1] - path[-6]) / 5])
