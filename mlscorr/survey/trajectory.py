@@ -98,9 +98,8 @@ class Trajectory(Summary):
         """
         gps_time = np.asarray(gps_time, dtype=float)
         starts, ends = self.passes.T
-        number = np.maximum(np.searchsorted(starts, gps_time, side="right") - 1, 0)
-        inside = (gps_time >= starts[number]) & (gps_time <= ends[number])
-        return np.where(inside, number, -1)
+        number = np.searchsorted(starts, gps_time, side="right") - 1
+        return np.where(gps_time <= ends[number], number, -1)
 
     def recorded_time(self, start: float, end: float) -> float:
         """Time from start to end without the gaps that lie whole between them. Units: s."""

@@ -61,47 +61,59 @@ class PointsInBalls:
     """
 
     def __init__(self, balls: Neighbourhoods):
-        self._balls, self._parts = balls, []
+        self._balls, self._parts, self._read = balls, [], 0
         self._first = np.full(len(balls.position), np.inf)
         self._last = -self._first
+        self._size, self._taken = np.zeros((2, len(balls.position)), int)
 
     def __len__(self):
-        return sum(map(len, self._parts))
+        return sum(len(part) for _, part, _ in self._parts)
 
     def add(self, cloud: PointCloud) -> None:
         """Hold points, each in a ball at least."""
-        self._parts.append(cloud)
+        self._read, wanted = self._read + 1, np.zeros(len(cloud), np.uint16)
         for ball, rows in enumerate(self._balls.each(cloud.xyz)):
             time = cloud.gps_time[rows]
             self._first[ball] = min(self._first[ball], time.min(initial=np.inf))
             self._last[ball] = max(self._last[ball], time.max(initial=-np.inf))
+            self._size[ball] += len(rows)
+            wanted[rows] += 1
+        self._parts.append((self._read, cloud, wanted))
 
     def since(self) -> float:
         """Time of the oldest point. Units: s."""
         return float(self._first.min(initial=np.inf))
 
     def passed(self, before: float) -> np.ndarray:
-        """Numbers (k,) of the balls with points of which none is later than a time (s)."""
-        return np.flatnonzero((self._last > -np.inf) & (self._last < before))
+        """Numbers (k,) of the balls with points of which none is later than a time (s).
 
-    def inside(self, number: int) -> PointCloud:
-        """Points in a ball from its middle (m), as they were read."""
-        ball = self._balls[np.array([number])]
-        rows = [ball.contains(part.xyz) for part in self._parts]
-        ends = np.cumsum([len(k) for k in rows])
-        xyz, columns = np.empty((ends[-1], 3)), []  # filled by parts, as dense balls are large
-        for part, k, places in zip(self._parts, rows, np.split(xyz, ends[:-1]), strict=True):
-            np.subtract(part.xyz[k], ball.position, out=places)
-            columns.append((part.gps_time[k], part.intensity[k]))
-        return PointCloud(xyz, *map(np.concatenate, zip(*columns, strict=True)))
+        Those of fewest points come first: when the largest is taken, little else is held.
+        """
+        numbers = np.flatnonzero((self._last > -np.inf) & (self._last < before))
+        return numbers[np.argsort(self._size[numbers], kind="stable")]
 
-    def release(self, numbers: np.ndarray) -> None:
-        """Let go of what is in these balls (k,) alone."""
-        self._first[numbers], self._last[numbers] = np.inf, -np.inf
-        others = self._balls[np.isfinite(self._last)]
-        for number, part in enumerate(self._parts):
-            self._parts[number] = part[others.contains(part.xyz)]
-        self._parts = list(filter(len, self._parts))
+    def take(self, number: int) -> PointCloud:
+        """Points in a ball from its middle (m), as they were read.
+
+        Those that no other ball waits for are let go of part by part, as dense balls are large.
+        """
+        ball, size, end = self._balls[np.array([number])], self._size[number], 0
+        kind = self._parts[0][1].intensity.dtype
+        cloud = PointCloud(np.empty((size, 3)), np.empty(size), np.empty(size, kind))
+        for place, (read, part, wanted) in enumerate(self._parts):
+            if read > self._taken[number]:
+                rows = ball.contains(part.xyz)
+                there = slice(end, end := end + len(rows))
+                np.subtract(part.xyz[rows], ball.position, out=cloud.xyz[there])
+                cloud.gps_time[there] = part.gps_time[rows]
+                cloud.intensity[there] = part.intensity[rows]
+                wanted[rows] -= 1
+                if not (kept := wanted > 0).all():
+                    self._parts[place] = read, part[kept], wanted[kept]
+        self._parts = [entry for entry in self._parts if len(entry[1])]
+        self._first[number], self._last[number] = np.inf, -np.inf
+        self._size[number], self._taken[number] = 0, self._read
+        return cloud
 
 
 def collect(
@@ -137,10 +149,8 @@ def collect(
     unplaced, starts = [NO_POINTS], {}
 
     def hand_on(file, held, before, latest):
-        passed = held.passed(before)
-        for index in passed:
-            fit(file, index, held.inside(index))
-        held.release(passed)
+        for index in held.passed(before):
+            fit(file, index, held.take(index))
         settled(min(held.since(), latest))
 
     for number, file in enumerate(survey.clouds):

@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 
 @cache
@@ -13,18 +12,26 @@ def quasi_random(count: int, dimensions: int, block: int = 0) -> np.ndarray:
 
     Parameters
     ----------
-    count, dimensions : int
+    count : int
+    dimensions : int
+        Up to five.
     block : int
         Number of the block of so many points, each unlike the others.
 
     Returns
     -------
     (count, dimensions) array
-        Of the Halton sequence (Halton 1960).
+        Of the Halton sequence (Halton 1960): a number's digits behind the point, in a prime base
+        for each dimension. As scipy.stats.qmc gives it, whose import costs each worker of a
+        project 0.4 s and 35 MB.
     """
-    sequence = qmc.Halton(dimensions, scramble=False)
-    sequence.fast_forward(1 + block * count)  # the first point is a corner
-    return sequence.random(count)
+    points = np.zeros((count, dimensions))
+    for k, base in enumerate((2, 3, 5, 7, 11)[:dimensions]):
+        left, weight = np.arange(count) + block * count + 1, 1 / base  # that of zero is a corner
+        while left.any():
+            points[:, k] += weight * (left % base)
+            left, weight = left // base, weight / base
+    return points
 
 
 @cache

@@ -30,16 +30,25 @@ def split_visits(cloud: PointCloud, survey: Survey) -> list[tuple[int, PointClou
     A pause of two seconds parts two visits, and so does a turn back (a U-turn before a target); a
     stop is one visit.
     """
-    segment = survey.trajectory.segment(cloud.gps_time)
-    if (segment < 0).any() or (np.diff(cloud.gps_time) < 0).any():
-        order = np.argsort(cloud.gps_time, kind="stable")
-        order = order[segment[order] >= 0]
-        cloud, segment = cloud[order], segment[order]
-    is_new = (np.diff(cloud.gps_time) > MATCHING.pause) | (np.diff(segment) != 0)
-    ends = np.unique([0, *(np.flatnonzero(is_new) + 1), len(cloud)])
-    turns = [first + _turns(cloud.gps_time[first:last], survey) for first, last in pairwise(ends)]
+    time = cloud.gps_time
+    if (time[1:] < time[:-1]).any():
+        cloud = cloud[np.argsort(time, kind="stable")]
+    starts, ends = survey.trajectory.passes.T
+    firsts, lasts = (np.searchsorted(cloud.gps_time, *at) for at in ((starts,), (ends, "right")))
+    return [
+        (number, visit)
+        for number in np.flatnonzero(firsts < lasts).tolist()
+        for visit in _visits(cloud[firsts[number] : lasts[number]], survey)
+    ]
+
+
+def _visits(cloud, survey):
+    """The points in order of time of each visit, of those of a segment of the trajectory."""
+    time = cloud.gps_time
+    ends = np.unique([0, *(np.flatnonzero(np.diff(time) > MATCHING.pause) + 1), len(time)])
+    turns = [first + _turns(time[first:last], survey) for first, last in pairwise(ends)]
     ends = np.unique(np.concatenate([ends, *turns]))
-    return [(int(segment[first]), cloud[first:last]) for first, last in pairwise(ends)]
+    return [cloud[first:last] for first, last in pairwise(ends)]
 
 
 def _turns(gps_time, survey):

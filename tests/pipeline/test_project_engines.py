@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -101,6 +102,16 @@ def test_parts_that_are_needed_together_fail_by_name(tmp_path):
             run.all_results([task(n) for n in numbers])
         assert run.all_results([task(n) for n in numbers if n > 0]) == [9, 4, 16]
     assert [outcome.seconds for outcome in ends[len(numbers) :]] == [0.0, 0.0, 0.0]
+
+
+def test_long_tasks_are_begun_first(tmp_path):
+    "What has most points, or most to be looked at again, ends first; alike ones keep their order"
+    ends, points = [], {1: (5, 0.0), 2: (7, 0.0), 3: (5, 3.5), 4: (5, 0.0)}
+    tasks = [replace(task(n), points=size, again=more) for n, (size, more) in points.items()]
+    with engine() as chosen:
+        run = Run(TaskStore(tmp_path), chosen, lambda outcome: ends.append(outcome.name))
+        assert list(run.results(tasks).values()) == [1, 4, 9, 16]
+    assert ends == ["square-3", "square-2", "square-1", "square-4"]
 
 
 def test_a_lost_worker_is_counted_and_its_task_done_again(tmp_path):

@@ -88,12 +88,16 @@ def test_a_ball_is_passed_by_itself():
     held = PointsInBalls(balls)
     held.add(PointCloud(ORIGIN + np.outer(north, [0, 1, 0]), START + north, north))
     assert held.passed(START + 2.0).tolist() == [0]
-    assert held.inside(0).intensity.tolist() == [-1.0, 1.5]
-    assert held.inside(1).xyz[:, 1] == pytest.approx([-1.5, 1.0])  # m, from its middle
-    held.release(np.array([0]))
+    assert held.take(0).intensity.tolist() == [-1.0, 1.5]
     assert len(held) == 2 and held.since() == START + 1.5  # s
     assert held.passed(START + 2.0).tolist() == [] and held.passed(np.inf).tolist() == [1]
-    assert len(held.inside(1)) == 2
+    held.add(
+        PointCloud(ORIGIN[None] + np.eye(3)[1:2] * 1.5, np.array([START + 9.0]), np.array([9.0]))
+    )
+    assert held.passed(np.inf).tolist() == [0, 1]  # with fewest points first
+    assert held.take(0).intensity.tolist() == [9.0]  # not again what it was given before
+    assert held.take(1).xyz[:, 1] == pytest.approx([-1.5, 1.0, -1.5])  # m, from its middle
+    assert len(held) == 0 and held.since() == np.inf
 
 
 def test_passes_without_a_target_count_too():

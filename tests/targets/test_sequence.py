@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from mlscorr.targets.sequence import quasi_random
 
@@ -11,6 +12,13 @@ def test_points_fill_the_cube_more_evenly_than_random_ones(dimensions):
     assert points.shape == (600, dimensions)
     assert 0 < points.min() < points.max() < 1
     assert np.abs(points.mean(axis=0) - 0.5).max() < 0.2 * 5 / np.sqrt(12 * 600)
+
+
+def test_points_are_those_of_another_implementation():
+    "Those of scipy from its second point on, to the last bit, in the fourth block of 500"
+    halton = qmc.Halton(5, scramble=False)
+    halton.fast_forward(1 + 3 * 500)
+    assert np.array_equal(quasi_random(500, 5, 3), halton.random(500))
 
 
 def test_blocks_differ_and_each_comes_back():

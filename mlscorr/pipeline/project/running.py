@@ -93,8 +93,11 @@ class Run:
         return result, texts
 
     def _outcomes(self, tasks) -> Iterator[tuple[Task, Outcome]]:
-        """Each task with its Outcome, as they end."""
-        waiting, suspects, running = deque(tasks), deque(), {}
+        """Each task with its Outcome, as they end; long ones are begun first, so that all workers
+        end at about the same time.
+        """
+        waiting = deque(sorted(tasks, key=lambda task: -task.points - task.again))
+        suspects, running = deque(), {}
         losses: dict[str, int] = {}
         while waiting or suspects or running:
             is_single = bool(suspects)  # what lost a worker is tried by itself: it may be to blame

@@ -173,15 +173,24 @@ def finding_tasks(
     tasks = []
     for file in survey.clouds:
         own, identity = survey.of(file), drive.identities[file.path]
-        near = near_boxes(survey, survey.surveyed, [drive.boxes[file.path]])
+        box = drive.boxes[file.path]
+        near = near_boxes(survey, survey.surveyed, [box])
         near = near[np.argsort(np.array(near.name, dtype=str), kind="stable")]
         inputs = FindingInput(store.folder, kept, file, identity, near, origin, with_ties)
         where = near.name, near.position, near.kind, near.size, near.normal
         given = identity, file.time_constant, file.point_source_ids, own.mounting, own.scanner
         key = digest(core, *given, *where, origin, with_ties)
-        name = task_name(survey.name, file)
-        tasks.append(Task("findings", key, survey.name, name, file.points, find, (inputs,)))
+        name, again = task_name(survey.name, file), file.points * _share_near(survey, near, box)
+        tasks.append(Task("findings", key, survey.name, name, file.points, find, (inputs,), again))
     return tasks
+
+
+def _share_near(survey, points, box):
+    """Share of a box within reach of surveyed points, by area, added up over these."""
+    low, high = box[:, :2]
+    reach = search_radius(survey, points)[:, None]
+    ends = np.clip([points.position[:, :2] + sign * reach for sign in (-1, 1)], low, high)
+    return ((ends[1] - ends[0]) / np.maximum(high - low, 1e-9)).prod(axis=1).sum()
 
 
 def cloud_tasks(

@@ -31,10 +31,12 @@ class Task:
     name : str
         Of what it works on.
     points : int
-        How much work it is.
+        That it works on.
     function : function
     arguments : tuple
         Paths and small values.
+    again : float
+        Points expected near surveyed points, once for each of these: they are looked at again.
     """
 
     kind: str
@@ -44,6 +46,7 @@ class Task:
     points: int
     function: Callable
     arguments: tuple
+    again: float = 0.0
 
 
 @dataclass(frozen=True)
