@@ -191,8 +191,10 @@ class Equations(Summary):
     @cached_property
     def target_rows(self) -> dict[str, np.ndarray]:
         """Rows of the observation equations of each target, all its passes together."""
-        names = np.repeat(self.names, 3)
-        return {str(name): np.flatnonzero(names == name) for name in dict.fromkeys(self.names)}
+        rows: dict[str, list[int]] = {}
+        for row, name in enumerate(np.repeat(self.names, 3).tolist()):
+            rows.setdefault(str(name), []).append(row)
+        return {name: np.array(own) for name, own in rows.items()}
 
     def solve(
         self, parameters: SignalParameters | None, like: Collocation | None = None

@@ -59,8 +59,10 @@ def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameter
         before = starts
         for number, segment in enumerate(segments):
             part = _about(equations, *segment[:2])
+            candidates = _candidates(times, *segment)
             best = Objective.of(part.with_starts(starts))(INTEGRATED, mode)
-            for candidate in _candidates(times, *segment):
+            best += np.log(len(candidates)) * (starts[number] == segment[0])
+            for candidate in candidates:
                 tried = np.where(np.arange(len(starts)) == number, candidate, starts)
                 value = Objective.of(part.with_starts(tried))(INTEGRATED, mode)
                 if value > best:

@@ -225,8 +225,9 @@ def choose_parameters(
     chosen = zip([row[0] for row in probable], (share / share.sum()).tolist(), strict=True)
     by_share = tuple(chosen)
     ties = 0 if equations.ties is None else len(equations.ties)  # a row each, targets have three
-    if max(len(equations.names), ties / 3) > SETTINGS.block:  # so many know the parameters well
-        return Posterior(by_share, by_share)
+    is_known = max(len(equations.names), ties / 3) > SETTINGS.block
+    if is_known or not ties + 3 * len(equations.names) > equations.design.shape[-1]:
+        return Posterior(by_share, by_share)  # so many know them well; none: what is stated stands
     drawn = []
     for (parameters, probability), (_, value) in zip(by_share, probable, strict=True):
         if probability > SETTINGS.smallest_share:
@@ -253,9 +254,18 @@ def _points(objective, family, mode, covariance, value, probability, pairs):
 
 
 def _blocks(equations):
-    """The equations in blocks of time, each with the trend that its epochs can carry."""
+    """The equations in blocks of targets, each with the trend that its epochs can carry.
+
+    A target is in one block with all its passes, which judge each other; they follow each other as
+    they were first seen, so that a block is a stretch of the street.
+    """
     number = -(-len(equations.names) // SETTINGS.block)
     if number <= 1 or equations.ties is not None:  # which may link any two blocks
         return (equations.affordable(),)
-    parts = np.array_split(np.argsort(equations.observed, kind="stable"), number)
-    return tuple(equations.select(part).without_outer_fallbacks().affordable() for part in parts)
+    order = np.argsort(equations.observed, kind="stable")
+    _, first, target, counts = np.unique(equations.names[order], True, True, True)
+    before, rank = np.empty(len(first), int), np.argsort(first)
+    before[rank] = np.cumsum(counts[rank]) - counts[rank]
+    block = (before * number // len(order))[target]
+    parts = (equations.select(order[block == k]) for k in np.unique(block))
+    return tuple(part.without_outer_fallbacks().affordable() for part in parts)

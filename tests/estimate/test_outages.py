@@ -63,6 +63,21 @@ def test_the_start_of_an_outage_is_found_between_control_points(outages):
         assert stated.starts[0] == pytest.approx(START + 80.0, abs=25.0)
 
 
+def test_nothing_that_control_does_not_tell_makes_the_head_surer_than_the_tail():
+    "A constant error and sigma: 40 s before the first control are as open as 40 s after the last"
+    error, ends = np.tile([0.1, -0.05, 0.03], (len(TIME), 1)), []
+    for times in (np.linspace(40.0, 237.0, 10), np.linspace(2.9, 199.9, 10)):
+        trajectory, matched = survey(np.random.default_rng(0), error, times)
+        stated = np.full((len(TIME), 3), 0.5)  # m
+        trajectory = replace(trajectory, position_sigma=stated)
+        estimate = estimate_correction(trajectory, matched)
+        sigma = np.linalg.norm(estimate.correction.corrected.position_sigma, axis=1)
+        ends.append(sigma[[0, -1]])
+    head, tail = ends[0][0], ends[1][1]
+    assert 0.7 < head / tail < 1.4
+    assert head < 0.05  # m, where an error was the same for 200 s
+
+
 def test_ties_tell_when_an_outage_began_where_no_control_point_does():
     "With control at both ends of the drive alone the start is found within 8 s in every drive"
     for seed in range(3):

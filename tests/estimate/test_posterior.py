@@ -16,7 +16,7 @@ from mlscorr.estimate.posterior import (
     choose_parameters,
     most_probable,
 )
-from mlscorr.estimate.prior import NAMES, Prior, mounting_prior
+from mlscorr.estimate.prior import NAMES, Prior, mounting_prior, position_prior
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.survey import Pos
@@ -169,6 +169,32 @@ def test_more_drift_than_stated_raises_its_scale():
     case = Case(EPOCHS, wave, even(14), rng, np.full((len(EPOCHS), 3), 0.01))
     best = most_probable(case.equations())[0][0]
     assert 3.0 < max(best.drift_scale, best.bias_scale) < 30.0
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.5])
+def test_what_is_stated_stands_where_nothing_can_tell_its_scale(sigma):
+    "A single control point leaves 100 s away from it what the POS states, to a factor of three"
+    case = Case(EPOCHS, CONSTANT, [100.0], np.random.default_rng(3), np.full((2001, 3), sigma))
+    corrected = case.estimate().correction.corrected
+    largest = corrected.position_sigma.max(axis=0)
+    assert (sigma < largest).all() and (largest < 3 * sigma).all()  # m
+
+
+def test_a_target_is_in_one_block_with_all_its_passes():
+    "Of 150 targets seen twice each has both looks in its block, and blocks are alike in size"
+    times = np.sort(np.random.default_rng(4).uniform(2.0, 198.0, 300))
+    case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4))
+    names = np.array(case.control.name[:150] * 2)
+    matched = case.matched
+    matched = replace(
+        matched,
+        observations=replace(matched.observations, name=tuple(names)),
+        surveyed=replace(matched.surveyed, name=tuple(names)),
+    )
+    equations = position_equations(case.recorded, matched, Pos(), 0, position_prior)
+    blocks = Objective.of(equations).blocks
+    assert [len(block.names) for block in blocks] == [100, 100, 100]
+    assert all(len(rows) == 6 for block in blocks for rows in block.target_rows.values())
 
 
 def test_large_surveys_are_cut_into_blocks_of_time():

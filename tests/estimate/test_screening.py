@@ -1,8 +1,12 @@
 """Gross errors in control, what the control points can't tell, and input that is wrong."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from mlscorr.estimate import estimate_correction
+from mlscorr.survey import Matched
+from tests.beds import lying_pos
 from tests.beds.pos_errors import (
     CONSTANT,
     EPOCHS,
@@ -60,6 +64,22 @@ def test_neighbours_wrong_together_are_rejected_or_told():
         wrong = set(case.observations.name[first : first + 2])
         named = {outlier.name for outlier in estimate.outliers}
         assert wrong <= named or any("follow each other" in text for text in estimate.warnings)
+
+
+def test_a_target_that_is_wrong_in_one_of_two_passes_is_found_among_many():
+    "Of 60 targets, each seen again 120 s later, the second look at one is off by 0.3 m: it goes"
+    rng, first = np.random.default_rng(3), np.linspace(3.0, 117.0, 60)
+    error = np.tile([0.1, -0.05, 0.03], (len(lying_pos.TIME), 1))
+    looks = lying_pos.survey(rng, error, np.append(first, first + 120.0))
+    names = 2 * looks[1].observations.name[:60]
+    place = looks[1].observations.position + np.outer(np.arange(120) == 67, [0.3, 0.0, 0.0])
+    observations = replace(looks[1].observations, name=names, position=place)
+    matched = Matched(observations, replace(looks[1].surveyed, name=names))
+    estimate = estimate_correction(looks[0], matched)
+    assert [outlier.name for outlier in estimate.outliers] == ["T07"]
+    assert len(estimate.tests) == 59 and {len(test.w) for test in estimate.tests} == {2}
+    moved = estimate.correction.corrected.position - looks[0].position
+    assert np.abs(moved - error).max() < 0.02  # m
 
 
 def test_a_bias_that_the_pos_does_not_state_is_corrected_beside_one_that_it_does():
