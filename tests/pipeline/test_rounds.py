@@ -1,11 +1,16 @@
 """Effect after effect into the simulator, until nothing is left."""
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
+from mlscorr.io.survey_file import read_survey
+from mlscorr.pipeline.diagnosis import diagnose
+from mlscorr.pipeline.rounds import DiagnosedRounds
 from mlscorr.simulate.simulator_file import read_simulator
 from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
@@ -38,6 +43,18 @@ def test_one_command_finds_the_cause_and_then_none(survey, tmp_path):
     assert rounds[0]["parameters"][0]["estimate"] == pytest.approx(0.02, abs=1e-3)
     (effect,) = read_simulator(out / "simulator.toml").effects
     assert effect.magnitude == pytest.approx(0.02, abs=1e-3)
+
+
+def test_what_has_no_bound_is_null(survey, tmp_path):
+    "A parameter without a detectable size, as the time of a jump: the document has None, and JSON"
+    first = diagnose(read_survey(survey))
+    inference = first.inference
+    size = replace(inference.cause.parameters[0], detectable=np.nan)
+    cause = replace(inference.cause, parameters=(size,))
+    inference = replace(inference, causes=(cause, *inference.causes[1:]))
+    rounds = DiagnosedRounds((replace(first, inference=inference),), ())
+    told = rounds.write(tmp_path / "out")
+    assert told["ablation"]["rounds"][0]["parameters"][0]["detectable"] is None
 
 
 def test_another_simulator_cannot_run_here(survey, tmp_path):
