@@ -79,6 +79,11 @@ def register(kind: type[Effect]) -> type[Effect]:
     size = kind.quantities().get("magnitude")
     if size is None or not size.typical or not size.source:
         raise ValueError(f"{kind.name} has no magnitude with unit, typical size and its source.")
+    if not kind.name.isidentifier() or kind.name in ("none", "noise", "unknown"):
+        raise ValueError(
+            f"{kind.name!r} can't name an effect: take letters, digits and _, and none of the "
+            "answers none, noise and unknown."
+        )
     if kind.name in {known.name for known in EFFECTS}:
         raise ValueError(f"{kind.name} is an effect of mlscorr already; take another name.")
     _known_stage(kind.stage)

@@ -49,7 +49,9 @@ def test_a_file_registers_its_effects(tmp_path):
 
 @pytest.mark.parametrize(("text", "said"), [
     ("x = (", "line 1"), ("1 / 0", "ZeroDivisionError: division by zero"),
-    ("x = 1", "registers no effect"),
+    ("x = 1", "registers no effect"), ("raise SystemExit(0)", "SystemExit: 0"),
+    (CLASS.format(name="a+b", body="0.0"), "'a\\+b' can't name an effect"),
+    (CLASS.format(name="none", body="0.0"), "none of the answers none, noise and unknown"),
 ])  # fmt: skip
 def test_a_file_that_cannot_be_used_is_refused(tmp_path, text, said):
     "With the line or the error that it raises, and no traceback"
@@ -69,7 +71,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
     ("nothing", "np.zeros(3)", "No row of this survey depends on it"),
     ("everything", "np.array([0.0, 0.0, 1e5])", "Is its unit right"),
     ("nan", "np.array([0.0, 0.0, np.nan])", "not a number"),
-    ("raises", "value.speed", "AttributeError"),
+    ("raises", "value.speed", "AttributeError"), ("leaves", "exit(0)", "SystemExit"),
 ])  # fmt: skip
 def test_an_effect_that_cannot_be_applied_is_left_out(tmp_path, name, body, said):
     "It changes nothing, everything, into no numbers, or raises: the reason is said"

@@ -131,18 +131,20 @@ def _tried(bench, kind, bank, rng):
         return [signature(bench, kind, fixed, rng) for fixed in bank]
     try:
         signs = [signature(bench, kind, fixed, rng) for fixed in bank]
-    except Exception as error:  # of a user's code: it is left out, not the diagnosis
+    except (Exception, SystemExit) as error:  # of a user's code: it is left out, not the diagnosis
         return f"It can't be applied to this survey: {type(error).__name__}: {error}"
     metric, largest = bench.rows.metric, SETTINGS.largest_shift
+    single = metric & ~bench.rows.two_times  # what moves all alike leaves two looks where they are
     for sign in signs:
-        moved = np.abs(sign.jacobian[metric] * sign.typical)
-        if not all(np.isfinite(v).all() for v in (moved, sign.variance, sign.growth)):
+        moved = np.abs(sign.jacobian * sign.typical)
+        if not all(np.isfinite(v).all() for v in (moved[metric], sign.variance, sign.growth)):
             return "It makes values that are no numbers."
-        if moved.size and np.median(moved.max(axis=1)) > largest:
+        usual = np.median(moved[single if single.any() else metric].max(axis=1, initial=0.0))
+        if usual > largest:
             return (
                 f"At its usual size, {sign.typical[0]:g} {sign.units[0]}, it moves points by "
-                f"{np.median(moved.max(axis=1)):.3g} m in the median: more than {largest:g} m no "
-                "survey is off everywhere. Is its unit right?"
+                f"{usual:.3g} m in the median: more than {largest:g} m no survey is off "
+                "everywhere. Is its unit right?"
             )
     return signs
 
