@@ -19,10 +19,6 @@ from mlscorr.survey import Survey
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
 LISTED = 1e-4  # probability from which on a pair is listed in the evidence
-NEXT_RUN = (
-    "Run mlscorr diagnose once more with --simulator simulator.toml of this folder: it has the "
-    "cause in it, and the next run finds what is left, or nothing."
-)
 
 
 def gap_document(
@@ -137,7 +133,6 @@ def _advice(inference, closure, next_data):
             )
     else:
         sentences += [effect_class(part).remedy for part in verdict.label.split("+")]
-        sentences.append(NEXT_RUN)
     labels = (*verdict.set, *inference.same)
     open_question = [lowered(title(n)) for n in labels if n not in ("none", verdict.label)]
     if open_question and next_data:

@@ -37,6 +37,14 @@ from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_int
 from mlscorr.pipeline.planning import check_enough
 from mlscorr.survey import Survey, TargetObservations
 
+NEXT_RUN = (
+    "Run mlscorr diagnose once more with --simulator simulator.toml of this folder: it has the "
+    "cause in it, and the next run finds what is left, or nothing."
+)
+NEXT_CLOUDS = (
+    "Put the cause into your simulator, and give the clouds that it makes then as a second "
+    "--simulated: they tell how far the gap shrinks, and by themselves what is left."
+)
 LINEAR = (
     "How far the gap would shrink is told to the first order: run your simulator with the effect, "
     "and give its clouds as a second --simulated."
@@ -61,6 +69,8 @@ class ComparedRows:
         Of the channels beside geometry.
     distances : tuple of DistributionDistance
         Between the clouds, where there are simulated ones.
+    next_run : str
+        What to run once the simulator has the cause, in a sentence.
     """
 
     rows: Rows
@@ -70,6 +80,7 @@ class ComparedRows:
     notes: tuple[str, ...]
     contrasts: tuple[Contrast, ...] = ()
     distances: tuple[DistributionDistance, ...] = ()
+    next_run: str = NEXT_CLOUDS
 
 
 def compare_with_belief(
@@ -106,7 +117,8 @@ def compare_with_belief(
     observed = without_effects(rows, believed, effects)
     apart = rng.spawn(1)[0]  # how much is contrasted leaves the draws of the verdict alone
     contrasts = contrast_returns(believed, patches, _loss(effects), apart)
-    return ComparedRows(observed, used, simulator.added, absence, pairing.notes, contrasts)
+    compared = observed, used, simulator.added, absence, pairing.notes, contrasts
+    return ComparedRows(*compared, next_run=NEXT_RUN)
 
 
 def _loss(effects):

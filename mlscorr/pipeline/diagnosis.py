@@ -121,7 +121,7 @@ def diagnose(
     return DiagnosedSurvey(
         survey, simulator, effects, part, inference, closure, plan, left_out, compared.notes,
         absence, signs_of_part, costs, compared.contrasts,
-        (*compared.distances, *_of_innovations(part, errors, inference, rng)),
+        (*compared.distances, *_of_innovations(part, errors, inference, rng)), compared.next_run,
     )  # fmt: skip
 
 
@@ -161,6 +161,7 @@ class DiagnosedSurvey(Summary):
     costs: Costs = field(default_factory=Costs)
     contrasts: tuple[Contrast, ...] = ()
     distances: tuple[DistributionDistance, ...] = ()
+    next_run: str = ""
 
     @property
     def document(self) -> dict:
@@ -179,6 +180,8 @@ class DiagnosedSurvey(Summary):
             warnings=self.warnings,
             absence=self.absence,
         )
+        if self.inference.verdict.label not in ("none", "unknown"):
+            content["advice"].append(self.next_run)
         agreement = agreements(self.rows, background(self.rows, believed))
         content["costs"] = vars(self.costs)
         content["contrasts"] = [contrast.document() for contrast in self.contrasts]
