@@ -107,6 +107,8 @@ def _costs(text):
 
 def _tell(content):
     """What stands first, and what to do."""
+    for sentence in content["warnings"]:
+        terminal.warn(f"Warning: {sentence}")
     terminal.say_statements(content["statements"])
     if "ablation" in content:
         _tell_rounds(content["ablation"])

@@ -46,8 +46,7 @@ NEXT_CLOUDS = (
     "--simulated: they tell how far the gap shrinks, and by themselves what is left."
 )
 LINEAR = (
-    "How far the gap would shrink is told to the first order: run your simulator with the effect, "
-    "and give its clouds as a second --simulated."
+    "How far the gap would shrink is reckoned to the first order: your simulator ran only once."
 )
 
 

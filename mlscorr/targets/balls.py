@@ -19,8 +19,8 @@ class Neighbourhoods:
 
     def __init__(self, position: np.ndarray, radius: np.ndarray):
         self.position, self.radius = np.ascontiguousarray(position, float), radius
-        reach = radius[:, None] * (1 + 1e-9)  # distances alone decide, not what is rounded here
-        ends = [self.position[:, :2] + sign * reach for sign in (-1, 1)]
+        margin = radius[:, None] * (1 + 1e-9)  # distances alone decide, not what is rounded here
+        ends = [self.position[:, :2] + sign * margin for sign in (-1, 1)]
         low = ends[0].min(axis=0, initial=np.inf)
         extent = ends[1].max(axis=0, initial=-np.inf) - low
         edge = max(1.0, float(np.sqrt(max(extent.prod(), 0.0) / SETTINGS.held_points)))

@@ -71,14 +71,14 @@ class PointsInBalls:
 
     def add(self, cloud: PointCloud) -> None:
         """Hold points, each in a ball at least."""
-        self._read, wanted = self._read + 1, np.zeros(len(cloud), np.uint16)
+        self._read, counts = self._read + 1, np.zeros(len(cloud), np.uint16)
         for ball, rows in enumerate(self._balls.each(cloud.xyz)):
             time = cloud.gps_time[rows]
             self._first[ball] = min(self._first[ball], time.min(initial=np.inf))
             self._last[ball] = max(self._last[ball], time.max(initial=-np.inf))
             self._size[ball] += len(rows)
-            wanted[rows] += 1
-        self._parts.append((self._read, cloud, wanted))
+            counts[rows] += 1
+        self._parts.append((self._read, cloud, counts))
 
     def since(self) -> float:
         """Time of the oldest point. Units: s."""
@@ -100,16 +100,16 @@ class PointsInBalls:
         ball, size, end = self._balls[np.array([number])], self._size[number], 0
         kind = self._parts[0][1].intensity.dtype
         cloud = PointCloud(np.empty((size, 3)), np.empty(size), np.empty(size, kind))
-        for place, (read, part, wanted) in enumerate(self._parts):
+        for place, (read, part, counts) in enumerate(self._parts):
             if read > self._taken[number]:
                 rows = ball.contains(part.xyz)
                 there = slice(end, end := end + len(rows))
                 np.subtract(part.xyz[rows], ball.position, out=cloud.xyz[there])
                 cloud.gps_time[there] = part.gps_time[rows]
                 cloud.intensity[there] = part.intensity[rows]
-                wanted[rows] -= 1
-                if not (kept := wanted > 0).all():
-                    self._parts[place] = read, part[kept], wanted[kept]
+                counts[rows] -= 1
+                if not (kept := counts > 0).all():
+                    self._parts[place] = read, part[kept], counts[kept]
         self._parts = [entry for entry in self._parts if len(entry[1])]
         self._first[number], self._last[number] = np.inf, -np.inf
         self._size[number], self._taken[number] = 0, self._read

@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 
+import laspy
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -45,6 +46,7 @@ def compared(folders, tmp_path_factory):
     command = ["diagnose", real, "--simulated", first, "--simulated", following, "-o", str(out)]
     done = CliRunner().invoke(app, [*command, "-q"])
     assert done.exit_code == 0, done.output
+    assert "Warning: Of first, " in done.output and "observed targets were paired" in done.output
     return json.loads((out / "gap.json").read_text())
 
 
@@ -76,8 +78,18 @@ def test_their_next_run_tells_how_far_the_gap_shrinks(compared):
     "18 of 20 ms take 99 % of the square, to 1 %"
     assert compared["closure"]["shrink"] == pytest.approx(0.99, abs=0.01)
     assert "next run" in compared["closure"]["held_out"]
-    said = " ".join(compared["warnings"])
-    assert "10 of 10" in said or "observed targets were paired" in said
+    assert "give the clouds that it makes then" in compared["advice"][-1]
+    assert any("another clock, other beams" in sentence for sentence in compared["warnings"])
+
+
+def test_clouds_of_another_place_are_doubted(folders, tmp_path):
+    "Moved 2 m along the street: surfaces are paired by place alone, and a warning says so first"
+    moved = shutil.copytree(folders[1], tmp_path / "moved")
+    cloud = laspy.read(moved / "pass-1.laz")
+    cloud.y += 2.0
+    cloud.write(moved / "pass-1.laz")
+    warnings = mlscorr.diagnose(mlscorr.read_survey(folders[1]), simulated=[moved]).warnings
+    assert any("or another place was simulated" in sentence for sentence in warnings)
 
 
 def test_a_survey_is_no_simulation_of_itself(folders):

@@ -129,10 +129,14 @@ def rows_against(
     if not np.isfinite(rows.residual[rows.metric]).any():
         raise ValueError(_elsewhere(survey, patches, simulated))
     number = 0 if patches is None else len(patches)
+    elsewhere = (
+        f" No pulse of the same time has its point within {SETTINGS.cell:g} m of the real one: "
+        "another clock, other beams or another place was simulated."
+    )
     return rows, (
         f"Of {simulated.name}, {targets} of {len(matched)} observed targets were paired, and "
         f"{by_beams + by_place} of {number} patches ({by_beams} by pulses of the same times, "
-        f"{by_place} by place); the rest is not compared."
+        f"{by_place} by place); the rest is not compared.{elsewhere * (by_beams == 0 < number)}"
     )
 
 

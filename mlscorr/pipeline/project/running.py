@@ -96,7 +96,7 @@ class Run:
         """Each task with its Outcome, as they end; long ones are begun first, so that all workers
         end at about the same time.
         """
-        waiting = deque(sorted(tasks, key=lambda task: -task.points - task.again))
+        waiting = deque(sorted(tasks, key=lambda task: -task.points - task.near_points))
         suspects, running = deque(), {}
         losses: dict[str, int] = {}
         while waiting or suspects or running:

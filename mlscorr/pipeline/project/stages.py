@@ -180,16 +180,17 @@ def finding_tasks(
         where = near.name, near.position, near.kind, near.size, near.normal
         given = identity, file.time_constant, file.point_source_ids, own.mounting, own.scanner
         key = digest(core, *given, *where, origin, with_ties)
-        name, again = task_name(survey.name, file), file.points * _share_near(survey, near, box)
-        tasks.append(Task("findings", key, survey.name, name, file.points, find, (inputs,), again))
+        near_points = file.points * _share_near(survey, near, box)
+        named = key, survey.name, task_name(survey.name, file)
+        tasks.append(Task("findings", *named, file.points, find, (inputs,), near_points))
     return tasks
 
 
 def _share_near(survey, points, box):
-    """Share of a box within reach of surveyed points, by area, added up over these."""
+    """Share of a box near surveyed points, by area, added up over these."""
     low, high = box[:, :2]
-    reach = search_radius(survey, points)[:, None]
-    ends = np.clip([points.position[:, :2] + sign * reach for sign in (-1, 1)], low, high)
+    radius = search_radius(survey, points)[:, None]
+    ends = np.clip([points.position[:, :2] + sign * radius for sign in (-1, 1)], low, high)
     return ((ends[1] - ends[0]) / np.maximum(high - low, 1e-9)).prod(axis=1).sum()
 
 

@@ -35,8 +35,8 @@ class Task:
     function : function
     arguments : tuple
         Paths and small values.
-    again : float
-        Points expected near surveyed points, once for each of these: they are looked at again.
+    near_points : float
+        Expected near surveyed points, once for each of these: they are looked at again.
     """
 
     kind: str
@@ -46,7 +46,7 @@ class Task:
     points: int
     function: Callable
     arguments: tuple
-    again: float = 0.0
+    near_points: float = 0.0
 
 
 @dataclass(frozen=True)
