@@ -45,6 +45,20 @@ CONTROL_NAMES = PLACE_NAMES | {
     "role": "rolle rôle rol 角色",
     **dict.fromkeys(("normal_e", "normal_n", "normal_h"), ""),
 }
+WORDS = {  # of the cells in a column of words: ours to those of others, plain
+    "role": {
+        "control": "controlpoint groundcontrolpoint gcp passpunkt 控制点",
+        "check": "checkpoint independentcheckpoint icp chk kontrollpunkt prüfpunkt pruefpunkt "
+        "检查点",
+    },
+    "kind": {
+        "circle": "disc disk kreis kreisscheibe",
+        "square": "quadrat",
+        "hole": "loch",
+        "checkerboard": "chessboard schachbrett",
+        "board": "",
+    },
+}
 TRAJECTORY_NAMES = PLACE_NAMES | {
     "gps_time": "time t sow tow gpssow gpstow secondsofweek gpsseconds zeit gpszeit temps tiempo "
     "时间 gps时间 周秒",
@@ -82,6 +96,25 @@ def plain(name: str) -> str:
     """
     words = BRACKETS.sub("", unicodedata.normalize("NFKC", name).casefold())
     return re.sub(r"[\s_.\-/:,'\"]+", "", words)
+
+
+def meant(column: str, cell: str) -> str:
+    """Our word for the one in a cell of roles or kinds; the cell in small letters without one.
+
+    Parameters
+    ----------
+    column : str
+        One of WORDS.
+    cell : str
+
+    Examples
+    --------
+    >>> meant("role", "Check Point"), meant("role", "Kontrollpunkt"), meant("kind", "Kugel")
+    ('check', 'check', 'kugel')
+    """
+    words = WORDS[column].items()
+    known = (our for our, others in words if plain(cell) in (our, *others.split()))
+    return next(known, cell.casefold())
 
 
 def unit_of(name: str) -> str | None:

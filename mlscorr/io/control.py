@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlscorr.io.column_names import AXES, CONTROL_NAMES
+from mlscorr.io.column_names import AXES, CONTROL_NAMES, WORDS, meant
 from mlscorr.io.control_lists import (
     HINTS,
     SIGMAS,
@@ -30,11 +30,12 @@ from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.table_rows import read_rows
 from mlscorr.io.tables import read_layout
 from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
-from mlscorr.survey import KINDS, ControlPoints, Trajectory
+from mlscorr.survey import ControlPoints, Trajectory
 
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
 NORMAL = ("normal_e", "normal_n", "normal_h")
-ROLES = ("control", "check")
+ROLES = tuple(WORDS["role"])
+AMBIGUOUS = {"cp": " It is short for control point and for check point alike: write gcp or check."}
 NOTHING_GIVEN = ControlSection(file="")
 
 
@@ -94,7 +95,7 @@ def read_control(
     rows = [row | given for row in rows]
     _refuse(path, [*faults, *_doubled(path, rows)])
     if not layout.is_own:
-        check_unused(layout, [cells for _, cells in lines], {"role": ROLES, "kind": KINDS})
+        check_unused(layout, [cells for _, cells in lines], given)
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
     _refuse(path, [fault for row in rows for fault in _faults(path, row)])
@@ -186,8 +187,8 @@ def _doubled(path, rows):
 
 def _value(layout, line, name, cell):
     """Value of a cell: text, or the number of a column that holds numbers."""
-    if name in ("kind", "role"):
-        return cell.casefold()
+    if name in WORDS:
+        return meant(name, cell)
     if name == "name":
         if not cell:
             raise ValueError(f"{line} has no name.")
@@ -206,12 +207,12 @@ def _value(layout, line, name, cell):
 def _faults(path, row):
     """A sentence on each value of a row that can't be meant."""
     who, (smallest, largest) = f"{shown(row['name'])} of {path}", SETTINGS.target_size
-    for key, known in (("kind", KINDS), ("role", ROLES)):
-        if row[key] not in known:
-            near = nearest(row[key], known)
+    for key, words in WORDS.items():
+        if row[key] not in words:
+            near = nearest(row[key], words) if key == "kind" else None  # words of roles are alike
             yield (
-                f"{who} has the unknown {key} '{shown(row[key])}'; known are "
-                f"{', '.join(known[:-1])} and {known[-1]}." + (f" Is {near} meant?" if near else "")
+                f"{who} has the unknown {key} '{shown(row[key])}'; known are {_known(words)}."
+                f"{f' Is {near} meant?' if near else ''}{AMBIGUOUS.get(row[key], '')}"
             )
     if not smallest <= row["size"] <= largest:
         yield (
@@ -230,6 +231,12 @@ def _faults(path, row):
     normal = [row.get(name, np.nan) for name in NORMAL]
     if np.isfinite(normal).any() and not (np.isfinite(normal).all() and np.any(normal)):
         yield f"{who} has the normal {normal}; give three numbers, not all zero, or none."
+
+
+def _known(words):
+    """Our words, each with those of others."""
+    listed = [f"{our} ({', '.join(others.split())})" for our, others in words.items() if others]
+    return ", ".join([*listed, *(our for our, others in words.items() if not others)])
 
 
 def _doubts(path, rows):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.column_names import AXES
+from mlscorr.io.column_names import AXES, WORDS, meant
 from mlscorr.io.layout_search import NUMBER
 from mlscorr.io.layouts import TableLayout
 from mlscorr.io.nearness import distance_of
@@ -83,7 +83,8 @@ def complete(
         needless.update(UNNAMED_AXES)
     columns = {name: i for name, i in columns.items() if name not in needless}
     horizontal, vertical = section.sigma or (None, None)
-    given = {"sigma_horizontal": horizontal, "sigma_vertical": vertical, "kind": section.kind}
+    kind = section.kind and meant("kind", section.kind)
+    given = {"sigma_horizontal": horizontal, "sigma_vertical": vertical, "kind": kind}
     given |= {"size": section.size, "role": "control"}
     present = set(columns) | (set(SIGMAS) if "sigma" in columns else set())
     given = {name: value for name, value in given.items() if name not in present}
@@ -99,32 +100,46 @@ def complete(
 
 
 def check_unused(
-    layout: TableLayout, rows: Sequence[Sequence[str]], words: Mapping[str, Collection[str]]
+    layout: TableLayout, rows: Sequence[Sequence[str]], given: Mapping[str, Any]
 ) -> None:
-    """Refuse a column that isn't used but holds what another name promises.
+    """Refuse a column that isn't used but holds roles or kinds, and others than are given.
 
     Parameters
     ----------
     layout : TableLayout
     rows : sequence of sequences of str
         All cells.
-    words : mapping
-        Name of a column to the only words that stand in it.
+    given : mapping
+        Name of a column to the value of all points.
 
     Raises
     ------
     ValueError
         Names column and name.
     """
-    for name in set(words) - set(layout.columns):
-        for i in set(range(len(layout.header))) - set(layout.columns.values()):
-            cells = {row[i].casefold() for row in rows if i < len(row)}
-            if cells and cells <= set(words[name]):
-                raise ValueError(
-                    f"The column {shown(layout.header[i])} of {layout.path} seems to be the "
-                    f"{name}, for it holds {', '.join(sorted(cells))}: name it {name}, or say so "
-                    "under [control.columns] in survey.toml."
-                )
+    for name, i in _columns_of_words(layout, rows):
+        cells = {cell.casefold() for cell in _cells(rows, i)}
+        if {meant(name, cell) for cell in cells} != {given.get(name)}:
+            column = shown(layout.header[i])
+            raise ValueError(
+                f"The column {column} of {layout.path} seems to be the {name}, for it holds "
+                f"{', '.join(sorted(cells))}: name it {name}, or say so under [control] in "
+                f"survey.toml, as columns.{name} = '{column}'."
+            )
+
+
+def _columns_of_words(layout, rows):
+    """Pairs (role or kind, position of a column that isn't used and holds nothing but these)."""
+    for name in (name for name in WORDS if name not in layout.columns):
+        for i in layout.unused:
+            words = {meant(name, cell) for cell in _cells(rows, i)}
+            if words and words <= set(WORDS[name]):
+                yield name, i
+
+
+def _cells(rows, i):
+    """The different cells of a column, in rows that reach it."""
+    return {row[i] for row in rows if i < len(row)}
 
 
 def with_check_points(

@@ -63,6 +63,12 @@ class TableLayout:
         form = f"{parted}, decimal {sign}{letters}"
         return f"{self.path.name} was read as {', '.join(parts)} ({form})"
 
+    @property
+    def unused(self) -> list[int]:
+        """Positions of the columns that have a name and aren't used."""
+        used = self.columns.values()
+        return [i for i, name in enumerate(self.header) if name and i not in used]
+
     def name_of(self, column: str) -> str:
         """What a column is called in the table, or its number from 1.
 

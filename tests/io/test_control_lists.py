@@ -7,11 +7,11 @@ import openpyxl
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, plain
+from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, WORDS, plain
 from mlscorr.io.control import COLUMNS, holds_points, read_control
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.toml_file import read_toml
-from mlscorr.survey import Trajectory
+from mlscorr.survey import KINDS, Trajectory
 
 ALL = {"kind": "circle", "size": 0.6, "sigma": [0.003, 0.004]}
 LETTERS = ("utf-8", "cp1252")
@@ -138,6 +138,46 @@ def test_german_columns_of_kind_size_and_role_are_known(drive, tmp_path):
     assert points.check.kind == ("square",) and points.check.size.tolist() == [0.5]
 
 
+def test_words_of_the_field_are_roles_and_kinds(drive, tmp_path):
+    "GCP and Passpunkt are control, Kontrollpunkt and ICP are check, Kreis and Quadrat kinds"
+    words = [
+        "GCP;Kreis",
+        "Check Point;Quadrat",
+        "Kontrollpunkt;Disc",
+        "Passpunkt;Loch",
+        "icp;kreis",
+    ]
+    rows = [f"P{i};532012;{3373978 + 3 * i};44;{word}\n" for i, word in enumerate(words)]
+    points = read(tmp_path, "Name;E;N;H;Role;Kind\n" + "".join(rows), drive)
+    assert points.control.name == ("P0", "P3") and points.check.name == ("P1", "P2", "P4")
+    assert points.control.kind == ("circle", "hole")
+    assert points.check.kind == ("square", "circle", "circle")
+    assert read(tmp_path, "P1 532012.5 3373991 44.5\n", drive, kind="Kreis").control.kind == (
+        "circle",
+    )
+    assert tuple(WORDS["kind"]) == KINDS
+
+
+@pytest.mark.parametrize(
+    ("role", "message"),
+    [
+        (
+            "Kontrolpunkt",
+            r"unknown role 'kontrolpunkt'; known are control .*kontrollpunkt.*检查点.\.$",
+        ),
+        (
+            "CP",
+            "role 'cp'; .* short for control point and for check point alike: write gcp or check",
+        ),
+    ],
+)
+def test_no_role_is_suggested_by_its_spelling(role, message, drive, tmp_path):
+    "A role that isn't known is never said to be control, which would end the independent check"
+    with pytest.raises(ValueError, match=message) as error:
+        read(tmp_path, f"Name,E,N,H,Role\nP1,532012.5,3373991,44.5,{role}\n", drive)
+    assert "meant" not in str(error.value)
+
+
 @pytest.mark.parametrize("names", [CONTROL_NAMES, TRAJECTORY_NAMES])
 def test_known_names_of_columns_are_written_as_they_are_compared(names):
     "A header is compared without case and marks, so a known name that has any would never be met"
@@ -229,8 +269,8 @@ def test_all_rows_that_are_wrong_are_named_at_once(drive, tmp_path):
         read(tmp_path, "\n".join(["Punkt;E;N;H", *rows]), drive)
     for part in ("Line 4", "'hoch'", "Line 7", "'tief'", "Line 10", "no name", "names P1 more"):
         assert part in str(error.value)
-    rows = [f"P{n};532012,49;3373991,48;44,48;disc;600" for n in range(12)]
-    with pytest.raises(ValueError, match=r"24 faults.*kind 'disc'.*Then give 0\.6") as error:
+    rows = [f"P{n};532012,49;3373991,48;44,48;ball;600" for n in range(12)]
+    with pytest.raises(ValueError, match=r"24 faults.*kind 'ball'.*Then give 0\.6") as error:
         read(tmp_path, "\n".join(["Punkt;E;N;H;kind;size", *rows]), drive)
     assert "P3 of" in str(error.value)
     assert str(error.value).endswith("And 16 more like these.")
