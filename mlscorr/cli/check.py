@@ -33,7 +33,7 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
     for fault in checked.faults:
         warn(f"Error: {fault.sentence}")
     if checked.faults:
-        warn(counted(len(checked.faults), "fault"))
+        warn(counted(sum(fault.number for fault in checked.faults), "fault"))
         raise typer.Exit(CODES[checked.faults[0].where])
     following = f"mlscorr correct {quote(str(survey))} -o OUT"
     say(f"No fault, {counted(len(checked.warnings), 'warning')}. Next: {following}")

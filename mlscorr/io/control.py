@@ -2,16 +2,16 @@
 
 import re
 import warnings
-from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mlscorr.io.column_names import AXES, CONTROL_NAMES, WORDS, meant
+from mlscorr.io.control_faults import doubled_names, refuse, row_doubts, row_faults
 from mlscorr.io.control_lists import (
     HINTS,
+    NORMAL,
     SIGMAS,
     check_unused,
     complete,
@@ -23,19 +23,16 @@ from mlscorr.io.control_lists import (
 )
 from mlscorr.io.nearness import check_together
 from mlscorr.io.opening import open_file
-from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
 from mlscorr.io.storage import as_path
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.table_rows import read_rows
 from mlscorr.io.tables import read_layout
-from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
+from mlscorr.io.text_files import ENCODING, shown, warn_of_cut
 from mlscorr.survey import ControlPoints, Trajectory
 
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
-NORMAL = ("normal_e", "normal_n", "normal_h")
 ROLES = tuple(WORDS["role"])
-AMBIGUOUS = {"cp": " It is short for control point and for check point alike: write gcp or check."}
 NOTHING_GIVEN = ControlSection(file="")
 
 
@@ -93,13 +90,13 @@ def read_control(
         raise ValueError(f"{path} has a header but no points.")
     rows, faults = _values(layout, lines)
     rows = [row | given for row in rows]
-    _refuse(path, [*faults, *_doubled(path, rows)])
+    refuse(path, [*faults, *doubled_names(path, rows)])
     if not layout.is_own:
         check_unused(layout, [cells for _, cells in lines], given)
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
-    _refuse(path, [fault for row in rows for fault in _faults(path, row)])
-    for doubt in _doubts(path, rows):
+    refuse(path, [fault for row in rows for fault in row_faults(path, row)])
+    for doubt in row_doubts(path, rows):
         warnings.warn(doubt, stacklevel=2)
     control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
     if layout.sheet is None and layout.encoding != "utf-16":
@@ -151,124 +148,36 @@ def holds_points(path: str | Path) -> bool:
 
 
 def _values(layout, lines):
-    """Rows of values by column, and a sentence on each cell that holds none."""
+    """Rows of values by column, and pairs (line, what is wrong) of each cell that holds none."""
     rows, faults = [], []
     for line, cells in lines:
         row = {}
         for name, i in layout.columns.items():
             try:
-                row[name] = _value(layout, line, name, cells[i])
+                row[name] = _value(layout, name, cells[i])
             except ValueError as fault:
-                faults.append(str(fault))
+                faults.append((line, str(fault)))
         rows.append(row)
     return rows, faults
 
 
-def _refuse(path, faults):
-    """Raise all that is wrong with the rows of a file at once, if anything is."""
-    number, limit = len(faults), SETTINGS.named_faults
-    if number > 1:
-        more = [f"And {number - limit} more like these."] if number > limit else []
-        faults = [f"{path} has {number} faults.", *faults[:limit], *more]
-    if faults:
-        raise ValueError(" ".join(faults))
-
-
-def _doubled(path, rows):
-    """A sentence on names that stand more than once."""
-    count = Counter(row.get("name", "") for row in rows)
-    doubled = [name for name, number in count.items() if number > 1 and name]
-    if doubled:
-        yield (
-            f"{path} names {shown(', '.join(doubled))} more than once; every control or check "
-            "point needs a name of its own."
-        )
-
-
-def _value(layout, line, name, cell):
+def _value(layout, name, cell):
     """Value of a cell: text, or the number of a column that holds numbers."""
     if name in WORDS:
         return meant(name, cell)
     if name == "name":
         if not cell:
-            raise ValueError(f"{line} has no name.")
+            raise ValueError("has no name.")
         return cell
     if name in NORMAL and not cell:
         return np.nan
     try:
         number = layout.number(cell) * layout.factors.get(name, 1.0)
     except ValueError:
-        raise ValueError(f"{line} has the {name} '{shown(cell)}', which is not a number.") from None
+        raise ValueError(f"has the {name} '{shown(cell)}', which is not a number.") from None
     if not np.isfinite(number) and name not in NORMAL:
-        raise ValueError(f"{line} has the {name} '{shown(cell)}', which is not a finite number.")
+        raise ValueError(f"has the {name} '{shown(cell)}', which is not a finite number.")
     return number
-
-
-def _faults(path, row):
-    """A sentence on each value of a row that can't be meant."""
-    who, (smallest, largest) = f"{shown(row['name'])} of {path}", SETTINGS.target_size
-    for key, words in WORDS.items():
-        if row[key] not in words:
-            near = nearest(row[key], words) if key == "kind" else None  # words of roles are alike
-            yield (
-                f"{who} has the unknown {key} '{shown(row[key])}'; known are {_known(words)}."
-                f"{f' Is {near} meant?' if near else ''}{AMBIGUOUS.get(row[key], '')}"
-            )
-    if not smallest <= row["size"] <= largest:
-        yield (
-            f"{who} has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
-            f"{_likely_unit(row['size'])}"
-        )
-    for key in AXES:
-        if abs(row[key]) > SETTINGS.largest_coordinate:
-            yield (
-                f"{who} has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
-                "no map reaches that far (millimetres?)."
-            )
-    for key in SIGMAS:
-        if row[key] <= 0:
-            yield f"{who} has the {key} {row[key]:g} m; it must be greater than zero."
-    normal = [row.get(name, np.nan) for name in NORMAL]
-    if np.isfinite(normal).any() and not (np.isfinite(normal).all() and np.any(normal)):
-        yield f"{who} has the normal {normal}; give three numbers, not all zero, or none."
-
-
-def _known(words):
-    """Our words, each with those of others."""
-    listed = [f"{our} ({', '.join(others.split())})" for our, others in words.items() if others]
-    return ", ".join([*listed, *(our for our, others in words.items() if not others)])
-
-
-def _doubts(path, rows):
-    """A sentence on sigmas with which points hardly count, and one on points at one place."""
-    coarse = [(row, key) for row in rows for key in SIGMAS if row[key] > SETTINGS.coarse_sigma]
-    for row, key in coarse[:1]:
-        yield (
-            f"{shown(row['name'])} of {path} has the {key} {row[key]:g} m and will hardly count "
-            f"(millimetres?){f', nor will {len(coarse) - 1} more sigmas' * (len(coarse) > 1)}."
-        )
-    smallest = SETTINGS.target_size[0]  # m: nearer to one another two targets can't be
-    near = cKDTree([[row[axis] for axis in AXES] for row in rows]).query_pairs(smallest)
-    pairs = [[rows[i] for i in pair] for pair in sorted(near)]
-    twice = [f"{a['name']} and {b['name']}" for a, b in pairs if a["kind"] == b["kind"]]
-    if twice:
-        yield (
-            f"{path} gives one place two names: {shown(', '.join(twice))}. No observation tells "
-            "them apart, so neither counts: leave one of the two out."
-        )
-
-
-def _likely_unit(size):
-    """What may be meant by a size that can't be metres."""
-    if size <= 0:
-        return "a diameter or edge is positive."
-    smallest, largest = SETTINGS.target_size
-    sizes = {"centimetres": size / 100, "millimetres": size / 1000}
-    usual = np.sqrt(smallest * largest)
-    unit = min(sizes, key=lambda unit: abs(np.log(sizes[unit] / usual)))
-    if smallest <= sizes[unit] <= largest:
-        return f"{unit}? Then give {sizes[unit]:g}."
-    return "sizes are in metres; is the decimal point misplaced, or another unit meant?"
 
 
 def _points(rows):

@@ -19,6 +19,7 @@ from mlscorr.io.text_files import shown
 from mlscorr.survey import Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
+NORMAL = ("normal_e", "normal_n", "normal_h")
 HINTS = {("easting", "latitude"): " Latitude and longitude must be projected first."}
 UNNAMED_AXES = ("x", "y")  # either may point east
 

@@ -71,7 +71,7 @@ def check(path: str | Path) -> CheckedSurvey:
         faults = Faults()
         find_faults(path, faults)
     for fault in first.faults:
-        faults.add(fault.where, fault.sentence)
+        faults.add(fault.where, fault.sentence, fault.number)
     reason = "Targets in the cloud, time and memory: the faults come first."
     return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
 

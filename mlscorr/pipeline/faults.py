@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from mlscorr.io.control import holds_points, read_control
+from mlscorr.io.control_faults import ListError
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
@@ -38,10 +39,13 @@ class Fault:
     where : str
         In survey.toml (or in the names of files), in the data, or in the system that gives them.
     sentence : str
+    number : int
+        Of the faults that the sentence names.
     """
 
     where: Place
     sentence: str
+    number: int = 1
 
 
 @dataclass
@@ -72,7 +76,7 @@ class Faults:
             try:
                 return function(*arguments)
             except ValueError as error:
-                self.add(where, str(error))
+                self.add(where, str(error), error.number if isinstance(error, ListError) else 1)
             except OSError as error:  # survey.toml names a file that is not there, or ...
                 is_named = isinstance(error, FileNotFoundError) and error.errno is None
                 self.add("survey.toml" if is_named else "system", str(error))
@@ -80,16 +84,16 @@ class Faults:
                 self.warn(*(str(warning.message) for warning in caught))
         return None
 
-    def add(self, where: Place, sentence: str) -> None:
+    def add(self, where: Place, sentence: str, number: int = 1) -> None:
         """Keep a fault.
 
         Parameters
         ----------
-        where, sentence : str
+        where, sentence, number
             As of Fault.
         """
         if not any(sentence in fault.sentence for fault in self.faults):
-            self.faults.append(Fault(where, sentence))
+            self.faults.append(Fault(where, sentence, number))
 
     def warn(self, *sentences: str) -> None:
         """Keep warnings.
@@ -167,7 +171,7 @@ def _control(path, section, trajectory: Trajectory | None, faults):
         problems.of("data", read_control, path, section)
         for fault in problems.faults:
             if "km of the trajectory" not in fault.sentence:
-                faults.add(fault.where, fault.sentence)
+                faults.add(fault.where, fault.sentence, fault.number)
         return
     points = faults.of("data", read_control, path, section, trajectory)
     if points is not None:

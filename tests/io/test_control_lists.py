@@ -9,6 +9,7 @@ import pytest
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, WORDS, plain
 from mlscorr.io.control import COLUMNS, holds_points, read_control
+from mlscorr.io.control_faults import ListError
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.toml_file import read_toml
 from mlscorr.survey import KINDS, Trajectory
@@ -269,11 +270,25 @@ def test_all_rows_that_are_wrong_are_named_at_once(drive, tmp_path):
         read(tmp_path, "\n".join(["Punkt;E;N;H", *rows]), drive)
     for part in ("Line 4", "'hoch'", "Line 7", "'tief'", "Line 10", "no name", "names P1 more"):
         assert part in str(error.value)
-    rows = [f"P{n};532012,49;3373991,48;44,48;ball;600" for n in range(12)]
-    with pytest.raises(ValueError, match=r"24 faults.*kind 'ball'.*Then give 0\.6") as error:
+    rows = [f"P{n};532012,49;3373991,48;44,48;ball;{20 + n}" for n in range(12)]
+    with pytest.raises(ValueError, match=r"13 faults.*kind 'ball'.*Then give 0\.2") as error:
         read(tmp_path, "\n".join(["Punkt;E;N;H;kind;size", *rows]), drive)
     assert "P3 of" in str(error.value)
-    assert str(error.value).endswith("And 16 more like these.")
+    assert str(error.value).endswith("And 5 more like these.")
+
+
+def test_what_is_wrong_alike_in_many_rows_is_said_once(drive, tmp_path):
+    "A size in millimetres in each of 12 rows is one fault with the first point, and so is a kind"
+    row = "P{0};532012,49;337399{0},48;44,48;{1};600"
+    rows = [row.format(n, "circle") for n in range(9)]
+    with pytest.raises(ListError, match=r"^P0 of \S+ and 8 more have the size 600 m") as error:
+        read(tmp_path, "\n".join(["Punkt;E;N;H;kind;size", *rows]), drive)
+    assert str(error.value).count("Then give 0.6") == error.value.number == 1
+    rows = [row.format(n, "ball" if n > 3 else "circle") for n in range(9)]
+    with pytest.raises(
+        ListError, match=r"has 2 faults\..* P4 of \S+ and 4 more have the .* 'ball'"
+    ):
+        read(tmp_path, "\n".join(["Punkt;E;N;H;kind;size", *rows]), drive)
 
 
 def test_axes_that_both_lie_near_are_not_guessed(drive, tmp_path):

@@ -79,6 +79,16 @@ def test_a_good_survey_has_no_fault_and_is_counted(small):
     assert all(amount.source for amount in (*checked.read, *checked.written, *checked.needed))
 
 
+def test_faults_are_counted_as_the_sentences_count_them(survey):
+    "A list with an unknown kind everywhere and one size in millimetres: two, and the end says so"
+    text = (survey / "control.csv").read_text().replace("circle", "ball")
+    (survey / "control.csv").write_text(text.replace(",0.6,", ",600,", 1))
+    (fault,) = mlscorr.check(survey).faults
+    assert "control.csv has 2 faults" in fault.sentence and fault.number == 2
+    result = CliRunner().invoke(app, ["check", str(survey)])
+    assert result.exit_code == 3 and result.stderr.endswith("\n2 faults\n")
+
+
 def test_all_faults_are_named_at_once(survey):
     "Two missing files, a bad CRS, exchanged axes, a cut cloud: five sentences, not the first alone"
     edit(survey / "survey.toml", '"pass-1.laz"', '"pass-1.laz", "pass-2.laz"')

@@ -11,7 +11,7 @@ from mlscorr.estimate import few_targets
 from mlscorr.io.preparation import glance
 from mlscorr.io.project_file import ProjectParts, read_project, read_project_file
 from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
-from mlscorr.pipeline.faults import Fault, Faults
+from mlscorr.pipeline.faults import Faults
 from mlscorr.pipeline.needs import Amount
 from mlscorr.pipeline.project.file_tasks import read_tile
 from mlscorr.pipeline.project.stages import planned_drive, tile_tasks
@@ -81,7 +81,9 @@ def _checked(survey: Survey) -> tuple[Survey, CheckedSurvey]:
     checked, name = checked_survey(survey, Faults(), needs_control=False), survey.name
     return survey, replace(
         checked,
-        faults=tuple(Fault(fault.where, f"{name}: {fault.sentence}") for fault in checked.faults),
+        faults=tuple(
+            replace(fault, sentence=f"{name}: {fault.sentence}") for fault in checked.faults
+        ),
         warnings=tuple(f"{name}: {sentence}" for sentence in checked.warnings),
         unchecked=tuple(f"{name}: {sentence}" for sentence in checked.unchecked),
     )
