@@ -17,6 +17,7 @@ from mlscorr.io.control_lists import (
     complete,
     lacking,
     placed,
+    role_doubts,
     sentence_on,
     unnamed_columns,
     with_check_points,
@@ -44,7 +45,7 @@ class ControlList(NamedTuple):
     control, check : ControlPoints
         Either may be empty.
     layout : str or None
-        A sentence; None for a file in our own columns, of which nothing had to be understood.
+        A sentence; None for a file in our own columns alone, of which nothing had to be understood.
     """
 
     control: ControlPoints
@@ -80,7 +81,8 @@ def read_control(
     Warns
     -----
     UserWarning
-        Of sigmas with which points hardly count, and of points at one place.
+        Of sigmas with which points hardly count, of points at one place, and of a column that isn't
+        used and may be that of the roles.
     """
     rules = CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns, HINTS
     layout = read_layout(path, COLUMNS, (NORMAL,), *rules)
@@ -93,6 +95,8 @@ def read_control(
     refuse(path, [*faults, *doubled_names(path, rows)])
     if not layout.is_own:
         check_unused(layout, [cells for _, cells in lines], given)
+        for doubt in () if section.check else role_doubts(layout, [cells for _, cells in lines]):
+            warnings.warn(doubt, stacklevel=2)
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
     refuse(path, [fault for row in rows for fault in row_faults(path, row)])
@@ -101,7 +105,8 @@ def read_control(
     control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
-    sentence = None if layout.is_own else sentence_on(layout, has_axes, given, section.check)
+    is_plain = layout.is_own and not layout.unused
+    sentence = None if is_plain else sentence_on(layout, has_axes, given, section.check)
     return ControlList(control, check, sentence)
 
 

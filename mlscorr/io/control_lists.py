@@ -1,6 +1,6 @@
 """Control lists of others: what they lack, which axis is which, and what was understood."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -129,6 +129,28 @@ def check_unused(
             )
 
 
+def role_doubts(layout: TableLayout, rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """A sentence on each column that isn't used and holds few words, where none is the roles.
+
+    Parameters
+    ----------
+    layout : TableLayout
+    rows : sequence of sequences of str
+        All cells.
+    """
+    for i in layout.unused if "role" not in layout.columns else ():
+        words, column = _cells(rows, i) - {""}, shown(layout.header[i])
+        is_few = 1 < len(words) <= len(WORDS["role"]) < len(rows)
+        is_check = any(meant("role", word) == "check" for word in words)
+        if is_check or (is_few and all(word.isalpha() for word in words)):
+            yield (
+                f"The column {column} of {layout.path} is not used, and all points are control "
+                f"points, though it may tell check points: it holds "
+                f"{shown(', '.join(sorted(words)))}. If so, say columns.role = '{column}' under "
+                "[control] in survey.toml."
+            )
+
+
 def _columns_of_words(layout, rows):
     """Pairs (role or kind, position of a column that isn't used and holds nothing but these)."""
     for name in (name for name in WORDS if name not in layout.columns):
@@ -235,4 +257,6 @@ def sentence_on(
     axes = ", easting and northing told by the trajectory" * has_axes
     values = [f"{k} {shown(v) if isinstance(v, str) else f'{v:g} m'}" for k, v in given.items()]
     values += [f"but check for {shown(', '.join(patterns))}"] * bool(patterns)
-    return f"{layout}{axes}{'; of all points: ' + ', '.join(values) if values else ''}."
+    given_to_all = f"; of all points: {', '.join(values)}" if values else ""
+    unused = ", ".join(shown(layout.header[i]) for i in layout.unused)
+    return f"{layout}{axes}{given_to_all}{f'; not used: {unused}' if unused else ''}."

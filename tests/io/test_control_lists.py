@@ -179,6 +179,25 @@ def test_no_role_is_suggested_by_its_spelling(role, message, drive, tmp_path):
     assert "meant" not in str(error.value)
 
 
+def test_roles_under_another_name_are_never_dropped_in_silence(drive, tmp_path):
+    "Words of roles are refused until named, other words warned of, and what is not used is named"
+    rows = [f"P{i};532012;{3373978 + 3 * i};44;{{{i % 2}}};Nr {i}\n" for i in range(4)]
+    text = "Name;E;N;H;use;Bemerkung\n" + "".join(rows)
+    with pytest.raises(ValueError, match=r"use .* the role, for it holds chk, gcp.*role = 'use'"):
+        read(tmp_path, text.format("GCP", "CHK"), drive)
+    points = read(tmp_path, text.format("GCP", "CHK"), drive, columns={"role": "use"})
+    assert points.check.name == ("P1", "P3") and points.layout.endswith("; not used: Bemerkung.")
+    message = r"column use .* may tell check points: it holds Neu, Pass\. .* columns.role = 'use'"
+    with pytest.warns(UserWarning, match=message):
+        points = read(tmp_path, text.format("Pass", "Neu"), drive)
+    assert len(points.control) == 4 and points.layout.endswith("; not used: use, Bemerkung.")
+    with pytest.warns(UserWarning, match="use .* may tell check points: it holds CHK"):
+        read(tmp_path, text.format("", "CHK"), drive)
+    points = read(tmp_path, text.format("Pass", "Neu"), drive, check=["P1"])  # that tells
+    assert points.check.name == ("P1",)
+    assert len(read(tmp_path, text.format("GCP", "GCP"), drive).control) == 4  # as without it
+
+
 @pytest.mark.parametrize("names", [CONTROL_NAMES, TRAJECTORY_NAMES])
 def test_known_names_of_columns_are_written_as_they_are_compared(names):
     "A header is compared without case and marks, so a known name that has any would never be met"
