@@ -98,6 +98,17 @@ def plain(name: str) -> str:
     return re.sub(r"[\s_.\-/:,'\"]+", "", words)
 
 
+def section_of(names: Mapping[str, str]) -> str:
+    """The section of survey.toml that is about a table with these names of columns.
+
+    Parameters
+    ----------
+    names : mapping
+        CONTROL_NAMES or TRAJECTORY_NAMES.
+    """
+    return "control" if "name" in names else "trajectory"
+
+
 def meant(column: str, cell: str) -> str:
     """Our word for the one in a cell of roles or kinds; the cell in small letters without one.
 

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.column_names import AXES, WORDS, meant
+from mlscorr.io.column_names import AXES, CONTROL_NAMES, WORDS, meant
 from mlscorr.io.layout_search import NUMBER
 from mlscorr.io.layouts import TableLayout
 from mlscorr.io.nearness import distance_of
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_sections import ControlSection
+from mlscorr.io.table_rows import read_rows
 from mlscorr.io.tables import missing_sentence
 from mlscorr.io.text_files import shown
 from mlscorr.survey import Trajectory
@@ -92,8 +93,13 @@ def complete(
     missing = [name for name, value in given.items() if value is None]
     if missing:
         used = {header[i] for i in columns.values()} if header else set()
+        rows = [cells for _, cells in read_rows(layout)]
+        seeming = {
+            name: header[i] for name, i in _columns_of_words(layout, rows) if name in missing
+        }
+        sentence = missing_sentence(layout.path, header, missing, used, CONTROL_NAMES, seeming)
         raise ValueError(
-            f"{missing_sentence(layout.path, header, missing, used)} A value for all points may "
+            f"{sentence} A value for all points may "
             'stand under [control] in survey.toml: kind = "circle", size = 0.6, sigma = [0.003, '
             "0.004] (m; horizontal, vertical)."
         )

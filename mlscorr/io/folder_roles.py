@@ -15,7 +15,7 @@ from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.text_files import shown
+from mlscorr.io.text_files import listed
 from mlscorr.io.trajectory_tables import tum_columns
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
@@ -139,5 +139,5 @@ def _table(path) -> tuple[Role, str]:
     except ValueError as error:  # has the columns, and is not clear
         return "control", str(error)
     if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):
-        return "table", f"its columns are {shown(', '.join(header))}"
+        return "table", f"its columns are {listed(header)}"
     return "none", "no table of places"

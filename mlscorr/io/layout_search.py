@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mlscorr.io.column_names import UNITS, find_meanings, is_foreign, unit_of
+from mlscorr.io.column_names import UNITS, find_meanings, is_foreign, section_of, unit_of
 from mlscorr.io.layouts import (
     COMMENT_MARKS,
     ENCODINGS,
@@ -142,7 +142,7 @@ def _layout_of(start, rows, names, lacking, chosen):
                 raise ValueError(
                     f"{start.path} has {len(doubled)} columns that may be the {name} "
                     f'({", ".join(doubled)}): choose, as {name} = "{doubled[0]}" under '
-                    "[control.columns] or [trajectory.columns] in survey.toml."
+                    f"[{section_of(names)}.columns] in survey.toml."
                 )
         check_chosen(start.path, set(chosen) - set(meanings), chosen)
         columns = {name: positions[0] for name, positions in meanings.items()}

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.column_names import find_meanings
+from mlscorr.io.column_names import find_meanings, plain, section_of
 from mlscorr.io.layout_search import NUMBER, check_chosen, find_layout, likely_header
 from mlscorr.io.layouts import TableLayout, head, not_text
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
 from mlscorr.io.storage import as_path
-from mlscorr.io.text_files import ENCODING, nearest, shown
+from mlscorr.io.text_files import ENCODING, listed, nearest, shown
 
 
 def read_header(path: str | Path) -> tuple[list[str], int]:
@@ -61,6 +61,7 @@ def find_columns(
     path : path
         For messages.
     header, required : sequence of str
+        All that are required are there.
     groups : sequence of sequences of str
         Columns that only make sense together.
 
@@ -72,11 +73,8 @@ def find_columns(
     Raises
     ------
     ValueError
-        For columns that are missing, doubled, or a group that is there in part.
+        For columns that are doubled, or a group that is there in part.
     """
-    missing = [name for name in required if name not in header]
-    if missing:
-        raise ValueError(missing_sentence(path, header, missing))
     names = list(required)
     for group in groups:
         present = [name for name in group if name in header]
@@ -146,7 +144,7 @@ def read_layout(
             for (name, other), way_out in (hints or {}).items()
             if name in missing and other in meanings
         )
-        raise refusal or ValueError(missing_sentence(path, header, missing, used) + ways_out)
+        raise refusal or ValueError(missing_sentence(path, header, missing, used, names) + ways_out)
     return layout
 
 
@@ -199,9 +197,14 @@ def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
 
 
 def missing_sentence(
-    path: str | Path, header: Sequence[str], missing: Sequence[str], used: Collection[str] = ()
+    path: str | Path,
+    header: Sequence[str],
+    missing: Sequence[str],
+    used: Collection[str],
+    names: Mapping[str, str],
+    seeming: Mapping[str, str] | None = None,
 ) -> str:
-    """A sentence on columns that are missing, and on the one that may be meant.
+    """A sentence on columns that are missing, and on the one that may be meant, if one is like it.
 
     Parameters
     ----------
@@ -211,16 +214,35 @@ def missing_sentence(
         Our names.
     used : collection of str
         Names in the header that mean something else.
+    names
+        See find_layout.
+    seeming : mapping, optional
+        Our name to the column whose cells are like it.
     """
     others = [cell for cell in header if cell and cell not in used]
-    near = nearest(missing[0], others)
-    hint = f" {missing[0]} may be meant by '{shown(near)}'." if near else ""
+    known = {name: our for our, words in names.items() for name in (plain(our), *words.split())}
+    near = {known.get(nearest(plain(cell), known) or ""): cell for cell in others}
+    near |= {name: cell for name in missing if (cell := nearest(name, others))}
+    near |= dict(seeming or {})
+    likely = [name for name in missing if name in near]
+    hint, section = "", section_of(names)
     if sum(NUMBER.fullmatch(cell) is not None for cell in header) > 2:
-        hint = " It has no header: number its columns in survey.toml, as easting = 2."
+        hint = (
+            f" It has no header: number its columns under [{section}.columns] in survey.toml, as "
+            "easting = 2."
+        )
     elif {"easting", "northing", "height"} <= set(missing):
-        hint += " It holds no coordinates: is another file meant?"
+        hint = " It holds no coordinates: is another file meant?"
+    elif likely:
+        name, column = likely[0], shown(near[likely[0]])
+        hint = (
+            f" {name} may be meant by '{column}': if so, say under [{section}] in survey.toml, as "
+            f"columns.{name} = '{column}'."
+        )
     elif others:
-        where = f"columns.{missing[0]} = '{shown(near or others[0])}'"
-        hint += f" Name it under [control] or [trajectory] in survey.toml, as {where}."
-    names = shown(", ".join(header)) or "no header"
-    return f"{path} has no column {', '.join(missing)}; it has {names}.{hint}"
+        hint = (
+            f" If one of the columns that are not used is meant ({listed(others)}), say which "
+            f"under [{section}] in survey.toml, as columns.{missing[0]} = '...'."
+        )
+    has = listed(header) or "no header"
+    return f"{path} has no column {', '.join(missing)}; it has {has}.{hint}"

@@ -268,7 +268,7 @@ P1 = "P1;532012,49;3373991,48;44,48\n"
         ("Punkt;E;N;H\n" + P1.replace("44,48", "hoch"), "height 'hoch', which is not a number"),
         ("Punkt;E;N;H\n" + P1 + P1, "names P1 more than once"),
         ("Punkt;E;N;H\n", "header but no points"),
-        ("P1;GCP;532012,49;3373991,48;44,48\n", "no header: number its columns in survey.toml, as"),
+        ("P1;GCP;532012,49;3373991,48;44,48\n", "no header: number .*control.columns. in .* as"),
     ],
 )  # fmt: skip
 def test_what_may_mean_two_things_or_nothing_is_refused(content, message, drive, tmp_path):
@@ -325,6 +325,21 @@ def test_what_the_list_lacks_is_asked_for_by_its_key(drive, tmp_path):
         read(tmp_path, "Punkt;E;N;H\n" + P1, drive, size=None)
     with pytest.raises(ValueError, match=r"control\.check names 'Q\*', no point of"):
         read(tmp_path, "Punkt;E;N;H\n" + P1, drive, check=["Q*"])
+
+
+def test_no_column_is_advised_that_is_not_like_the_one_that_is_missing(drive, tmp_path):
+    "By its name or its words: Bemerkung is no sigma, Typ holds kinds; headers are shown whole"
+    head = "Punktnummer;Rechtswert;Hochwert;Höhe;mE [mm];mH [mm];Zuletzt geändert am;Bemerkung"
+    row = "P1;532012,49;3373991,48;44,48;3;4;gestern;Tafel"
+    with pytest.raises(
+        ValueError, match=r"geändert am, Bemerkung\. If one .*sigma_h\S+ = '\.\.\.'"
+    ):
+        read(tmp_path, f"{head}\n{row}\n", drive, sigma=None)
+    message = r"Typ\. kind may be meant by 'Typ': .* under \[control\] .* columns\.kind = 'Typ'\."
+    with pytest.raises(ValueError, match=message):
+        read(tmp_path, f"{head};Typ\n{row};Kreis\n", drive, sigma=None, kind=None)
+    with pytest.raises(ValueError, match=r"has no column height; .* and 3 more\. .* \[control\]"):
+        read(tmp_path, "Pt;E;N;" + ";".join(f"Q{n}" for n in range(40)) + "\nP1;1;2\n", drive)
 
 
 def test_names_and_numbers_of_columns_are_not_mixed(tmp_path):
