@@ -22,6 +22,10 @@ from mlscorr.survey import Trajectory
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
 NORMAL = ("normal_e", "normal_n", "normal_h")
 HINTS = {("easting", "latitude"): " Latitude and longitude must be projected first."}
+EXAMPLES = {
+    **dict.fromkeys(SIGMAS, "sigma = [0.003, 0.004] (horizontal, vertical)"),
+    **{"kind": 'kind = "circle"', "size": "size = 0.6"},
+}
 UNNAMED_AXES = ("x", "y")  # either may point east
 
 
@@ -98,10 +102,10 @@ def complete(
             name: header[i] for name, i in _columns_of_words(layout, rows) if name in missing
         }
         sentence = missing_sentence(layout.path, header, missing, used, CONTROL_NAMES, seeming)
+        values = ", ".join(dict.fromkeys(EXAMPLES[name] for name in missing))
         raise ValueError(
-            f"{sentence} A value for all points may "
-            'stand under [control] in survey.toml: kind = "circle", size = 0.6, sigma = [0.003, '
-            "0.004] (m; horizontal, vertical)."
+            f"{sentence} A value for all points may stand under [control] in survey.toml, lengths "
+            f"in m: {values}."
         )
     return replace(layout, columns=columns), given
 

@@ -194,8 +194,7 @@ def _nothing_fits(name, times, span, candidates, setting):
         return (
             f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
             "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "
-            "them may be in UTC or local time. Check cloud.files and trajectory.file in "
-            "survey.toml."
+            "them may be in UTC or local time. Check that both are of one drive."
         )
     return (
         f'None of {spans}, taken as {NAMES[setting]}, which cloud.gps_time = "{setting}" in '

@@ -1,6 +1,7 @@
 """``init``: a survey.toml of what lies in a folder; what is ambiguous is named, never guessed."""
 
 import os
+import re
 import warnings
 from collections import Counter
 from collections.abc import Mapping
@@ -27,7 +28,8 @@ from mlscorr.pipeline.survey_text import SurveyText
 from mlscorr.survey import PointCloud, Trajectory
 from mlscorr.survey.summary import counted
 
-HINT = " What is said in survey.toml is given here as --set 'control.size = 0.6'."
+SECTION = re.compile(rf"(?<!\[)\[({'|'.join(PlannedSurveyFile.model_fields)})(\.columns)?\]")
+VALUE = re.compile(r"""(?<![\w.])([\w.]+) = ("[^"]+"|'[^']+'|\[[^]]+\]|\d+(?:\.\d+)?)""")
 
 
 @dataclass(frozen=True)
@@ -100,13 +102,23 @@ def init(
             text, roles = _text(folder, path, given, sort_files(folder))
             return StartedSurvey(path, text, tuple(roles), _read_notes(path, text))
     except ValueError as error:
-        hint = HINT if "survey.toml" in str(error) and "--set" not in str(error) else ""
-        raise ValueError(f"{error}{hint} Nothing was written.") from None
+        raise ValueError(f"{error}{_hint(str(error))} Nothing was written.") from None
 
 
 def _check_free(path):
     if path.exists():
         raise ValueError(f"{path} is there already; move it, or write another with -o FILE.")
+
+
+def _hint(sentence):
+    """How what a sentence wants in a survey.toml, which is not there yet, is said to init."""
+    section, value = SECTION.findall(sentence), VALUE.findall(sentence)
+    if "survey.toml" not in sentence or "--set" in sentence or not (section or value):
+        return ""
+    key, example = value[-1] if value else ("KEY", "VALUE")
+    where = f"{''.join(section[-1])}." if section else ""
+    example = example.replace("'", '"')
+    return f" survey.toml is not there yet: say it here, as --set '{where}{key} = {example}'."
 
 
 def _text(folder, path, given, roles):

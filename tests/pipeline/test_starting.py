@@ -336,13 +336,36 @@ AMBIGUOUS = {
         write("control.csv", "Pt,E,N,H\n" + control("{},{:.3f},{:.3f},{:.3f}")),
         ["no column .*kind, size", "--set 'control.size = 0.6'"],
     ),
+    "angles in radians": (
+        write("trajectory.csv", HEADER + trajectory(row="{:.3f},{:.4f},3374000,42,0,0,1.5708")),
+        [
+            "seem to be radians",
+            "not there yet: say it here, as --set 'trajectory.angles = \"rad\"'",
+        ],
+    ),
+    "a time by another name": (
+        write("trajectory.csv", HEADER.replace("gps_time", "timestamp") + trajectory()),
+        ["--set 'trajectory.columns.gps_time = \"timestamp\"'"],
+    ),
+    "a yaw": (
+        write("trajectory.csv", HEADER.replace("heading", "yaw") + trajectory()),
+        ["--set 'trajectory.heading = \"counterclockwise from east\"'"],
+    ),
+    "seconds of the day": (
+        write("trajectory.csv", HEADER + trajectory(START % 86_400.0)),
+        ["^((?!survey.toml|--set).)*both are of one drive. Nothing was written.$"],
+    ),
+    "sigmas unknown": (
+        write("control.csv", "Pt,E,N,H,kind,size\nT01,532012.5,3373991.5,44,circle,0.6\n"),
+        ["^((?!kind =|size =).)* --set 'control.sigma = .0.003, 0.004.'"],
+    ),
     "two heights": (
         write(
             "control.csv",
             CONTROL.replace("height", "Elevation,H-Ell")
             + control("{},{:.3f},{:.3f},{:.3f},50.0,0.003,0.004,circle,0.6,{}"),
         ),
-        ["2 columns that may be the height", "Elevation", "--set"],
+        ["2 columns that may be the height", "Elevation", "--set 'control.columns.height = "],
     ),
     "clouds of two zones": (
         lambda folder: write_cloud(folder / "pass-3.las", "EPSG:32649"),
