@@ -10,13 +10,13 @@ import numpy as np
 from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings
 from mlscorr.io.control_lists import lacking, unnamed_columns
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.layout_search import find_layout, likely_header
+from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
 from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.text_files import listed
-from mlscorr.io.trajectory_tables import tum_columns
+from mlscorr.io.trajectory_tables import COLUMNS, tum_columns
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
 CLOUDS = (".las", ".laz", ".e57")
@@ -107,18 +107,22 @@ def _cloud(path):
 
 
 def _records(path) -> Iterator[FileRole]:
-    """What a headerless file of float64 may be: its times and angles tell."""
-    kinds: tuple[tuple[Role, tuple[str, ...]], ...]
-    kinds = ("trajectory", SBET_FIELDS), ("accuracy", SMRMSG_FIELDS)
-    for role, fields in kinds:
-        if path.stat().st_size == 0 or path.stat().st_size % (8 * len(fields)):
-            continue
-        table = np.fromfile(path, "<f8", 100 * len(fields)).reshape(-1, len(fields))
-        is_timed = np.isfinite(table).all() and (np.diff(table[:, 0]) > 0).all()
-        is_angle = np.abs(table[:, 1:3]).max() <= 2 * np.pi if role == "trajectory" else True
-        if is_timed and is_angle:
-            name = "SBET" if role == "trajectory" else "smrmsg"
-            yield FileRole(path, role, f"whole {name} records with increasing times")
+    """What a headerless file of float64 may be, whole or cut off: its times and angles tell."""
+    size, sbet = path.stat().st_size, 8 * len(SBET_FIELDS)
+    if not size % sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):
+        yield FileRole(path, "trajectory", "whole SBET records with increasing times")
+    if not size % (8 * len(SMRMSG_FIELDS)) and _is_timed(path, SMRMSG_FIELDS, np.inf):
+        yield FileRole(path, "accuracy", "whole smrmsg records with increasing times")
+    if size > 2 * sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):  # its reader says the rest
+        yield FileRole(path, "trajectory", "SBET records with increasing times, cut off")
+
+
+def _is_timed(path, fields, limit):
+    """Whether a file starts with records whose times increase, and whose places are in a limit."""
+    values = np.fromfile(path, "<f8", 100 * len(fields))
+    table = values[: len(values) // len(fields) * len(fields)].reshape(-1, len(fields))
+    is_timed = len(table) and np.isfinite(table).all() and (np.diff(table[:, 0]) > 0).all()
+    return bool(is_timed and np.abs(table[:, 1:3]).max() <= limit)
 
 
 def _table(path) -> tuple[Role, str]:
@@ -129,6 +133,8 @@ def _table(path) -> tuple[Role, str]:
         return "trajectory", f"columns {', '.join(sorted(driven))}"
     if find_layout(path, {}, lambda _: ["gps_time"], {}, tum_columns) is not None:
         return "trajectory", "rows of eight numbers, as time, place and quaternion"
+    if find_layout(path, {}, lambda _: ["gps_time"], {}, _unnamed_epoch) is not None:
+        return "table", "rows of numbers without names of columns, as of a trajectory"
     header = likely_header(path, CONTROL_NAMES)
     surveyed = set(find_meanings(header, CONTROL_NAMES))
     if "name" in surveyed and ({"easting", "northing"} <= surveyed or {"x", "y"} <= surveyed):
@@ -141,3 +147,9 @@ def _table(path) -> tuple[Role, str]:
     if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):
         return "table", f"its columns are {listed(header)}"
     return "none", "no table of places"
+
+
+def _unnamed_epoch(cells):
+    """The column of times in a row of numbers alone, as many as an epoch has, with parts of s."""
+    is_epoch = len(cells) >= len(COLUMNS) and all(map(NUMBER.fullmatch, cells))
+    return {"gps_time": 0} if is_epoch and not cells[0].isdecimal() else {}

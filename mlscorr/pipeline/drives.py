@@ -220,7 +220,8 @@ def _no_trajectory(roles):
     tables = [f"{role.path.name} ({role.reason})" for role in roles if role.role == "table"]
     hint = (
         f" If it is {' or '.join(tables)}, say so, as --set 'trajectory.file = ...' and "
-        "--set 'trajectory.columns.gps_time = ...' with the other columns."
+        "--set 'trajectory.columns.gps_time = ...' with the other columns (numbers from 1 where "
+        "they have no names)."
     )
     return (
         "No file looks like a trajectory: add an SBET, or a table with the columns gps_time (s), "

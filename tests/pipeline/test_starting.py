@@ -291,7 +291,22 @@ def remove(name):
     return lambda folder: (folder / name).unlink()
 
 
+def cut_sbet(folder):
+    "With half a record at its end, and no other trajectory"
+    (folder / "trajectory.csv").unlink()
+    write_sbet(folder / "drive.out")
+    (folder / "drive.out").write_bytes((folder / "drive.out").read_bytes()[:-68])
+
+
 AMBIGUOUS = {
+    "a cut SBET": (
+        cut_sbet,
+        ["^((?!No file looks).)*drive.out has .* 68 more than 799 whole SBET"],
+    ),
+    "a trajectory without a header": (
+        write("trajectory.csv", trajectory()),
+        ["No file looks .*trajectory.csv .rows of numbers without names", "columns.gps_time = "],
+    ),
     "two trajectories": (
         write("smoothed.csv", HEADER + trajectory()),
         ["2 files may be the trajectory", "smoothed.csv", "--set 'trajectory.file = "],
