@@ -11,6 +11,7 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 
+from mlscorr.io.text_files import shown
 from mlscorr.survey import data_frame
 
 AXES = data_frame.AXES
@@ -107,6 +108,18 @@ def section_of(names: Mapping[str, str]) -> str:
         CONTROL_NAMES or TRAJECTORY_NAMES.
     """
     return "control" if "name" in names else "trajectory"
+
+
+def listed(cells: Sequence[str]) -> str:
+    """The cells of a header, as a message can show them: as many as there are names that we know.
+
+    Parameters
+    ----------
+    cells : sequence of str
+    """
+    limit = len(CONTROL_NAMES | TRAJECTORY_NAMES)
+    more = [f"and {len(cells) - limit} more"] if len(cells) > limit else []
+    return ", ".join([*map(shown, cells[:limit]), *more])
 
 
 def meant(column: str, cell: str) -> str:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings
+from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings, listed
 from mlscorr.io.control_lists import lacking, unnamed_columns
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
@@ -15,7 +15,6 @@ from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.text_files import listed
 from mlscorr.io.trajectory_tables import COLUMNS, tum_columns
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]

@@ -40,7 +40,6 @@ class Settings:
 
     # ---- tables
     longest_line: int = 10_000  # characters; no table has columns for that
-    named_columns: int = 40  # of a header in a message: a POS exports thirty; more hide the rest
     sampled_lines: int = 200  # in which a header stands, below what a program says of itself
 
     # ---- trajectories

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.column_names import find_meanings, plain, section_of
+from mlscorr.io.column_names import find_meanings, listed, plain, section_of
 from mlscorr.io.layout_search import NUMBER, check_chosen, find_layout, likely_header
 from mlscorr.io.layouts import TableLayout, head, not_text
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
 from mlscorr.io.storage import as_path
-from mlscorr.io.text_files import ENCODING, listed, nearest, shown
+from mlscorr.io.text_files import ENCODING, nearest, shown
 
 
 def read_header(path: str | Path) -> tuple[list[str], int]:
@@ -241,8 +241,8 @@ def missing_sentence(
         )
     elif others:
         hint = (
-            f" If one of the columns that are not used is meant ({listed(others)}), say which "
-            f"under [{section}] in survey.toml, as columns.{missing[0]} = '...'."
+            f" If another one of these is meant, say which under [{section}] in survey.toml, as "
+            f"columns.{missing[0]} = '...'."
         )
     has = listed(header) or "no header"
     return f"{path} has no column {', '.join(missing)}; it has {has}.{hint}"

@@ -2,12 +2,11 @@
 
 import os
 import warnings
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 
 from mlscorr.io.opening import open_file
-from mlscorr.io.settings import SETTINGS
 
 ENCODING = "utf-8-sig"  # UTF-8, with or without a byte order mark
 
@@ -47,18 +46,6 @@ def shown(text: str) -> str:
     """
     short = text if len(text) <= 60 else f"{text[:57]}..."
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in short)
-
-
-def listed(cells: Sequence[str]) -> str:
-    """The cells of a header, as a message can show them: of very many the first ones.
-
-    Parameters
-    ----------
-    cells : sequence of str
-    """
-    limit = SETTINGS.named_columns
-    more = [f"and {len(cells) - limit} more"] if len(cells) > limit else []
-    return ", ".join([*map(shown, cells[:limit]), *more])
 
 
 def warn_of_cut(path: str | Path) -> None:
