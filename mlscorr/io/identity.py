@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mlscorr.io.opening import open_file
@@ -49,3 +51,27 @@ class FileIdentity:
                 file.seek(max(0, size - SETTINGS.identified_bytes))
                 hashed.update(file.read(SETTINGS.identified_bytes))
         return cls(size, changed, hashed.hexdigest())
+
+
+def find_copies(paths: Iterable[Path]) -> dict[Path, Path]:
+    """Files that hold the same as one before them, each with that one.
+
+    Only those of one size are opened, and told by their heads and tails.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+
+    Raises
+    ------
+    OSError
+        Where one can't be read.
+    """
+    sizes = {path: file_state(path)[0] for path in paths}
+    count, firsts, copies = Counter(sizes.values()), {}, {}
+    for path in (path for path, size in sizes.items() if size and count[size] > 1):
+        identity = FileIdentity.of(path)
+        is_tagged = str(identity.changed).startswith(ETAG)
+        first = firsts.setdefault(identity if is_tagged else replace(identity, changed=0), path)
+        copies |= {path: first} if first != path else {}
+    return copies

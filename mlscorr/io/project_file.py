@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.control import NOTHING_SURVEYED, read_surveyed
+from mlscorr.io.identity import find_copies
 from mlscorr.io.inputs import input_file
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.project_sections import ProjectFile
@@ -202,6 +203,15 @@ def _check_tiles(path, settings, drives):
     for drive in drives:
         for file in drive.parts.files.clouds:
             owners.setdefault(resolved(file), []).append(drive)
+    for copy, first in find_copies(owners).items():
+        both = [*owners[first], *owners[copy]]
+        ids = [number for drive in both for number in drive.ids or ()]
+        if len(set(ids)) < len(ids) or any(drive.ids is None for drive in both):
+            raise ValueError(
+                f"{copy}, of drive {owners[copy][0].name}, is a copy of {first}, of drive "
+                f"{owners[first][0].name}: all of its points would count twice. Leave it out of "
+                f"the [[drive]] of {path} whose trajectory does not cover it."
+            )
     shared = {file: own for file, own in owners.items() if len(own) > 1}
     if doubtful := [file for file, own in shared.items() if any(d.ids is None for d in own)]:
         names = " and ".join(drive.name for drive in shared[doubtful[0]])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mlscorr.io.conversion import written_name
+from mlscorr.io.identity import find_copies
 from mlscorr.io.storage import beside, files_like, is_there, resolved
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
 from mlscorr.io.trajectory_sessions import SessionFile
@@ -199,7 +200,7 @@ def existing(path: Path, key: str, name: str) -> Path:
 
 
 def check_distinct(path: Path, clouds: list[Path]) -> None:
-    """Refuse a cloud file that is named twice, and two of one name: outputs keep the names.
+    """Refuse a cloud that is named twice or by a copy, and two of one name: outputs keep names.
 
     Parameters
     ----------
@@ -220,3 +221,8 @@ def check_distinct(path: Path, clouds: list[Path]) -> None:
         value, count = Counter(values).most_common(1)[0]
         if count > 1:
             raise ValueError(f"cloud.files of {path} {kind} {value} ({count} times).")
+    for copy, first in find_copies(clouds).items():
+        raise ValueError(
+            f"cloud.files of {path} names {copy}, which is a copy of {first}: all of its points "
+            "would count twice, as a pass of its own. Leave out one of the two."
+        )

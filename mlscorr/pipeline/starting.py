@@ -13,6 +13,7 @@ import numpy as np
 
 from mlscorr.io.conversion import is_foreign, recorded_points
 from mlscorr.io.folder_roles import SIMULATED, FileRole, sort_files
+from mlscorr.io.identity import find_copies
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.output import output_file
@@ -125,6 +126,8 @@ def _text(folder, path, given, roles):
     """The text, and the roles with those that are not taken."""
     _validate(given)
     clouds = _clouds(folder, given, roles)
+    copies = find_copies(cloud.layout.cloud for cloud in clouds)
+    clouds = [cloud for cloud in clouds if cloud.layout.cloud not in copies]
     drive, late = choose_trajectory(
         _roles(folder, given, "trajectory", roles), clouds, given.get("trajectory", {})
     )
@@ -135,6 +138,9 @@ def _text(folder, path, given, roles):
         _roles(folder, given, "control", roles), trajectory, given.get("control", {})
     )
     refusals = late | apart
+    refusals |= {
+        copy: f"a copy of {first.name}, and would count twice" for copy, first in copies.items()
+    }
     roles = [replace(role, role="none", reason=refusals[role.path]) if role.path in refusals
              else role for role in roles]  # fmt: skip
     text = SurveyText(given)

@@ -8,6 +8,7 @@ import tomllib
 import warnings
 from dataclasses import replace
 
+import laspy
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -470,7 +471,9 @@ def test_a_survey_without_mounting_is_refused(street, tmp_path):
 def test_files_measured_at_the_same_time_are_warned_of(street, tmp_path):
     "Two files of one time may be of two scanners, and a survey.toml has one mounting"
     folder = shutil.copytree(street, tmp_path / "survey")
-    shutil.copy(folder / "pass-1.laz", folder / "pass-1-scanner-2.laz")
+    cloud = laspy.read(folder / "pass-1.laz")
+    cloud.x += 0.01  # of another scanner, no copy
+    cloud.write(folder / "pass-1-scanner-2.laz")
     text = (folder / "survey.toml").read_text()
     text = text.replace('["pass-1.laz"', '["pass-1.laz", "pass-1-scanner-2.laz"')
     (folder / "survey.toml").write_text(text)

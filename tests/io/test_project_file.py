@@ -80,6 +80,21 @@ def test_what_is_wrong_is_said(city, parts, words):
         read_project(write(city, *parts))
 
 
+def test_a_copy_of_another_drives_cloud_is_refused(city):
+    "Both files and drives are named; by point_source_ids of their own two drives may share copies"
+    for name in ("a", "b"):
+        (city / name / f"tile-{name}.laz").write_bytes(b"the same")
+    words = r"tile-b.laz, of drive b, is a copy of .*tile-a.laz, of drive a: all .* twice"
+    for parts in (
+        [DRIVE.format("a"), DRIVE.format("b")],
+        [IDS.format("a", "[1]"), DRIVE.format("b")],
+    ):
+        with pytest.raises(ValueError, match=words):
+            read_project(write(city, *parts))
+    parts = [IDS.format(n, f"[{i}]").replace('["a/', f'["{n}/') for i, n in enumerate("ab")]
+    assert len(read_project(write(city, *parts)).drives) == 2
+
+
 def test_drives_of_two_systems_are_refused(city):
     "Two CRS, two time systems, two beliefs about the POS, and a second control list"
     for name, head in (("a", 'crs = "EPSG:32650"\n\n'), ("b", 'crs = "EPSG:32649"\n\n')):

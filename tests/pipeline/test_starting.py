@@ -255,6 +255,19 @@ def test_a_folder_without_control_has_none(folder):
     assert "# [control]" in text
 
 
+def test_a_copy_of_a_cloud_is_left_out_and_refused(folder):
+    "A second file of the same points is no second pass: init leaves it out, check names both"
+    (folder / "copy.las").write_bytes((folder / "pass-1.las").read_bytes())
+    started = mlscorr.init(folder)
+    reasons = {role.path.name: role.reason for role in started.roles if role.role == "none"}
+    assert reasons == {"pass-1.las": "a copy of copy.las, and would count twice"}
+    assert tomllib.loads(started.text)["cloud"]["files"] == ["copy.las", "pass-2.las"]
+    path = started.write()
+    path.write_text(started.text.replace('"copy.las"', '"*.las"').replace(', "pass-2.las"', ""))
+    (fault,) = mlscorr.check(path).faults
+    assert "pass-1.las, which is a copy of" in fault.sentence and "copy.las:" in fault.sentence
+
+
 # ---- folders that do not
 
 
