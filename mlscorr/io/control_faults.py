@@ -44,12 +44,12 @@ def refuse(path: str | Path, faults: Iterable[tuple[object, str]]) -> None:
     ListError
         Where anything is.
     """
-    alike: dict[str, list[object]] = {}
+    groups: dict[str, list[object]] = {}
     for who, what in faults:
-        alike.setdefault(what, []).append(who)
+        groups.setdefault(what, []).append(who)
     sentences = [
         f"{who} {what}" if not more else f"{who} and {len(more)} more have{what[len('has') :]}"
-        for what, (who, *more) in alike.items()
+        for what, (who, *more) in groups.items()
     ]
     number, limit = len(sentences), SETTINGS.named_faults
     if number > 1:

@@ -224,7 +224,7 @@ def missing_sentence(
     near = {known.get(nearest(plain(cell), known) or ""): cell for cell in others}
     near |= {name: cell for name in missing if (cell := nearest(name, others))}
     near |= dict(seeming or {})
-    likely = [name for name in missing if name in near]
+    candidates = [name for name in missing if name in near]
     hint, section = "", section_of(names)
     if sum(NUMBER.fullmatch(cell) is not None for cell in header) > 2:
         hint = (
@@ -233,8 +233,8 @@ def missing_sentence(
         )
     elif {"easting", "northing", "height"} <= set(missing):
         hint = " It holds no coordinates: is another file meant?"
-    elif likely:
-        name, column = likely[0], shown(near[likely[0]])
+    elif candidates:
+        name, column = candidates[0], shown(near[candidates[0]])
         hint = (
             f" {name} may be meant by '{column}': if so, say under [{section}] in survey.toml, as "
             f"columns.{name} = '{column}'."
