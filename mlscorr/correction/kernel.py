@@ -4,6 +4,24 @@ import numpy as np
 from numba import njit
 
 
+def require_times(points: int, times: int) -> None:
+    """Refuse points without a time each: the kernel, which checks no index, would read on.
+
+    Parameters
+    ----------
+    points, times : int
+        How many there are.
+
+    Raises
+    ------
+    ValueError
+    """
+    if points != times:
+        raise ValueError(
+            f"{points} points came with {times} times; each moves by its own. Give one for each."
+        )
+
+
 @njit(cache=True, nogil=True)
 def locate(
     gps_time: np.ndarray, constant: float, epochs: np.ndarray, step: float, is_gap: np.ndarray

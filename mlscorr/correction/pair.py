@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.correction.kernel import fill_increments, move_integers
+from mlscorr.correction.kernel import fill_increments, move_integers, require_times
 from mlscorr.frames import angle_sigma
 from mlscorr.survey import Mounting, PointCloud, Trajectory
 from mlscorr.survey.summary import Summary
@@ -119,7 +119,13 @@ class Correction(Summary):
         increments : (n, 3) array
             Zero outside the trajectory. Units: m.
         inside : (n,) bool array
+
+        Raises
+        ------
+        ValueError
+            Unless each point has a time.
         """
+        require_times(len(xyz), len(gps_time))
         increments = np.zeros((len(gps_time), 3))
         inside = np.zeros(len(gps_time), dtype=bool)
         fill_increments(
@@ -170,8 +176,10 @@ class Correction(Summary):
         Raises
         ------
         ValueError
-            When a corrected coordinate does not fit the file's 32 bit integers.
+            When a corrected coordinate does not fit the file's 32 bit integers, or not each point
+            has a time.
         """
+        require_times(len(xyz[0]), len(gps_time))
         outside, overflow = move_integers(
             *xyz,
             np.asarray(scale, dtype=float),

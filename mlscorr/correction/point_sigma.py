@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mlscorr.correction.kernel import locate
+from mlscorr.correction.kernel import locate, require_times
 from mlscorr.correction.pair import Correction
 from mlscorr.frames import map_root, skew
 from mlscorr.survey import Mounting, Scanner
@@ -86,7 +86,13 @@ class PointSigma:
         )
 
     def at(self, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
-        """One sigma (n, 3) of corrected points (n, 3), NaN outside the trajectory. Units: m."""
+        """One sigma (n, 3) of corrected points (n, 3), NaN outside the trajectory. Units: m.
+
+        Raises
+        ------
+        ValueError
+            Unless each point has a time.
+        """
         return self.of_integers(
             np.asarray(xyz, dtype=float).T, np.ones(3), np.zeros(3), np.asarray(gps_time, float)
         )
@@ -105,7 +111,13 @@ class PointSigma:
         ----------
         xyz, scale, offset, gps_time, time_constant
             As ``Correction.shift_integers`` has left them.
+
+        Raises
+        ------
+        ValueError
+            Unless each point has a time.
         """
+        require_times(len(xyz[0]), len(gps_time))
         scale = np.asarray(scale, dtype=float)
         offset = np.asarray(offset, dtype=float) - self.origin
         step = float(np.median(np.diff(self.epochs)))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mlscorr.survey.data_frame import columns_frame
 
@@ -18,8 +19,11 @@ if TYPE_CHECKING:
 class Columns:
     """What dataclasses of arrays (n, ...), tuples of n and Columns have in common.
 
-    Numbers among their fields hold for all rows.
+    Numbers among their fields hold for all rows. Raises ValueError for columns of unlike lengths.
     """
+
+    def __post_init__(self):
+        check_lengths(self)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} rows)"
@@ -41,6 +45,32 @@ class Columns:
         names = [field.name for field in fields(cls)]
         columns = zip(*([getattr(part, name) for name in names] for part in parts), strict=True)
         return cls(*(sum(c, ()) if isinstance(c[0], tuple) else np.concatenate(c) for c in columns))
+
+
+def check_lengths(record: Any) -> None:
+    """Refuse a record whose columns have unlike numbers of rows: one would borrow from another.
+
+    Parameters
+    ----------
+    record : dataclass
+        Fields that are no columns take no part.
+
+    Raises
+    ------
+    ValueError
+    """
+    columns = ((field.name, getattr(record, field.name)) for field in fields(record))
+    rows = {
+        name: 1 if getattr(column, "single", False) else len(column)
+        for name, column in columns
+        if isinstance(column, np.ndarray | tuple | list | Columns | Rotation)
+    }
+    if len(set(rows.values())) > 1:
+        counts = ", ".join(f"{name} {count}" for name, count in rows.items())
+        raise ValueError(
+            f"The columns of {type(record).__name__} have unlike numbers of rows ({counts}): "
+            "a row of each belongs to the same thing. Give all of them the same length."
+        )
 
 
 def _selected(column, rows):

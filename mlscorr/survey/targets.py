@@ -113,6 +113,7 @@ class Matched(Columns):
     def __post_init__(self):
         if self.scanner is None:
             object.__setattr__(self, "scanner", np.zeros(len(self.observations), int))
+        super().__post_init__()
 
     @classmethod
     def by_name(cls, observations: TargetObservations, points: ControlPoints) -> Matched:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
 
+from mlscorr.survey.columns import check_lengths
 from mlscorr.survey.summary import Summary
 
 GAP_FACTOR = 10.0  # a step longer than ten median steps is a gap
@@ -35,7 +36,8 @@ class Trajectory(Summary):
     Raises
     ------
     ValueError
-        For fewer than two epochs, times that do not increase, or values that are not finite.
+        For fewer than two epochs, columns of unlike lengths, times that do not increase, or values
+        that are not finite.
     """
 
     gps_time: np.ndarray
@@ -46,6 +48,7 @@ class Trajectory(Summary):
     session: np.ndarray | None = None
 
     def __post_init__(self):
+        check_lengths(self)
         if len(self.gps_time) < 2:
             raise ValueError(f"A trajectory needs at least 2 epochs, this one has {len(self)}.")
         for name in ("gps_time", "position", "position_sigma", "attitude_sigma"):

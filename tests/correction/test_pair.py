@@ -117,3 +117,18 @@ def test_points_of_two_scanners_move_by_the_mounting_of_theirs():
     for number, correction in enumerate(corrections):
         alone = correction.increments(xyz[:, number], gps_time[:, number])[0]
         assert np.array_equal(moved[:, number], alone)
+
+
+@pytest.mark.parametrize(("points", "times"), [(3, 200_000), (5, 3), (3, 1)])
+def test_points_without_a_time_each_are_refused(points, times):
+    """Fewer points than times, or more, are refused: foreign memory is no correction."""
+    recorded = drive()
+    correction = Correction(recorded, with_errors(recorded))
+    xyz, gps_time = np.zeros((points, 3)), np.full(times, START + 1.0)
+    integers = np.zeros((3, points), np.int32)
+    for move in (
+        lambda: correction.increments(xyz, gps_time),
+        lambda: correction.shift_integers(integers, SCALE, CORNER, gps_time),
+    ):
+        with pytest.raises(ValueError, match=f"^{points} points came with {times} times"):
+            move()

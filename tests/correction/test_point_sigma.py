@@ -216,3 +216,11 @@ def test_sigmas_are_not_added_twice(tmp_path):
     write_corrected(cloud_of(path), tmp_path / "out.laz", correction, sigma=sigma)
     with pytest.raises(ValueError, match="have the field sigma_easting already"):
         write_corrected(cloud_of(tmp_path / "out.laz"), tmp_path / "2.laz", correction, sigma=sigma)
+
+
+def test_points_without_a_time_each_have_no_sigma():
+    """Three points with six times are refused, as one sigma for each time would be another's."""
+    recorded = drive()
+    sigma = PointSigma.of(Correction(recorded, recorded), NOISELESS)
+    with pytest.raises(ValueError, match="^3 points came with 6 times"):
+        sigma.at(np.zeros((3, 3)), np.full(6, START + 1.0))

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 
+from mlscorr.survey import PointCloud
 from mlscorr.survey.columns import Columns
 
 
@@ -20,3 +22,9 @@ def test_records_are_told_apart_as_keys():
     assert low != high
     assert {low: "low", high: "high"}[low] == "low"
     assert np.array_equal(high[1:].height, np.ones(2))
+
+
+def test_columns_of_unlike_lengths_make_no_record():
+    """Three points with one time are no cloud: all three would move by that one."""
+    with pytest.raises(ValueError, match=r"PointCloud .*\(xyz 3, gps_time 1, intensity 3\)"):
+        PointCloud(np.zeros((3, 3)), np.zeros(1), np.zeros(3))

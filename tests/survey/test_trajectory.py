@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.survey import Trajectory, control_epochs
@@ -147,3 +148,17 @@ def test_some_epochs_keep_all_that_is_known_of_them():
         assert np.array_equal(part.position_sigma, sigma[rows])
         assert np.array_equal(part.session, whole.session[rows])
         assert part.attitude_sigma is None
+
+
+@pytest.mark.parametrize(
+    ("positions", "attitudes", "counts"),
+    [
+        (2, Rotation.identity(3), "gps_time 3, position 2, attitude 3"),
+        (3, Rotation.identity(2), "gps_time 3, position 3, attitude 2"),
+        (3, Rotation.identity(), "gps_time 3, position 3, attitude 1"),
+    ],
+)
+def test_each_epoch_has_a_pose(positions, attitudes, counts):
+    """Three times with two positions or attitudes are no trajectory."""
+    with pytest.raises(ValueError, match=counts):
+        Trajectory(np.arange(3.0), np.zeros((positions, 3)), attitudes)
