@@ -40,7 +40,11 @@ class CentredPairs:
 
     @classmethod
     def of(cls, matched: Matched) -> CentredPairs:
-        """The pairs of matched observations, about their weighted mean."""
+        """The pairs of matched observations, about their weighted mean; Undetermined for none."""
+        if len(matched) == 0:
+            raise Undetermined(
+                "A transformation needs control points that were found in the cloud; there is none."
+            )
         observations, variance = matched.observations, np.mean(matched.variance, axis=1)
         weight = 1.0 / variance
         start = np.round(observations.position[0])  # keeps the digits of the mean

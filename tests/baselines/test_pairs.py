@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from mlscorr.baselines import Undetermined, fit_affine, fit_horizontal_and_height, fit_rigid
+from mlscorr.baselines import (
+    Undetermined,
+    fit_affine,
+    fit_horizontal_and_height,
+    fit_rigid,
+    fit_shift,
+)
 from mlscorr.baselines.pairs import CentredPairs
+from mlscorr.survey import Matched
 from tests.beds.streets import SHIFT, observed, on_a_line, on_a_plane, targets
 
 
@@ -33,6 +40,13 @@ def test_a_degenerate_geometry_is_refused_with_numbers(fit, layout, words):
     place, time = layout(9, np.random.default_rng(3))
     with pytest.raises(Undetermined, match=words):
         fit(observed(place, time, place + SHIFT))
+
+
+@pytest.mark.parametrize("fit", [fit_shift, fit_horizontal_and_height, fit_rigid, fit_affine])
+def test_nothing_is_fitted_to_nothing(fit):
+    """Without a control point in the cloud no transformation is determined."""
+    with pytest.raises(Undetermined, match="there is none"):
+        fit(Matched.none())
 
 
 def test_targets_nearly_on_a_plane_are_refused():
