@@ -65,11 +65,10 @@ def fit_literal(
         Unless more than order + 1 epochs see control.
     """
     gps_time = matched.gps_time
-    epochs = _control_epochs(gps_time, order)
+    _require_epochs(gps_time, order)
     c0 = _stated_variance(stated_sigma(trajectory, pos, gps_time))
     partials = pose_partials(trajectory, matched.observations.position, gps_time)  # B
-    interval = trajectory.recorded_time(epochs[0], epochs[-1]) / (len(epochs) - 1)
-    correlation_time = SETTINGS.interval_ratio * interval
+    correlation_time = SETTINGS.interval_ratio * trajectory.control_interval(gps_time)
     solved = _solve(matched, order, [LiteralSignal(partials, c0, c0, correlation_time)])
     details = {"correlation_time": correlation_time, "c0": c0.tolist()}
     pose = _predict(solved, trajectory, matched, order)
@@ -79,7 +78,7 @@ def fit_literal(
 def _solve(matched, order, signals):
     """Literal collocation of the misclosures; without signals least squares."""
     gps_time = matched.gps_time
-    _control_epochs(gps_time, order)
+    _require_epochs(gps_time, order)
     survey = matched.surveyed.sigma[:, :, None] ** 2 * np.eye(3)
     noise = matched.observations.covariance + survey  # Eq. 19
     design = _design(gps_time, matched, order)
@@ -103,16 +102,15 @@ def _design(gps_time, matched, order):
     return polynomial_design(gps_time, span, order, extrapolate=True)
 
 
-def _control_epochs(gps_time, order):
-    """Control epochs; fewer than the polynomial needs are refused."""
-    epochs = control_epochs(gps_time)
-    if len(epochs) <= order + 1:
+def _require_epochs(gps_time, order):
+    """Refuse fewer control epochs than the polynomial needs."""
+    count = len(control_epochs(gps_time))
+    if count <= order + 1:
         raise Undetermined(
             f"A polynomial of order {order} needs control points at {order + 2} epochs at least "
-            f"(section 2.4.2 of the paper); here are {len(epochs)}, {SAME_EPOCH:.0f} s or more "
+            f"(section 2.4.2 of the paper); here are {count}, {SAME_EPOCH:.0f} s or more "
             "apart."
         )
-    return epochs
 
 
 def _stated_variance(stated):

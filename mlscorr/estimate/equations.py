@@ -177,16 +177,13 @@ class Equations(Summary):
     def interval(self) -> float:
         """Mean interval of the control epochs without the trajectory's gaps between them. Units: s.
 
-        The whole trajectory's length where there is only one epoch. Where there is none, or where
+        The whole trajectory's length where they are as good as one. Where there is none, or where
         ties tell more of the time than how far apart targets stand, the believed correlation time
         as the paper's rule has it.
         """
-        epochs = control_epochs(self.observed)
-        if len(epochs) == 0 or self.ties is not None:
+        if len(self.observed) == 0 or self.ties is not None:
             return self.pos.correlation_time / SETTINGS.start_ratio
-        if len(epochs) == 1:
-            return float(np.ptp(self.trajectory.gps_time))
-        return self.trajectory.recorded_time(epochs[0], epochs[-1]) / (len(epochs) - 1)
+        return self.trajectory.control_interval(self.observed)
 
     @cached_property
     def target_rows(self) -> dict[str, np.ndarray]:

@@ -109,6 +109,21 @@ class Trajectory(Summary):
         starts, ends = self.gaps.T
         return float(end - start - (ends - starts)[(starts >= start) & (ends <= end)].sum())
 
+    def control_interval(self, gps_time: np.ndarray) -> float:
+        """Mean interval of control epochs without the gaps between them. Units: s.
+
+        The whole trajectory's length where they are one, or as good as one: less than a second was
+        recorded from one to the next, as from the end of a pass to the start of another.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Times of observed targets, one at least. Units: s.
+        """
+        epochs = control_epochs(gps_time)
+        interval = self.recorded_time(epochs[0], epochs[-1]) / max(len(epochs) - 1, 1)
+        return interval if interval >= SAME_EPOCH else float(np.ptp(self.gps_time))
+
     def select(self, rows: slice | np.ndarray) -> Trajectory:
         """Some of its epochs.
 

@@ -5,6 +5,7 @@ import pytest
 
 from mlscorr.baselines import Undetermined, fit_literal, fit_polynomial
 from mlscorr.survey import Pos
+from tests.beds.pos_errors import CONSTANT, LENGTH, case_at_a_gap
 from tests.beds.streets import DURATION, SHIFT, SIGMA, TIME, observed, targets, trajectory
 
 
@@ -75,3 +76,12 @@ def test_a_polynomial_needs_more_epochs_than_its_order_and_one(order):
         fit_polynomial(trajectory(), given, order)
     with pytest.raises(Undetermined, match="epochs at least"):
         fit_literal(trajectory(), given, Pos(), order)
+
+
+def test_control_at_both_edges_of_a_gap_alone_is_enough():
+    """Without a recorded interval the correlation time is four times the drive's length."""
+    case = case_at_a_gap()
+    correction, found = fit_literal(case.recorded, case.matched, Pos(), 0)
+    assert found["correlation_time"] == pytest.approx(4 * LENGTH)
+    moved = correction.corrected.position - case.recorded.position
+    assert np.abs(moved - CONSTANT[0]).max() < 0.05  # m

@@ -104,6 +104,14 @@ def smooth_case(seed, n=16, sigma=0.1):
     return Case(EPOCHS, waves(rng), times, rng, np.full((len(EPOCHS), 3), sigma))
 
 
+def case_at_a_gap():
+    "A drive with a constant error and a gap of 5 s, one target at each of its edges"
+    case = Case(EPOCHS, CONSTANT, [EPOCHS[600], EPOCHS[650]], np.random.default_rng(1))
+    old, kept = case.recorded, (EPOCHS <= EPOCHS[600]) | (EPOCHS >= EPOCHS[650])
+    case.recorded, case.true = old.select(kept), case.true.select(kept)
+    return case
+
+
 def outage_case(seed, n=20):
     rng = np.random.default_rng(seed)
     error, sigma = outage(rng)

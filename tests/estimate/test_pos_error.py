@@ -14,6 +14,7 @@ from tests.beds.pos_errors import (
     START,
     SURVEYED,
     Case,
+    case_at_a_gap,
     even,
     outage,
     outage_case,
@@ -38,6 +39,17 @@ def outages():
     "6 drives with an outage, 20 targets, and their estimates"
     cases = [outage_case(seed) for seed in range(6)]
     return [(case, case.estimate()) for case in cases]
+
+
+@pytest.mark.parametrize("order", [0, 2])
+@pytest.mark.parametrize("sigma", [None, 0.5])
+def test_control_at_both_edges_of_a_gap_alone_is_enough(sigma, order):
+    """Between two such targets no time was recorded, and a constant error is still taken away."""
+    case = case_at_a_gap()
+    if sigma is not None:
+        stated = np.full((len(case.recorded), 3), sigma)
+        case.recorded = replace(case.recorded, position_sigma=stated)
+    assert rms(case.remaining(case.estimate(order=order))) < 0.05  # m
 
 
 def test_waves_are_recovered_at_all_epochs():

@@ -118,6 +118,12 @@ def test_a_gap_counts_only_where_it_lies_whole_in_the_time_asked():
     assert gappy().recorded_time(START + 3.0, START + 7.0) == pytest.approx(4.0)  # s
 
 
+@pytest.mark.parametrize(("times", "interval"), [([2.0, 5.0], 22.0), ([2.0, 20.0], 2.0)])
+def test_epochs_with_nothing_recorded_between_them_are_as_good_as_one(times, interval):
+    """From the end of one pass to the start of the next there is no interval but all the drive."""
+    assert gappy().control_interval(START + np.array(times)) == pytest.approx(interval)  # s
+
+
 def test_targets_within_a_second_share_an_epoch():
     "Of times in any order those within a second of the last one kept are left out"
     epochs = control_epochs(START + np.array([5.0, 0.0, 0.9, 1.5, 9.0, 5.5]))
