@@ -182,14 +182,16 @@ def _least_squares(equations, matched, recorded):
         if np.abs(step).max() < SETTINGS.resolution:
             break
         correction = correction + step
-    covariance = solved.trend_covariance
     # What the weak hold of the mounting adds to the redundancy is what it adds to the estimate
+    held = solved.trend_covariance / _weak(recorded) ** 2
     observed, sigma0 = 3 * len(matched), 1.0
-    redundancy = observed - len(correction) + np.sum(np.diag(covariance) / _weak(recorded) ** 2)
-    if observed:
+    redundancy = observed - len(correction) + np.trace(held)
+    if round(redundancy) > 0:  # less than one observation too many tells nothing of the noise
         sigma0 = solved.sigma0 * np.sqrt(observed / redundancy)
-    estimate = MountingEstimate(mountings, correction, sigma0**2 * covariance, float(sigma0))
-    return about, correction, estimate
+    # Larger noise makes the targets worse, not that hold: s^2 (C^-1 + (s^2 - 1) W)^-1
+    shared = np.eye(len(correction)) + (sigma0**2 - 1.0) * held
+    covariance = np.linalg.solve(shared, sigma0**2 * solved.trend_covariance)
+    return about, correction, MountingEstimate(mountings, correction, covariance, float(sigma0))
 
 
 def linearized(

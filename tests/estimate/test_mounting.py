@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.effects import make_effect
-from mlscorr.estimate import estimate_mounting
+from mlscorr.estimate import believed_mounting, estimate_mounting
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.evaluate.scores import misclosures
 from mlscorr.frames import (
@@ -505,3 +505,17 @@ def test_a_measured_lever_arm_is_a_prior():
     assert np.abs(calibration.lsc.correction[:3]).max() < 3e-3  # m
     assert (calibration.lsc.sigma[:3] <= 1.01e-3).all()
     assert (calibration.lsc.sigma < free.lsc.sigma).all()
+
+
+@pytest.mark.parametrize("count", range(4))
+def test_no_target_makes_a_mounting_worse_than_it_is_without_any(count):
+    """One sigma by least squares is at most what is known without the survey, by any number of targets.
+
+    One target leaves nothing to judge the noise by: what is stated of it holds.
+    """
+    site = Site(5)
+    estimate = believed_mounting(site.recorded, [RECORDED], site.matched[np.arange(count)]).ls
+    assert (estimate.sigma <= prior_sigma(RECORDED) * (1 + 1e-9)).all()
+    assert np.allclose(estimate.covariance, estimate.covariance.T)
+    assert (np.linalg.eigvalsh(estimate.covariance) > 0.0).all()
+    assert (estimate.sigma0 == 1.0) == (count < 2)
