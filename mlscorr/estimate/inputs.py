@@ -27,15 +27,14 @@ def checked_inputs(
     Raises
     ------
     ValueError
-        Without any observation, for an order below zero, and for sigmas that can't be: negative
+        Without any observation, for an order that is none, and for sigmas that can't be: negative
         ones, or none at all of a control point and its observation together.
     """
     if len(matched) == 0:
         raise ValueError(
             "There is no observation of a control point to estimate a correction from."
         )
-    if order < 0:
-        raise ValueError(f"The trend's order is {order}; it should be 0 (a shift) or more.")
+    check_order(order)
     _check_noise(matched)
     if pos.position_sigma < 0 or np.any(np.asarray(pos.attitude_sigma) < 0):
         raise ValueError(
@@ -43,6 +42,23 @@ def checked_inputs(
             f"{np.degrees(pos.attitude_sigma).tolist()} deg; none may be negative."
         )
     return filled_sigmas(trajectory)
+
+
+def check_order(order: int) -> None:
+    """Refuse an order of the trend that is no whole number from 0 on.
+
+    Parameters
+    ----------
+    order : int
+
+    Raises
+    ------
+    ValueError
+    """
+    if not isinstance(order, int | np.integer) or isinstance(order, bool) or order < 0:
+        raise ValueError(
+            f"The trend's order is {order!r}; it should be 0 (a shift) or more, a whole number."
+        )
 
 
 def _check_noise(matched):

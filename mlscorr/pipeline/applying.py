@@ -29,14 +29,14 @@ DATUM = ("horizontal_datum", "vertical_datum")
 TAKEN_OUT = (CLOCK, *MOUNTING, *DATUM)
 
 
-def apply(survey: Survey, effects: Iterable[Effect]) -> AppliedSurvey:
+def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
     """Take effects of known size out of a survey: clock offset, mounting, datum.
 
     Parameters
     ----------
     survey : Survey
         As recorded, with the effects in it.
-    effects : iterable of Effect
+    effects : iterable of Effect, or one
         ``mlscorr.effects.make_effect`` makes them, ``read_effects`` reads what was found.
 
     Returns
@@ -48,7 +48,8 @@ def apply(survey: Survey, effects: Iterable[Effect]) -> AppliedSurvey:
     Raises
     ------
     ValueError
-        For effects that nothing can take out, and for a mounting where there is none, or several.
+        For what is no effect, effects that nothing can take out, and for a mounting where there is
+        none, or several.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.effects import make_effect
@@ -69,7 +70,7 @@ def apply(survey: Survey, effects: Iterable[Effect]) -> AppliedSurvey:
     0.08
     """
     check_survey(survey)
-    effects = tuple(effects)
+    effects = _effects(effects)
     stubborn = [effect for effect in effects if effect.name not in TAKEN_OUT]
     if not effects:
         raise ValueError(f"No effect is given: {joined(TAKEN_OUT)} can be taken out.")
@@ -88,6 +89,19 @@ def apply(survey: Survey, effects: Iterable[Effect]) -> AppliedSurvey:
                 "Add the lever_arm (m) and boresight (deg) that the cloud was georeferenced with."
             )
     return AppliedSurvey(survey, effects, _correction(survey, effects))
+
+
+def _effects(given) -> tuple[Effect, ...]:
+    """One effect or a list of them as a tuple; a ValueError for what is none."""
+    is_list = isinstance(given, Iterable) and not isinstance(given, str)
+    effects = tuple(given) if is_list else (given,)
+    for effect in effects:
+        if not isinstance(effect, Effect):
+            raise ValueError(
+                f"{effect!r} is no effect: mlscorr.effects.make_effect(name, magnitude=size) makes "
+                f"one; {joined(TAKEN_OUT)} can be taken out."
+            )
+    return effects
 
 
 def read_effects(source: str | Path) -> tuple[Effect, ...]:

@@ -11,7 +11,7 @@ from mlscorr.io.las import read_chunks
 from mlscorr.matching import Matches, match
 from mlscorr.pipeline.near_points import NearPoints, check_control, no_control, nothing_found
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Matched, PointCloud, Survey
+from mlscorr.survey import Matched, PointCloud, Survey, check_generator
 from mlscorr.targets import (
     NO_POINTS,
     Candidates,
@@ -138,7 +138,9 @@ def fit_while_reading(
 
     Warns where the intensity tells nothing.
     """
-    seed = (rng or np.random.default_rng(SETTINGS.seed)).integers(2**63)
+    rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
+    check_generator(rng)
+    seed = rng.integers(2**63)
     fits, latest, near = [], [], NearPoints(survey)
 
     def fit(file, index, cloud):

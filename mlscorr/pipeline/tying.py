@@ -18,6 +18,7 @@ from mlscorr.estimate import (
     scanner_warnings,
     with_ties,
 )
+from mlscorr.estimate.inputs import check_order
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.survey import Matched, Survey, TieFeatures, Ties
@@ -79,13 +80,14 @@ def estimate_survey(
     Raises
     ------
     ValueError
-        As ``find_control``, for another use of ties, and where they alone are asked for and there
-        is none.
+        As ``find_control``, for another use of ties, an order that is none, and where they alone
+        are asked for and there is none.
     """
     ties = ("auto" if survey.use_ties else "off") if ties is None else ties
     if ties not in get_args(TieUse):
         known = ", ".join(map(repr, get_args(TieUse)))
         raise ValueError(f"ties = {ties!r} is no use of ties: give one of {known}, or None.")
+    check_order(order)
     if ties == "only":
         survey = without_control(survey)
     collector = TieCollector(survey)

@@ -258,3 +258,23 @@ def check_survey(value: object) -> None:
             f"A Survey belongs where {str(value)[:60]!r} ({type(value).__name__}) was given: read "
             "one with mlscorr.read_survey(path), and give that."
         )
+
+
+def check_generator(value: object) -> None:
+    """Refuse what is no random generator, as a seed.
+
+    Parameters
+    ----------
+    value : object
+        Given as rng.
+
+    Raises
+    ------
+    ValueError
+        With the way out.
+    """
+    if not isinstance(value, np.random.Generator):
+        raise ValueError(
+            f"rng = {str(value)[:60]!r} is no random generator: numpy.random.default_rng(seed) "
+            "makes one of a seed."
+        )

@@ -126,11 +126,12 @@ def test_negative_beliefs_are_refused(pos):
         checked(pos=pos)
 
 
-def test_an_order_below_zero_is_refused():
-    "Order 0 is a shift; there is nothing below it"
-    with pytest.raises(ValueError, match="order is -1; it should be 0"):
-        checked(order=-1)
-    assert checked(order=0)[1] == ()
+@pytest.mark.parametrize("order", [-1, 1.5, "1", None, True])
+def test_an_order_is_a_whole_number_from_zero_on(order):
+    "Order 0 is a shift; there is nothing below it, and nothing between two orders"
+    with pytest.raises(ValueError, match=f"order is {order!r}; it should be 0"):
+        checked(order=order)
+    assert checked(order=0)[1] == checked(order=np.int64(1))[1] == ()
 
 
 def test_a_sigma_of_zero_counts_with_that_of_the_observation():

@@ -132,3 +132,14 @@ def test_what_cannot_be_taken_out_is_named(site):
         mlscorr.apply(survey, [make_effect("range_bias", magnitude=0.01)])
     with pytest.raises(ValueError, match="No effect is given"):
         mlscorr.apply(survey, [])
+    for strange in ("time_offset", ["time_offset"]):
+        with pytest.raises(ValueError, match=r"^'time_offset' is no effect"):
+            mlscorr.apply(survey, strange)
+
+
+def test_one_effect_need_be_in_no_list(site):
+    """An effect by itself is taken out as the list of it is."""
+    with warnings.catch_warnings(action="ignore"):
+        survey = mlscorr.read_survey(site)
+    late = make_effect("time_offset", magnitude=0.01)
+    assert mlscorr.apply(survey, late).effects == mlscorr.apply(survey, [late]).effects == (late,)

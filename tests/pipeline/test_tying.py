@@ -73,6 +73,20 @@ def test_another_use_of_ties_is_refused(survey):
         mlscorr.correct(survey, ties="never")
 
 
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"order": 1.5}, "order is 1.5; it should be 0"),
+        ({"order": None}, "order is None; it should be 0"),
+        ({"rng": 5}, r"rng = '5' is no random generator: numpy.random.default_rng\(seed\)"),
+    ],
+)
+def test_what_is_no_order_and_no_generator_is_refused(survey, given, sentence):
+    """An order between two, and a seed in place of a generator, end in a sentence."""
+    with pytest.raises(ValueError, match=sentence):
+        mlscorr.correct(survey, **given)
+
+
 def test_the_report_tells_what_ties_did(tied, tmp_path):
     """report.json has misfits by pair of passes, and shares that add up to one; the page shows the
     ties on a map, and a wall as each pass saw it

@@ -139,6 +139,12 @@ def test_pulses_can_be_made_again_in_blocks_of_any_size(pair):
         assert sum(block.fired for block in small) == survey.fired
 
 
+def test_a_seed_is_no_generator(short):
+    """A whole number as rng ends in a sentence that makes a generator of it."""
+    with pytest.raises(ValueError, match=r"rng = '5' is no random generator"):
+        simulate(short.scenario, 5)
+
+
 def test_stages_do_not_disturb_each_other(short):
     "Losing GNSS changes what the POS records and nothing else"
     lost = make(with_(SHORT, pos=PosScenario(outages=((1.0, 4.0),))))
