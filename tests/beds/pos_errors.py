@@ -106,9 +106,12 @@ def smooth_case(seed, n=16, sigma=0.1):
 
 def case_at_a_gap():
     "A drive with a constant error and a gap of 5 s, one target at each of its edges"
-    case = Case(EPOCHS, CONSTANT, [EPOCHS[600], EPOCHS[650]], np.random.default_rng(1))
-    old, kept = case.recorded, (EPOCHS <= EPOCHS[600]) | (EPOCHS >= EPOCHS[650])
-    case.recorded, case.true = old.select(kept), case.true.select(kept)
+    case, kept = (
+        Case(EPOCHS, CONSTANT, EPOCHS[[600, 650]], np.random.default_rng(1)),
+        EPOCHS < 60.05,
+    )
+    kept[650:] = True
+    case.recorded, case.true = case.recorded.select(kept), case.true.select(kept)
     return case
 
 

@@ -222,5 +222,5 @@ def test_points_without_a_time_each_have_no_sigma():
     """Three points with six times are refused, as one sigma for each time would be another's."""
     recorded = drive()
     sigma = PointSigma.of(Correction(recorded, recorded), NOISELESS)
-    with pytest.raises(ValueError, match="^3 points came with 6 times"):
+    with pytest.raises(ValueError, match=r"^3 points came with 6 times"):
         sigma.at(np.zeros((3, 3)), np.full(6, START + 1.0))

@@ -509,7 +509,7 @@ def test_a_measured_lever_arm_is_a_prior():
 
 @pytest.mark.parametrize("count", range(4))
 def test_no_target_makes_a_mounting_worse_than_it_is_without_any(count):
-    """One sigma by least squares is at most what is known without the survey, by any number of targets.
+    """One sigma by least squares is at most that without the survey, by any number of targets.
 
     One target leaves nothing to judge the noise by: what is stated of it holds.
     """
