@@ -40,20 +40,22 @@ def accuracy_figure(document: dict) -> Figure:
     control = numbers(accuracy["control_times"])
     places = numbers(place["gps_time"] for place in document["next_control"])
     passes = passes_of(time)
+    # Times at an end of a pass may lie beyond its last sigma, and belong to the nearer pass
+    between = (passes[:-1, 1] + passes[1:, 0]) / 2
     width = np.maximum(np.diff(passes)[:, 0], 0.12 * np.diff(passes).max())
     figure = new_figure(2.6)
     panels = figure.subplots(1, len(passes), sharey=True, squeeze=False, width_ratios=width)[0]
-    for number, (panel, (start, end)) in enumerate(zip(panels, passes, strict=True), start=1):
-        inside = (time >= start) & (time <= end)
+    for number, (panel, start) in enumerate(zip(panels, passes[:, 0], strict=True)):
+        inside = np.searchsorted(between, time) == number
         panel.plot(time[inside] - start, sigma[inside], color=BLUE, label="Corrected position, 3D")
         for times, color, mark, words in (
             (control, GREY, "|", "A control point is seen"),
             (places, VERMILLION, "*", "The next one would help most"),
         ):
-            there = times[(times >= start) & (times <= end)] - start
+            there = times[np.searchsorted(between, times) == number] - start
             panel.plot(there, np.zeros(len(there)), mark, color=color, markersize=8, label=words)
-        panel.set_xlabel(f"Pass {number}: s after {start:.0f}")
-        panel.set_ylim(bottom=-0.04 * sigma.max())
+        panel.set_xlabel(f"Pass {number + 1}: s after {start:.0f}")
+    panels[0].set_ylim(bottom=-0.04 * sigma.max())  # of all, after all: it ends their scaling
     panels[0].set_ylabel("Sigma (cm)")
     legend_above(figure, panels[0].get_legend_handles_labels()[0])
     return figure

@@ -71,6 +71,8 @@ def diagnosis_page(document: dict, name: str) -> Page:
     separability, closure = document["separability"], document["closure"]
     answer, detectable = document["verdict"], separability["detectable"]
     is_clean = is_judged(document) and family(answer["label"]) == "none"
+    labels = dict.fromkeys([*answer["set"], *answer["same"]])
+    alike = [lowered(title(label)) for label in labels if label not in ("none", "unknown")]
     probable, unlikely = _by_probability(cause_rows(document))
     figures = _drawn(diagnosis_figures(document))
     is_empty = {key: key not in figures for key in ("where", "innovations", "evidence", "map")}
@@ -89,6 +91,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "splits_in_words": joined(lowered(split_title(split)) for split in document["where"]),
         "bin_rows": bin_rows(document),
         "shared": "what the cause moves" if is_named(document) else "the squared gap",
+        "alike": [joined(alike)] * (len(alike) > 1),
         "in_set": joined(lowered(title(label)) for label in answer["set"]),
         "cause_rows": probable,
         "unlikely_rows": unlikely,
@@ -128,6 +131,7 @@ def plan_page(document: dict, name: str) -> Page:
         "verdict": _plan_verdict(worst, document),
         "detectable_rows": rows,
         "smallest_rows": [],
+        "alike": [lowered(titles(members)) for members in document["classes"]],
         "compared": False,
         "accuracy_words": accuracy_sentence(document["accuracy"])
         if document.get("accuracy")

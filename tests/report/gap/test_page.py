@@ -233,3 +233,17 @@ def test_a_table_sorts_by_the_heading_that_is_pressed(opened):
     values = opened[0]["effect.html 1280"]["sorted"]
     assert len(values) == 12
     assert values == sorted(values)
+
+
+def test_the_plan_says_whether_an_addition_is_needed_or_helps():
+    """Two effects that look alike need one: where none is offered, those that were tried failed."""
+    needed = plan_document(next_data=[])
+    said = words(plan_page(needed, "street").html())
+    assert "None of the additions that were tried would tell these apart much better" in said
+    assert "No addition is needed" not in said
+    said = words(plan_page(needed | {"classes": []}, "street").html())
+    assert "No addition is needed: no two causes that are open look alike." in said
+    assert "None of the additions" not in said
+    open_pair = KINDS["alike"]() | {"next_data": []}
+    said = words(diagnosis_page(open_pair, "street").html())
+    assert "much better than now: lever arm and vertical datum." in said
