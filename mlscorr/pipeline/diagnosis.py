@@ -28,7 +28,7 @@ from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clo
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate.simulator_file import Simulator, beliefs_of, write_simulator
-from mlscorr.survey import Survey, check_generator, check_survey
+from mlscorr.survey import Survey, check_rng, check_survey
 from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
 
@@ -92,7 +92,7 @@ def diagnose(
     """
     check_survey(survey)
     rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
-    check_generator(rng)
+    check_rng(rng)
     costs = Costs() if costs is None else costs
     survey.check_one_scanner("a diagnosis")
     library = known_effects() if library is None else library

@@ -16,7 +16,7 @@ from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_extracted_csv
 from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, silent, unmatched
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Survey, TargetObservations, check_generator, check_survey
+from mlscorr.survey import Survey, TargetObservations, check_rng, check_survey
 from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
 from mlscorr.targets import BY_EDGES, distinct, search_targets, why_useless
@@ -66,7 +66,7 @@ def extract(
     """
     check_survey(survey)
     rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
-    check_generator(rng)
+    check_rng(rng)
     surveyed = survey.surveyed
     kinds = dict.fromkeys(zip(surveyed.kind, surveyed.size.tolist(), strict=True))
     shapes = [shape for shape in kinds if shape[0] not in BY_EDGES]

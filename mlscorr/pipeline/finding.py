@@ -11,7 +11,7 @@ from mlscorr.io.las import read_chunks
 from mlscorr.matching import Matches, match
 from mlscorr.pipeline.near_points import NearPoints, check_control, no_control, nothing_found
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Matched, PointCloud, Survey, check_generator
+from mlscorr.survey import Matched, PointCloud, Survey, check_rng
 from mlscorr.targets import (
     NO_POINTS,
     Candidates,
@@ -139,7 +139,7 @@ def fit_while_reading(
     Warns where the intensity tells nothing.
     """
     rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
-    check_generator(rng)
+    check_rng(rng)
     seed = rng.integers(2**63)
     fits, latest, near = [], [], NearPoints(survey)
 

@@ -15,7 +15,7 @@ from mlscorr.simulate.drive import drive
 from mlscorr.simulate.scan import MeasuredPulses, Platform, Surfaces, pulses_of_a_pass, shoot
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene import Mesh, Scene, build_scene, static_scan
-from mlscorr.survey import ControlPoints, Mounting, PointCloud, Trajectory, check_generator
+from mlscorr.survey import ControlPoints, Mounting, PointCloud, Trajectory, check_rng
 from mlscorr.survey.summary import Summary
 
 STREAMS = 7  # drive, scene, scan, POS, control, effects, reference: each leaves all others
@@ -217,7 +217,7 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     >>> survey.files, survey.targets.name
     (('pass-1.laz',), ('T01', 'T02', 'T03'))
     """
-    check_generator(rng)
+    check_rng(rng)
     drive_rng, scene_rng, scan_rng, pos_rng, control_rng, *more = rng.spawn(STREAMS)
     effect_rng, static_rng = more
     effects, streams = scenario.imperfections, effect_streams(effect_rng)

@@ -260,7 +260,7 @@ def check_survey(value: object) -> None:
         )
 
 
-def check_generator(value: object) -> None:
+def check_rng(value: object) -> None:
     """Refuse what is no random generator, as a seed.
 
     Parameters

@@ -71,8 +71,6 @@ def diagnosis_page(document: dict, name: str) -> Page:
     separability, closure = document["separability"], document["closure"]
     answer, detectable = document["verdict"], separability["detectable"]
     is_clean = is_judged(document) and family(answer["label"]) == "none"
-    labels = dict.fromkeys([*answer["set"], *answer["same"]])
-    alike = [lowered(title(label)) for label in labels if label not in ("none", "unknown")]
     probable, unlikely = _by_probability(cause_rows(document))
     figures = _drawn(diagnosis_figures(document))
     is_empty = {key: key not in figures for key in ("where", "innovations", "evidence", "map")}
@@ -91,7 +89,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "splits_in_words": joined(lowered(split_title(split)) for split in document["where"]),
         "bin_rows": bin_rows(document),
         "shared": "what the cause moves" if is_named(document) else "the squared gap",
-        "alike": [joined(alike)] * (len(alike) > 1),
+        "open_causes": _open_causes(answer),
         "in_set": joined(lowered(title(label)) for label in answer["set"]),
         "cause_rows": probable,
         "unlikely_rows": unlikely,
@@ -131,7 +129,7 @@ def plan_page(document: dict, name: str) -> Page:
         "verdict": _plan_verdict(worst, document),
         "detectable_rows": rows,
         "smallest_rows": [],
-        "alike": [lowered(titles(members)) for members in document["classes"]],
+        "open_causes": [lowered(titles(members)) for members in document["classes"]],
         "compared": False,
         "accuracy_words": accuracy_sentence(document["accuracy"])
         if document.get("accuracy")
@@ -180,6 +178,13 @@ def _channels(document):
         "distance_rows": distance_rows(document),
         "gap_words": f"{' before, '.join(sides)} after ({span(gap)} when nothing is wrong)",
     }
+
+
+def _open_causes(answer):
+    """The causes in words that a verdict leaves open, as one class; none where it is one cause."""
+    labels = dict.fromkeys([*answer["set"], *answer["same"]])
+    causes = [lowered(title(label)) for label in labels if label not in ("none", "unknown")]
+    return [joined(causes)] if len(causes) > 1 else []
 
 
 def _by_probability(rows):
