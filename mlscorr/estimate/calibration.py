@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 
@@ -112,6 +113,13 @@ class Calibration(Summary):
     notes: tuple[str, ...] = ()
     ties: TieResiduals | None = None
     scanner: ScannerErrors | None = None
+
+    @property
+    def sigma_note(self) -> str:
+        """On what sigmas of the one mounting rest that this geometry can't tell; else empty."""
+        parts = ", ".join(compress(MOUNTING_COMPONENTS, ~self.determined))
+        note = f"not determined: {parts}; its sigma holds only as far as the POS's own do"
+        return note if parts else ""
 
     @property
     def posterior(self) -> Posterior:

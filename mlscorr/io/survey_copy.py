@@ -26,6 +26,7 @@ def write_survey_copy(
     clouds: Sequence[Sequence[str]] = (),
     trajectory: str | None = None,
     control: Sequence[str] = (),
+    notes: Sequence[str] = (),
 ) -> None:
     """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
 
@@ -45,6 +46,8 @@ def write_survey_copy(
         New trajectory.file of all sessions, in the folder.
     control : sequence of str, optional
         Names of the control points by which that one was corrected.
+    notes : sequence of str, optional
+        A comment on the sigmas of each mounting, or an empty one.
     """
     source = as_path(source)
     document = tomlkit.parse(read_bytes(source).decode(ENCODING))
@@ -64,8 +67,9 @@ def write_survey_copy(
                 section["files"][number] = _moved(there, name, source.parent)
     if trajectory is not None:
         _set_trajectory(document, trajectory, sorted(set(control)))
-    for section, mounting in zip(scanners or [document], mountings, strict=bool(mountings)):
-        _set_mounting(section["mounting"], mounting)
+    sections, notes = scanners or [document], notes or [""] * len(mountings)
+    for section, mounting, note in zip(sections, mountings, notes, strict=bool(mountings)):
+        _set_mounting(section["mounting"], mounting, note)
     Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
 
 
@@ -97,11 +101,13 @@ def _listed(section):
     return section if isinstance(section, list) else []
 
 
-def _set_mounting(section, mounting):
+def _set_mounting(section, mounting, note):
     """Lever arm and boresight, and how well they are known."""
     section["lever_arm"], section["boresight"] = mounting_values(mounting)
     if mounting.covariance is not None:
         _set_covariance(section, mounting.covariance)
+        trivia = section["lever_arm_sigma"].trivia  # has the comment on sigmas that were there
+        trivia.comment_ws, trivia.comment = ("  ", f"# {note}") if note else ("", "")
 
 
 def _set_covariance(section, covariance):

@@ -112,6 +112,7 @@ class CalibrationResult(Summary):
                     *survey.corrected_by,
                     *(name for part in parts.values() for name in part.used.name),
                 ],
+                [calibration.sigma_note for calibration in calibrations.values()],
             )
         return content
 
@@ -165,7 +166,7 @@ class CalibratedSurvey(CalibrationResult):
         rows = [("", "correction", "1 sigma", "", "")]
         for row in self.components:
             numbers = (f"{row[f'lsc_{name}']:.4f}" for name in ("correction", "sigma"))
-            doubt = "" if row["determined"] else "not determined by this site"
+            doubt = "" if row["determined"] else "not determined by this site: as the POS states"
             rows.append((row["component"], *numbers, row["unit"], doubt))
         return [(f"{self.survey.name}: what the recorded mounting lacks",), *rows]
 

@@ -126,13 +126,18 @@ def _size(value, sigma, unit):
 
 def _determined(content):
     """Which parts this geometry tells."""
-    open_parts = [row["name"] for row in component_rows(content) if not row["determined"]]
+    open_parts = [
+        f"{row['name']} {_size(row['lsc'], row['lsc_sigma'], row['unit'])}"
+        for row in component_rows(content)
+        if not row["determined"]
+    ]
     count = len(MOUNTING_COMPONENTS)
     if not open_parts:
         return Statement("Determined", "green", f"All {count} parts by this geometry.")
     sentence = (
-        f"{count - len(open_parts)} of {count} parts; this geometry does not tell "
-        f"{', '.join(open_parts)}, which stays open."
+        f"{count - len(open_parts)} of {count} parts by this geometry. Not determined, and changed "
+        "only as far as the accuracy of the POS tells it from what looks the same: "
+        f"{', '.join(open_parts)}."
     )
     return Statement("Determined", "amber", sentence)
 

@@ -335,6 +335,17 @@ def test_a_copied_survey_file_keeps_all_but_the_mounting(tmp_path):
     assert np.allclose(there["mounting"]["boresight"], [90, 0, 35 + np.degrees(0.01)], atol=2e-6)
 
 
+def test_a_sigma_says_in_the_file_what_it_rests_on(tmp_path):
+    """A comment stands beside the sigmas of a mounting, and goes when they are written without."""
+    old, new = tmp_path / "survey.toml", tmp_path / "new.toml"
+    old.write_text(SURVEY)
+    mounting = replace(RECORDED, covariance=1e-6 * np.eye(6))
+    write_survey_copy(old, new, tmp_path, [mounting], notes=["as the POS states"])
+    assert "lever_arm_sigma = [0.001, 0.001, 0.001]  # as the POS states\n" in new.read_text()
+    write_survey_copy(new, old, tmp_path, [mounting])
+    assert "lever_arm_sigma = [0.001, 0.001, 0.001]\n" in old.read_text()
+
+
 @pytest.mark.parametrize(
     "keys, fault",
     [
@@ -391,6 +402,8 @@ def test_the_command_writes_the_calibration(commanded):
     assert content == json.loads(process.stdout)
     assert content["schema"] == "mlscorr.calibration/1"
     assert np.shape(content["determined"]) == (6,)
+    assert not content["determined"][2]
+    assert "# not determined: lever arm" in (out / "survey.toml").read_text()
     for method in ("lsc", "ls"):
         assert np.shape(content[method]["correlation"]) == (6, 6)
         check = content[method]["check"]

@@ -49,7 +49,8 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
     text = words(calibration_page({"name": "site", **content}).html())
     lacks = "lacks lever arm right -91 ± 3.0 mm, boresight about forward 0.300 ± 0.010 deg."
     assert lacks in text
-    assert "5 of 6 parts; this geometry does not tell lever arm up, which stays open" in text
+    assert "5 of 6 parts by this geometry. Not determined, and changed only as far as the" in text
+    assert "tells it from what looks the same: lever arm up 2.0 ± 5.0 mm." in text
     assert content["rating"] == "amber"
     assert text.index(lacks) < text.index("How far the cloud is")
     assert all(row["sentence"] in text for row in content["statements"])
