@@ -72,6 +72,7 @@ class TrajectorySection(TomlSection):
 
     file: str
     accuracy: str | None = None
+    time_constant: Annotated[float, Field(allow_inf_nan=False)] = 0.0  # s, added to its times
     columns: TrajectoryColumns = TrajectoryColumns()
     angles: Literal["deg", "rad"] | None = None
     heading: (

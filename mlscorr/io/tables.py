@@ -244,5 +244,7 @@ def missing_sentence(
             f" If another one of these is meant, say which under [{section}] in survey.toml, as "
             f"columns.{missing[0]} = '...'."
         )
+    if "gps_time" in missing and "utc" in " ".join(header).casefold():
+        hint += " Times in UTC need trajectory.time_constant, too: 18 s since 2017."
     has = listed(header) or "no header"
     return f"{path} has no column {', '.join(missing)}; it has {has}.{hint}"

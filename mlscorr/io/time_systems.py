@@ -7,10 +7,12 @@ plain GPS seconds are found under either flag.
 
 import warnings
 from dataclasses import dataclass
+from datetime import date, timedelta
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mlscorr.io.leap_seconds import EPOCH, leap_seconds
 from mlscorr.io.settings import SETTINGS
 from mlscorr.survey import Trajectory
 
@@ -169,6 +171,21 @@ def usual_systems(times: np.ndarray) -> tuple[str, ...]:
     return ("gps", "standard") if times.min() >= SETTINGS.earliest_time else ("standard",)
 
 
+def utc_lag(*times: np.ndarray) -> int:
+    """GPS time minus UTC on the day of times, by the first that tell it, or else today's. Units: s.
+
+    Parameters
+    ----------
+    *times : (n,) arrays
+        Of cloud or trajectory, each in its own system. Units: s.
+    """
+    for some in times:
+        if (system := usual_systems(some)[0]) != "week":
+            seconds = float(some[0]) + ADJUSTMENT * (system == "standard")
+            return leap_seconds(EPOCH + timedelta(seconds=seconds))
+    return leap_seconds(date.max)
+
+
 def _settle_equal(match, times):
     """Name the system of equal times by their size: a constant of zero says nothing of it."""
     usual = usual_systems(times)
@@ -185,10 +202,19 @@ def _nothing_fits(name, times, span, candidates, setting):
         f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
         f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
     )
+    share = f"Only {largest:.0%} of" if largest > 0 else "None of"
+    for later in (lag := utc_lag(span, times), -lag):
+        constants = [constant for constant, cloud, _ in candidates if setting in ("auto", cloud)]
+        if any(_inside(times, span, constant + later) == 1.0 for constant in constants):
+            return (
+                f"{share} {spans}, but all would with {later:+d} s: one of both may be in UTC. "
+                f"Export both in GPS time, or add {-later} to trajectory.time_constant (s) in "
+                "survey.toml."
+            )
     if largest > 0:
         return (
-            f"Only {largest:.0%} of {spans}: the trajectory covers a part of the cloud. "
-            "Export the whole trajectory, or clip the cloud to it."
+            f"{share} {spans}: the trajectory covers a part of the cloud. Export the whole "
+            "trajectory, or clip the cloud to it."
         )
     if setting == "auto" or max(shares)[0] < SETTINGS.covered_share:
         return (

@@ -27,7 +27,7 @@ from mlscorr.io.trj import MARK
 from mlscorr.survey import Trajectory
 
 SBET_SUFFIXES = (".sbet", ".out")
-NAMED = {"file", "accuracy"}  # keys of any trajectory
+NAMED = {"file", "accuracy", "time_constant"}  # keys of any trajectory
 NOTHING_GIVEN = TrajectorySection(file="")
 
 

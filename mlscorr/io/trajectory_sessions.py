@@ -83,7 +83,10 @@ def read_sessions(
     """
     read = [read_trajectory_file(f.path, crs, f.accuracy, f.section) for f in files]
     names = [file.path.name for file in files]
-    parts = [file.trajectory for file in read]
+    parts = [
+        replace(part.trajectory, gps_time=part.trajectory.gps_time + file.section.time_constant)
+        for part, file in zip(read, files, strict=True)
+    ]
     joined, notes = parts[0], []
     if len(parts) > 1:
         check_systems(names, parts)

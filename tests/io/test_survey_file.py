@@ -71,6 +71,21 @@ def toml(folder, old, new):
 # ---- survey.toml
 
 
+def test_a_time_constant_brings_a_trajectory_in_utc_to_gps_time(folder):
+    "UTC is 18 s behind: 18 s more, and cloud and trajectory agree; without them they don't"
+    right = read_survey(folder)
+    path = folder / "trajectory.csv"
+    header, *rows = path.read_text().splitlines()
+    times = [f"{float(row[:11]) - 18.0:.4f}{row[11:]}" for row in rows]
+    path.write_text("\n".join([header, *times]) + "\n")
+    with pytest.raises(ValueError, match=r"UTC.*add 18 to trajectory.time_constant"):
+        read_survey(folder)
+    (folder / "survey.toml").write_text(TOML.replace('.csv"', '.csv"\ntime_constant = 18.0', 1))
+    survey = read_survey(folder)
+    np.testing.assert_allclose(survey.trajectory.gps_time, right.trajectory.gps_time, atol=1e-6)
+    assert survey.clouds == right.clouds
+
+
 def test_a_survey_is_read_with_its_defaults(folder):
     "Only what must be given is given: beliefs come from the nouns, the mounting stays open"
     survey = read_survey(folder)

@@ -101,6 +101,17 @@ def test_utc_is_not_taken_for_gps_time():
         match_times("a.laz", OF_WEEK[:26] - 18.0, False, trajectory(OF_WEEK[0], OF_WEEK[25]))
 
 
+def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
+    "Where 18 s bring all times inside, the sentence says what to add, and not that a part lacks"
+    for early in (18.0, -18.0):
+        covering = trajectory(OF_WEEK[0] - early - 0.5, OF_WEEK[25] - early + 0.5)
+        sentence = (
+            rf"Only 42% of.*with \{-early:+.0f} s.*add {early:.0f} to trajectory.time_constant"
+        )
+        with pytest.raises(ValueError, match=sentence):
+            match_times("a.laz", OF_WEEK[:26], False, covering)
+
+
 def test_a_trajectory_that_covers_a_part_is_refused():
     "With a third of the cloud covered, the file is said to be short, not the system wrong"
     with pytest.raises(ValueError, match="covers a part of the cloud"):

@@ -132,6 +132,17 @@ def test_columns_without_names_are_numbered(tmp_path):
     assert "heading = column 7 (blanks, decimal point)" in file.layout
 
 
+def test_a_column_in_utc_is_named_with_the_seconds_that_it_needs(tmp_path):
+    "UTC may be meant by gps_time, 18 s behind; other columns need nothing added"
+    text = csv_of(tmp_path / "t.csv", table_of(drive(100, sigmas=False))).read_text()
+    for name, is_utc in (("UTC", True), ("Stempel", False)):
+        path = tmp_path / f"{name}.csv"
+        path.write_text(text.replace("gps_time", name))
+        with pytest.raises(ValueError, match=f"as columns.gps_time = '{name}'") as error:
+            read(path)
+        assert ("UTC need trajectory.time_constant, too: 18 s" in str(error.value)) is is_utc
+
+
 AXES = {  # theirs from ours
     "right-forward-up": np.eye(3),
     "forward-left-up": np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
