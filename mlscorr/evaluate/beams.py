@@ -7,6 +7,7 @@ import numpy as np
 from mlscorr.evaluate.settings import SETTINGS
 from mlscorr.frames import to_scanner
 from mlscorr.io.settings import SETTINGS as IO
+from mlscorr.io.time_systems import utc_lag
 from mlscorr.survey import CloudFile, PointCloud, Survey
 
 
@@ -40,27 +41,31 @@ class BeamCheck:
         return watch
 
     def _sample(self, chunk, mounting):
-        """Time (s), horizontal length (m) and angle off the scan plane (rad) of beams: (n, 3)."""
+        """Time (s), horizontal vector (m) and angle off the scan plane (rad) of beams: (n, 4)."""
         trajectory = self.survey.trajectory
         some = chunk[:: max(1, len(chunk) // IO.sampled_points)]
         some = some[trajectory.segment(some.gps_time) >= 0]
         if not len(some):
-            return np.empty((0, 3))
+            return np.empty((0, 4))
         beam = (some.xyz - trajectory.at(some.gps_time).position)[:, :2]
         off = np.zeros(len(some))
         if mounting is not None:
             x, y, across = to_scanner(trajectory, mounting, some.xyz, some.gps_time).T
             off = np.arctan2(np.abs(across), np.hypot(x, y))
-        return np.column_stack([some.gps_time, np.linalg.norm(beam, axis=1), off])
+        return np.column_stack([some.gps_time, beam, off])
 
     def warnings(self) -> Iterator[str]:
         """A sentence on each file whose beams can't have been measured so."""
         for file, rows in self.samples.items():
-            sample = np.concatenate(rows) if rows else np.empty((0, 3))
+            sample = np.concatenate(rows) if rows else np.empty((0, 4))
             if len(sample) < 10:
                 continue
+            if sentence := self._other_clock(file, *sample[:, :3].T):
+                yield sentence
+                continue
             steps = np.diff(sample[:, 0])
-            length, off = np.median(sample[:, 1]), np.degrees(np.median(sample[:, 2]))
+            length = np.median(np.hypot(*sample[:, 1:3].T))
+            off = np.degrees(np.median(sample[:, 3]))
             if (steps < 0).any() and not (steps > 0).any():
                 yield (
                     f"The times of {file.name} run backwards: none of {len(steps)} sampled points "
@@ -75,3 +80,37 @@ class BeamCheck:
                     "another survey with the same times, its gps_time wrong (UTC is 18 s late), or "
                     "[mounting] another scanner's or not in m and deg. Take out what doesn't fit."
                 )
+
+    def _other_clock(self, file, times, *beam):
+        """A sentence where points lie about the vehicle leap seconds before or after their times.
+
+        They do where three of four lie nearer to that place than half the way there, and so farther
+        from the vehicle. A scanner that looks ahead has beams of many lengths, and a vehicle that
+        hardly moves tells neither.
+        """
+        trajectory, beam = self.survey.trajectory, np.column_stack(beam)
+        lag = utc_lag(trajectory.gps_time, times - file.time_constant)
+        for later in (-lag, lag):
+            way = _place(trajectory, times + later) - _place(trajectory, times)
+            driven = np.linalg.norm(way, axis=1)
+            rows = (trajectory.segment(times + later) >= 0) & (driven > IO.moving * lag)
+            length, shifted = (np.linalg.norm(x[rows], axis=1) for x in (beam, beam - way))
+            if len(length) < 10 or np.quantile(shifted / driven[rows], 0.75) > 0.5:
+                continue
+            order, side = ("later", "before") if later < 0 else ("earlier", "after")
+            behind, ahead = ("trajectory", "cloud") if later < 0 else ("cloud", "trajectory")
+            return (
+                f"The times of {file.name} are {lag} s {order} than the trajectory's: its points "
+                f"lie {np.median(length):.0f} m beside the vehicle, and {np.median(shifted):.0f} m "
+                f"beside where it is {lag} s {side} (horizontal medians of {len(length)} samples). "
+                f"The {behind} seems to be in UTC, the {ahead} in GPS time: export both in GPS "
+                f"time, or add {-later} to trajectory.time_constant (s) in survey.toml."
+            )
+        return ""
+
+
+def _place(trajectory, times):
+    """Easting and northing (n, 2) at times, that of its ends beyond them. Units: m."""
+    return np.column_stack(
+        [np.interp(times, trajectory.gps_time, x) for x in trajectory.position.T[:2]]
+    )

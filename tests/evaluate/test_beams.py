@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from mlscorr.evaluate.beams import BeamCheck
+from mlscorr.frames import attitude_from_angles
 from mlscorr.io.las import read_chunks
 from mlscorr.io.survey_file import read_survey
-from mlscorr.survey import PointCloud
+from mlscorr.survey import PointCloud, Trajectory
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +66,44 @@ def test_a_tile_of_another_town_is_named_without_a_mounting(survey):
 
     (sentence,) = said(replace(survey, mounting=None), moved)
     assert "pass-1.laz lie 3" in sentence and "m beside the trajectory" in sentence
+
+
+def clocks(survey, late, beam=((0.0, -8.0), (0.0, 8.0)), speed=5.0, start=357_700.0, system="week"):
+    "Warnings where the trajectory's times are late (s), and beams go ahead and to the left (m)"
+    times = np.linspace(0.0, 100.0, 1001)  # s
+    path = np.outer(speed * times, [1.0, 0.0, 0.0])
+    level = attitude_from_angles(np.zeros(len(times)), 0.0, 0.0)
+    trajectory = Trajectory(start + late + times, path, level)
+    seen = times[200:800]
+    ahead, left = np.resize(beam, (len(seen), 2)).T
+    xyz = np.column_stack([speed * seen + ahead, left, np.zeros(len(seen))])
+    cloud = PointCloud(xyz, start + seen, np.zeros(len(seen), np.uint16))
+    file = replace(survey.clouds[0], time_constant=0.0, time_system=system)
+    check = BeamCheck(replace(survey, trajectory=trajectory, clouds=(file,), mounting=None))
+    list(check.watched(lambda _: [cloud])(file))
+    return list(check.warnings())
+
+
+def test_a_trajectory_in_utc_is_named_with_the_seconds_and_both_distances(survey):
+    "Points 8 m beside the vehicle lie 90 m behind it where its times are 18 s early"
+    (sentence,) = clocks(survey, -18.0)
+    assert "The times of pass-1.laz are 18 s later than the trajectory's" in sentence
+    assert "lie 90 m beside the vehicle, and 8 m beside where it is 18 s before" in sentence
+    assert "trajectory seems to be in UTC" in sentence
+    assert "add 18 to trajectory.time_constant" in sentence
+
+
+def test_a_cloud_in_utc_is_named_by_the_leap_seconds_of_its_day(survey):
+    "On a day of 2016 both were 17 s apart; a trajectory of GPS seconds tells the day"
+    (sentence,) = clocks(survey, 17.0, start=1_150_000_000.0, system="gps")
+    assert "are 17 s earlier than" in sentence and "beside where it is 17 s after" in sentence
+    assert "cloud seems to be in UTC" in sentence
+    assert "add -17 to trajectory.time_constant" in sentence
+
+
+def test_a_right_clock_or_a_slow_vehicle_hears_nothing_of_leap_seconds(survey):
+    "Half a metre a second tells nothing; a boat may look where it is 18 s later"
+    assert clocks(survey, 0.0) == []
+    assert clocks(survey, -18.0, speed=0.5) == clocks(survey, 18.0, speed=0.5) == []
+    assert clocks(survey, 0.0, beam=((20.0, 28.0), (22.0, 30.0)), speed=1.1) == []
+    assert clocks(survey, 0.0, beam=((5.0, 1.0), (20.0, 4.0), (45.0, 9.0)), speed=1.1) == []
