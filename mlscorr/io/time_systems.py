@@ -69,7 +69,8 @@ def match_times(
     Raises
     ------
     ValueError
-        When most of the times lie outside the trajectory under every constant.
+        When most of the times lie outside the trajectory under every constant, and when those
+        outside are seconds of the next week or the one before.
 
     Warns
     -----
@@ -112,7 +113,23 @@ def match_times(
                 f"[{times.min():.1f}, {times.max():.1f}] s fit the trajectory as {match}.",
                 stacklevel=2,
             )
+    _check_week_end(name, times, span, match)
     return match
+
+
+def _check_week_end(name, times, span, match):
+    """Refuse seconds of week that start again where the trajectory's run on."""
+    placed = times + match.constant
+    outside = placed[(placed < span[0]) | (placed > span[1])]
+    for week in (-WEEK, WEEK) if match.cloud_system == "week" and len(outside) else ():
+        if share := _inside(outside, span, week):
+            raise ValueError(
+                f"The GPS week ends within {name}: {share * len(outside):.0f} of {len(times)} "
+                f"sampled times [{times.min():.3f}, {times.max():.3f}] s lie inside the trajectory "
+                f"[{span[0]:.3f}, {span[1]:.3f}] s with {week:+.0f} s only, the others without. "
+                "Export it in adjusted standard GPS time, or cut it into two files where its times "
+                "start again."
+            )
 
 
 def _candidates(times, span):

@@ -101,6 +101,21 @@ def test_utc_is_not_taken_for_gps_time():
         match_times("a.laz", OF_WEEK[:26] - 18.0, False, trajectory(OF_WEEK[0], OF_WEEK[25]))
 
 
+def test_a_week_that_ends_within_a_cloud_is_refused():
+    "Half of the times start again at 0 while the trajectory's run on: cut there, each half fits"
+    running = np.linspace(604_770.0, 604_829.0, 60)  # s
+    covering, times = trajectory(604_765.0, 604_835.0), running % 604_800.0
+    sentence = r"GPS week ends within a.laz: 30 of 60.*with \+604800 s only.*cut it into two files"
+    with pytest.raises(ValueError, match=sentence):
+        match_times("a.laz", times, False, covering)
+    with pytest.raises(ValueError, match="15 of 45 sampled times"):
+        match_times("a.laz", times[:45], False, covering, "week")
+    with pytest.raises(ValueError, match=r"15 of 45 sampled times.*with -604800 s only"):
+        match_times("a.laz", times[15:], False, trajectory(-35.0, 35.0))
+    for part, constant in ((times[:30], 0.0), (times[30:], 604_800.0)):
+        assert match_times("a.laz", part, False, covering).constant == constant
+
+
 def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
     "Where 18 s bring all times inside, the sentence says what to add, and not that a part lacks"
     for early in (18.0, -18.0):
