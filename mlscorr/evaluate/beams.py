@@ -22,6 +22,7 @@ class BeamCheck:
     def __init__(self, survey: Survey):
         self.survey = survey
         self.samples: dict[CloudFile, list[np.ndarray]] = {}
+        self.segments: dict[CloudFile, list[np.ndarray]] = {}
 
     def watched(self, read: Callable) -> Callable:
         """A function that reads as another one does, and samples what it gives.
@@ -33,18 +34,19 @@ class BeamCheck:
         """
 
         def watch(file: CloudFile) -> Iterator[PointCloud]:
-            rows = self.samples[file] = []
+            rows, numbers = self.samples[file], self.segments[file] = [], []
             for chunk in read(file):
-                rows.append(self._sample(chunk, self.survey.of(file).mounting))
+                some = chunk[:: max(1, len(chunk) // IO.sampled_points)]
+                numbers.append(self.survey.trajectory.segment(some.gps_time))
+                some = some[numbers[-1] >= 0]
+                rows.append(self._sample(some, self.survey.of(file).mounting))
                 yield chunk
 
         return watch
 
-    def _sample(self, chunk, mounting):
+    def _sample(self, some, mounting):
         """Time (s), horizontal vector (m) and angle off the scan plane (rad) of beams: (n, 4)."""
         trajectory = self.survey.trajectory
-        some = chunk[:: max(1, len(chunk) // IO.sampled_points)]
-        some = some[trajectory.segment(some.gps_time) >= 0]
         if not len(some):
             return np.empty((0, 4))
         beam = (some.xyz - trajectory.at(some.gps_time).position)[:, :2]
@@ -53,6 +55,11 @@ class BeamCheck:
             x, y, across = to_scanner(trajectory, mounting, some.xyz, some.gps_time).T
             off = np.arctan2(np.abs(across), np.hypot(x, y))
         return np.column_stack([some.gps_time, beam, off])
+
+    def outside(self) -> Iterator[str]:
+        """A sentence on each file with points outside the trajectory."""
+        for file, numbers in self.segments.items():
+            yield from outside_warnings(self.survey, file, np.concatenate([[], *numbers]))
 
     def warnings(self) -> Iterator[str]:
         """A sentence on each file whose beams can't have been measured so."""
@@ -107,6 +114,26 @@ class BeamCheck:
                 f"time, or add {-later} to trajectory.time_constant (s) in survey.toml."
             )
         return ""
+
+
+def outside_warnings(survey: Survey, file: CloudFile, segment: np.ndarray) -> Iterator[str]:
+    """A sentence where points of a file lie outside the trajectory or in its gaps.
+
+    Parameters
+    ----------
+    survey : Survey
+    file : CloudFile
+    segment : (n,) int array
+        Of the trajectory, of times spread over the file; -1 where none has it.
+    """
+    if (segment < 0).any():
+        start, end = survey.trajectory.gps_time[[0, -1]]
+        yield (
+            f"About {np.mean(segment < 0):.0%} of the points of {file.name} lie outside the "
+            f"trajectory [{start:.3f}, {end:.3f}] s or in its gaps ({len(survey.trajectory.gaps)})"
+            f", by {len(segment)} times spread over it: they stay as they are (exit code 4). "
+            "Export the whole trajectory."
+        )
 
 
 def _place(trajectory, times):

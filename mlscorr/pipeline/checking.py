@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.estimate import few_targets
+from mlscorr.evaluate.beams import outside_warnings
 from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.io.conversion import read_in_part
 from mlscorr.io.las import spread_records
@@ -145,15 +146,7 @@ def _placed_times(survey) -> tuple[int, list[str]]:
             continue
         segment = survey.trajectory.segment(times)
         passes += len(set(segment[segment >= 0].tolist()))
-        share = float(np.mean(segment < 0))
-        if share > 0:
-            start, end = survey.trajectory.gps_time[[0, -1]]
-            outside.append(
-                f"About {share:.0%} of the points of {file.name} lie outside the trajectory "
-                f"[{start:.3f}, {end:.3f}] s or in its gaps ({len(survey.trajectory.gaps)}), by "
-                f"{len(segment)} times spread over it: they stay as they are (exit code 4). Export "
-                "the whole trajectory."
-            )
+        outside += outside_warnings(survey, file, segment)
     return passes, outside
 
 

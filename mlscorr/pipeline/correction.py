@@ -67,8 +67,8 @@ def correct(
     check_survey(survey)
     survey, control, check, finding, estimate = estimate_survey(survey, order, ties, rng, progress)
     result = CorrectedSurvey(**corrected_fields(survey, control, check, finding, estimate))
-    datum = result.warnings[len(finding.warnings) :]  # those of the finding were told meanwhile
-    for sentence in (*datum, *estimate.warnings):
+    others = result.warnings[len(finding.warnings) :]  # those of the finding were told meanwhile
+    for sentence in (*others, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
     return result
 
@@ -88,6 +88,7 @@ def corrected_fields(
         By the control points.
     """
     datum = datum_warnings(control[estimate.used], survey.trajectory, survey.pos)
+    others = *finding.uncovered, *datum, *reuse_warnings(survey)
     return {
         "survey": survey,
         "estimate": estimate,
@@ -97,5 +98,5 @@ def corrected_fields(
             survey, finding.matches.refusals, finding.candidates, finding.scanned
         ),
         "fitted": finding.fitted,
-        "warnings": (*finding.warnings, *datum, *reuse_warnings(survey)),
+        "warnings": (*finding.warnings, *others),
     }

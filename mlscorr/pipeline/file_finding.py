@@ -25,8 +25,8 @@ class FileFinding:
         Points near surveyed points without a pose.
     scanned : frozenset of str
         Names of the surveyed points that have points of it about them.
-    warnings : tuple of str
-        On beams that can't have been measured so.
+    warnings, uncovered : tuple of str
+        On beams that can't have been measured so, and on points outside the trajectory.
     features : TieFeatures
         Planes and poles; the number of the pass is that of the segment.
     """
@@ -36,6 +36,7 @@ class FileFinding:
     unplaced: PointCloud
     scanned: frozenset[str]
     warnings: tuple[str, ...]
+    uncovered: tuple[str, ...]
     features: TieFeatures
 
 
@@ -64,6 +65,7 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
         unplaced=candidates.unplaced,
         scanned=frozenset(names[i] for i in np.flatnonzero(near.is_scanned)),
         warnings=tuple(near.beams.warnings()),
+        uncovered=tuple(near.beams.outside()),
         features=replace(features, pass_number=np.array(numbers, int)),
     )
 
@@ -109,5 +111,6 @@ def join_findings(survey: Survey, files: Sequence[FileFinding]) -> tuple[Finding
         finding,
         scanned=frozenset().union(*(file.scanned for file in files)),
         warnings=tuple(sentence for file in files for sentence in file.warnings),
+        uncovered=tuple(sentence for file in files for sentence in file.uncovered),
     )
     return finding, TieFeatures.concatenate(parts)

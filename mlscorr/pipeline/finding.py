@@ -39,6 +39,8 @@ class Finding:
         Names of the surveyed points that have points of the cloud about them.
     warnings : tuple of str
         On cloud files whose beams can't have been measured so.
+    uncovered : tuple of str
+        On cloud files with points outside the trajectory.
     """
 
     matches: Matches
@@ -46,6 +48,7 @@ class Finding:
     fitted: dict[tuple[int, float], FittedTarget]
     scanned: frozenset[str] = frozenset()
     warnings: tuple[str, ...] = ()
+    uncovered: tuple[str, ...] = ()
 
     def scanners(self, survey: Survey) -> dict[int, int]:
         """Number of the scanner of each pass.
@@ -90,7 +93,7 @@ def _bar(survey, progress):
 
 def _checked(survey, targets, candidates, near):
     """The Finding of what fit_while_reading gives; raises as find_targets does."""
-    sentences = tuple(near.beams.warnings())
+    uncovered, sentences = tuple(near.beams.outside()), tuple(near.beams.warnings())
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=4)
     if len(targets) == 0:
@@ -104,7 +107,7 @@ def _checked(survey, targets, candidates, near):
             "same CRS?"
         )
     names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
-    return replace(finding, scanned=names, warnings=sentences)
+    return replace(finding, scanned=names, warnings=sentences, uncovered=uncovered)
 
 
 def fit_while_reading(
