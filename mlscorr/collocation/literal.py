@@ -119,13 +119,9 @@ class LiteralCollocation:
                 f"{len(rows)} rows of {epochs.sum()} epochs are left out: an epoch's {r} rows go "
                 "together."
             )
-        others = collocate_literal(
-            self.gps_time[kept],
-            self.misclosure[kept],
-            self.noise.select(kept),
-            self.design[kept],
-            [_select(signal, kept) for signal in self.signals],
-        )
+        signals = [_select(signal, kept) for signal in self.signals]
+        given = self.gps_time[kept], self.misclosure[kept], self.noise.select(kept)
+        others = collocate_literal(*given, self.design[kept], signals)
         partials = [signal.partials[epochs] for signal in self.signals]
         mean, _ = others.predict(self.gps_time[epochs], self.design[epochs], partials)
         residuals = np.full((n, r), np.nan)

@@ -43,12 +43,7 @@ def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     ----------
     a, b : (k, i), (k, j) array
     """
-    out = np.zeros((a.shape[1], b.shape[1]))
-    for k in range(a.shape[0]):
-        for i in range(a.shape[1]):
-            for j in range(b.shape[1]):
-                out[i, j] += a[k, i] * b[k, j]
-    return out
+    return multiply(a.T, b)
 
 
 @njit(cache=True, nogil=True)
