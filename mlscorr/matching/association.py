@@ -106,14 +106,11 @@ def match(
     named = replace(observations, name=tuple(control.name[c] if c >= 0 else None for c in column))
     elsewhere = decision.moved(pairs)[rank]
     names = tuple(control.name[c] for c in elsewhere[elsewhere >= 0])
-    return Matches(
-        named[column >= 0],
-        named[column < 0],
-        refusals,
-        decision.probability[rank][column >= 0],
-        tuple(reasons[i] for i in rank[column < 0]),
-        replace(observations[elsewhere >= 0], name=names),
-    )
+    moved = replace(observations[elsewhere >= 0], name=names)
+    is_matched = column >= 0
+    probability = decision.probability[rank][is_matched]
+    why = tuple(reasons[i] for i in rank[~is_matched])
+    return Matches(named[is_matched], named[~is_matched], refusals, probability, why, moved)
 
 
 def _decide(chain, count):
