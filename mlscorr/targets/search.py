@@ -43,14 +43,10 @@ def search_targets(
     carried = None
     for chunk in chunks:
         whole = chunk if carried is None else PointCloud.concatenate([carried, chunk])
-        yield (
-            chunk,
-            [
-                target
-                for cloud, path, region in _pieces(whole, survey)
-                for target in _fit_piece(cloud, path, region, shapes, survey.scanner, rng)
-            ],
-        )
+        targets = []
+        for piece in _pieces(whole, survey):
+            targets += _fit_piece(*piece, shapes, survey.scanner, rng)
+        yield chunk, targets
         carried = _end_of(chunk)
 
 
