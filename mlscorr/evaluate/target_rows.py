@@ -64,22 +64,11 @@ def target_rows(
     after, sigma = misclosures(matched, correction), np.sqrt(matched.variance)  # Eq. 19
     left_out = np.full_like(before, np.nan) if left_out is None else left_out.copy()
     left_out[~np.isfinite(left_out).all(axis=1)] = np.nan
+    vectors = matched.surveyed.position, observations.position, sigma, before, after, left_out
+    origins = matched.name, observations.pass_number.tolist(), observations.gps_time.tolist()
     return [
-        TargetRow(
-            name,
-            int(observations.pass_number[i]),
-            float(observations.gps_time[i]),
-            role,
-            matched.surveyed.position[i],
-            observations.position[i],
-            sigma[i],
-            before[i],
-            after[i],
-            left_out[i],
-            reasons[i] is None,
-            reasons[i],
-        )
-        for i, name in enumerate(matched.name)
+        TargetRow(name, number, time, role, *row, reason is None, reason)
+        for name, number, time, *row, reason in zip(*origins, *vectors, reasons, strict=True)
     ]
 
 

@@ -61,16 +61,15 @@ def pair_rows(residuals: TieResiduals) -> list[dict[str, object]]:
     for passes in np.unique(ties.pass_number, axis=0):
         inside = (ties.pass_number == passes).all(axis=1)
         both = inside & residuals.used
-        rows.append(
-            {
-                "passes": passes.tolist(),
-                "scanners": (ties.scanner[inside][0] + 1).tolist(),
-                "n": int(inside.sum()),
-                "used": int(both.sum()),
-                "before": misfit(ties.misclosure[both]),
-                "after": misfit(residuals.after[both]),
-            }
-        )
+        row = {
+            "passes": passes.tolist(),
+            "scanners": (ties.scanner[inside][0] + 1).tolist(),
+            "n": int(inside.sum()),
+            "used": int(both.sum()),
+            "before": misfit(ties.misclosure[both]),
+            "after": misfit(residuals.after[both]),
+        }
+        rows.append(row)
     return rows
 
 
