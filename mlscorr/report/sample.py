@@ -49,7 +49,7 @@ class CloudSample:
 def gather(
     chunks: Iterable[PointCloud],
     targets: list[TargetRow],
-    walls: np.ndarray | None = None,
+    walls: np.ndarray,
     limit: int = SETTINGS.sample_points,
 ) -> CloudSample:
     """The sample of a cloud that is streamed as chunks.
@@ -59,13 +59,12 @@ def gather(
     chunks : iterable of PointCloud
     targets : list of TargetRow
         Those near which points are kept.
-    walls : (k, 3) array, optional
+    walls : (k, 3) array
         Places near which points are kept, too. Units: m.
     limit : int
         Of the points spread over the cloud, near targets and near walls: at most twice as many.
     """
-    nothing = np.empty((0, 3))
-    regions = _cells(targets), _about(nothing if walls is None else walls, SETTINGS.plan_cell)
+    regions = _cells(targets), _about(walls, SETTINGS.plan_cell)
     spread, near = EvenSample(limit), [EvenSample(limit) for _ in regions]
     for chunk in chunks:
         spread.add(chunk)

@@ -5,15 +5,17 @@ import numpy as np
 from mlscorr.report.sample import gather
 from tests.beds.street_of_points import ORIGIN, pieces, street, target
 
+NO_WALLS = np.empty((0, 3))
+
 
 def test_a_small_cloud_is_gathered_whole_and_a_large_one_evenly():
     "All of 10 000 points where there is room; else every 2^k-th, and all near the targets"
     cloud = street(10_000, np.random.default_rng(1))
-    whole = gather(pieces(cloud, 700), [])
+    whole = gather(pieces(cloud, 700), [], NO_WALLS)
     assert whole.step == 1
     np.testing.assert_array_equal(whole.cloud.xyz, cloud.xyz)
     row = target("T1", np.add(ORIGIN, [100.0, 0.0, 2.0]))
-    thinned = gather(pieces(cloud, 700), [row], limit=1000)
+    thinned = gather(pieces(cloud, 700), [row], NO_WALLS, limit=1000)
     assert thinned.step == 8
     np.testing.assert_array_equal(thinned.cloud.xyz[:1250], cloud.xyz[::8])
     near = np.linalg.norm(cloud.xyz - row.observed, axis=1) < 2.0
@@ -27,7 +29,7 @@ def test_the_sample_does_not_depend_on_the_chunks():
     "Chunks of 300 or of 4000 points give the same sample"
     cloud = street(10_000, np.random.default_rng(2))
     rows = [target("T1", np.add(ORIGIN, [40.0, 3.0, 2.0]))]
-    samples = [gather(pieces(cloud, size), rows, limit=2000) for size in (300, 4000)]
+    samples = [gather(pieces(cloud, size), rows, NO_WALLS, limit=2000) for size in (300, 4000)]
     np.testing.assert_array_equal(*(sample.cloud.xyz for sample in samples))
     assert samples[0].step == samples[1].step == 4
 

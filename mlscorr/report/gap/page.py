@@ -131,9 +131,7 @@ def plan_page(document: dict, name: str) -> Page:
         "smallest_rows": [],
         "open_causes": [lowered(titles(members)) for members in document["classes"]],
         "compared": False,
-        "accuracy_words": accuracy_sentence(document["accuracy"])
-        if document.get("accuracy")
-        else "",
+        "accuracy_words": accuracy_sentence(known) if (known := document.get("accuracy")) else "",
     }
     if document["advice"]:
         content["advice_title"] = "What to add"
@@ -169,11 +167,10 @@ def _channels(document):
     """What is shown of channels beside geometry, and of distances."""
     contrasts, gap = document.get("contrasts", ()), document["gap"]
     sides = (signed(gap[when], gap["unit"]) for when in ("before", "after"))
+    silent = [(WORDS[c["channel"]][0], c["silent"]) for c in contrasts if c["silent"]]
     return {
         "channel_sentences": [text for each in contrasts for text in each["sentences"]],
-        "channels_silent": [
-            (WORDS[c["channel"]][0], c["silent"]) for c in contrasts if c["silent"]
-        ],
+        "channels_silent": silent,
         "channel_rows": channel_rows(document),
         "distance_rows": distance_rows(document),
         "gap_words": f"{' before, '.join(sides)} after ({span(gap)} when nothing is wrong)",

@@ -109,12 +109,11 @@ def lone_rows(effects: list[dict]) -> list[RoundRow]:
     effects : list of dict
         ``alone`` of ``ablation`` in gap.json.
     """
-    return [
-        RoundRow(
-            title(r["effect"]), "", *(signed(r[k], r["unit"]) for k in ("before", "after")), ""
-        )
-        for r in effects
-    ]
+    rows = []
+    for r in effects:
+        before, after = (signed(r[key], r["unit"]) for key in ("before", "after"))
+        rows.append(RoundRow(title(r["effect"]), "", before, after, ""))
+    return rows
 
 
 def split_title(split: dict) -> str:

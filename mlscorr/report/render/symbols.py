@@ -82,6 +82,7 @@ def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
         arrows = {"E": camera.axes[:2, 0], "N": camera.axes[:2, 1]}
     tips = np.array([[0, 0], *(1.35 * d for d in arrows.values())]) * [1, -1] * arm + middle
     _paper(axes, *(tips.min(axis=0) - 0.4 * arm), *(tips.max(axis=0) + 0.4 * arm))
+    line: dict[str, Any] = {"arrowstyle": "<|-", "linewidth": 1.4, "shrinkA": 1, "shrinkB": 0}
     for name, direction in arrows.items():
         color = "#777777" if name in ("E", "up") else "black"
         axes.annotate(
@@ -93,13 +94,7 @@ def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
             color=color,
             fontsize=letter(axes, 0.8),
             fontweight="normal" if name in ("E", "up") else "bold",
-            arrowprops={
-                "arrowstyle": "<|-",
-                "color": color,
-                "linewidth": 1.4,
-                "shrinkA": 1,
-                "shrinkB": 0,
-            },
+            arrowprops={**line, "color": color},
         )
 
 
