@@ -96,11 +96,7 @@ def correct(
             out, overwrite, progress, sigma, page=not no_report, trajectories=trajectory
         )
     tell(report, out, as_json)
-    failed = failures(gates, report)
-    for sentence in failed:
-        terminal.warn(f"Quality gate failed: {sentence}")
-    if failed or report["coverage"]["points_untouched"]:
-        raise typer.Exit(terminal.Exit.QUALITY_GATE if failed else terminal.Exit.IN_PART)
+    terminal.end(failures(gates, report), not report["coverage"]["points_untouched"])
 
 
 def tell(report: dict, out: Path, as_json: bool) -> None:

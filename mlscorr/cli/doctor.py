@@ -16,9 +16,8 @@ def doctor(as_json: Json = False) -> None:
         say(f"{part.mark:7s} {part.name}: {part.state}")
     for line in installation.remedies:
         say(f"To install what is missing:  {line}")
-    names = {"state": "found"}
     rows = [
-        {names.get(key, key): value for key, value in vars(part).items()}
+        {"found" if key == "state" else key: value for key, value in vars(part).items()}
         for part in installation.parts
     ]
     print_json(document("doctor", {"findings": rows}), as_json)

@@ -62,10 +62,7 @@ def correct_drives(
         for name, report in result.reports.items()
         for sentence in failures(gates, report)
     ]
-    for sentence in failed:
-        terminal.warn(f"Quality gate failed: {sentence}")
-    if failed or not result.is_whole:
-        raise typer.Exit(terminal.Exit.QUALITY_GATE if failed else terminal.Exit.IN_PART)
+    terminal.end(failed, result.is_whole)
 
 
 def tell(sentence: str) -> None:

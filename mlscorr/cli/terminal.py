@@ -211,6 +211,27 @@ def warn(text: object) -> None:
     print(shown, file=sys.stderr)  # names of files and points may hold what moves the cursor
 
 
+def end(failed: list[str], is_whole: bool) -> None:
+    """Name the quality gates that failed, and exit unless none did and all was corrected.
+
+    Parameters
+    ----------
+    failed : list of str
+        Sentences.
+    is_whole : bool
+        Whether no point was left as it was.
+
+    Raises
+    ------
+    typer.Exit
+        With the code of failed gates, or of results in part.
+    """
+    for sentence in failed:
+        warn(f"Quality gate failed: {sentence}")
+    if failed or not is_whole:
+        raise typer.Exit(Exit.QUALITY_GATE if failed else Exit.IN_PART)
+
+
 def say_statements(statements: list[dict]) -> None:
     """Print the first screen of a document; what is red is said in any case.
 
