@@ -223,6 +223,8 @@ def missing_sentence(
     known = {name: our for our, words in names.items() for name in (plain(our), *words.split())}
     near = {known.get(nearest(plain(cell), known) or ""): cell for cell in others}
     near |= {name: cell for name in missing if (cell := nearest(name, others))}
+    if in_utc := [cell for cell in others if "utc" in cell.casefold()]:
+        near["gps_time"] = in_utc[0]
     near |= dict(seeming or {})
     candidates = [name for name in missing if name in near]
     hint, section = "", section_of(names)
@@ -244,7 +246,7 @@ def missing_sentence(
             f" If another one of these is meant, say which under [{section}] in survey.toml, as "
             f"columns.{missing[0]} = '...'."
         )
-    if "gps_time" in missing and "utc" in " ".join(header).casefold():
+    if "gps_time" in missing and "utc" in near.get("gps_time", "").casefold():
         hint += " Times in UTC need trajectory.time_constant, too: 18 s since 2017."
     has = listed(header) or "no header"
     return f"{path} has no column {', '.join(missing)}; it has {has}.{hint}"
