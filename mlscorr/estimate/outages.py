@@ -47,7 +47,7 @@ def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameter
         Of control points, and of some ties, whose epochs tell starts apart between the points.
     """
     history = equations.stated.history
-    edges, starts = history.edges, equations.stated.starts
+    edges, stated = history.edges, equations.stated.starts
     ends_by_step = np.isin(edges[1:], history.steps.middle)
     begins_pass = np.isin(edges[:-1], history.trajectory.passes[:, 0])
     segments = list(zip(edges[:-1], edges[1:], begins_pass, ends_by_step, strict=True))
@@ -55,18 +55,20 @@ def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameter
     times = np.append(equations.observed, tied)
     objective = Objective.of(equations)
     mode, _ = objective.maximum(INTEGRATED, objective.initial)
+    starts = stated
     for _ in range(SETTINGS.rounds):
         before = starts
         for number, segment in enumerate(segments):
             part = _about(equations, *segment[:2])
-            candidates = _candidates(times, *segment)
-            best = Objective.of(part.with_starts(starts))(INTEGRATED, mode)
-            best += np.log(len(candidates)) * (starts[number] == segment[0])
+            candidates = np.append(starts[number], _candidates(times, *segment))
+            scores = []
             for candidate in candidates:
                 tried = np.where(np.arange(len(starts)) == number, candidate, starts)
-                value = Objective.of(part.with_starts(tried))(INTEGRATED, mode)
-                if value > best:
-                    starts, best = tried, value
+                scores.append(Objective.of(part.with_starts(tried))(INTEGRATED, mode))
+            # What is stated stands unless control makes another start as likely as all together
+            scores += np.log(len(scores)) * (candidates == stated[number])
+            likeliest = candidates[np.argmax(scores)]
+            starts = np.where(np.arange(len(starts)) == number, likeliest, starts)
         if np.array_equal(before, starts):
             break
         objective = Objective.of(equations.with_starts(starts))

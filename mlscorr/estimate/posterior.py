@@ -46,8 +46,8 @@ class Posterior:
 class Objective:
     """Restricted likelihood times prior, as a function of the free parameters' logarithms.
 
-    Large surveys are cut into blocks of time whose likelihoods are multiplied: the work then
-    grows with their length, not with its cube.
+    Large surveys are cut into blocks of targets whose likelihoods are multiplied: the work then
+    grows with their number, not with its cube.
 
     Parameters
     ----------
