@@ -95,7 +95,7 @@ def _intensity(table, value, sigma, where):
 
 def _pair(value, sigma):
     """A figure ± its sigma, with as many decimals as the sigma's first figure asks for."""
-    places = int(np.clip(-np.floor(np.log10(max(sigma, 1e-9))), 0, 3))
+    places = int(np.clip(-np.floor(np.log10(max(sigma, 1e-9))), 0, 4))
     return f"{value:.{places}f} ± {sigma:.{places}f}"
 
 

@@ -149,6 +149,8 @@ def _where(document, cause, kind: type[Effect]):
         if window["effect"] == kind.name and known(start) and known(end):
             if end - start < 1.0:  # times are written in whole seconds
                 return f" at gps_time {start:.1f} s"
+            if kind.name == "position_step":  # from then on to the end of its pass
+                return f" about gps_time {start:.0f} s"
             return f" between gps_time {start:.0f} s and {end:.0f} s"
     return ""
 

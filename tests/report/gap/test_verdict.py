@@ -3,7 +3,7 @@
 import pytest
 
 from mlscorr.report.gap.verdict import advice, facts, verdict
-from tests.beds.gap_documents import KINDS, gap_document
+from tests.beds.gap_documents import CAUSES, KINDS, START, gap_document
 
 
 def summary(document):
@@ -34,6 +34,16 @@ def test_the_first_screen_says_what_is_wrong(kind, expected):
     "The verdict in words, its size with its sigma, and how sure it is, are the document's"
     text = summary(KINDS[kind]())
     assert [piece for piece in expected if piece not in text] == []
+
+
+def test_a_jump_is_when_it_happens_not_as_long_as_it_lasts():
+    "That it stays to the end of its pass, 357 s later, says nothing of when it came"
+    window = {"effect": "position_step", "start": START + 15.0, "end": START + 372.0}
+    document = gap_document("position_step", 0.9, windows=[window])
+    parameters = CAUSES["position_bump"][:-1]  # but its width
+    document["causes"][0] |= {"effect": "position_step", "parameters": parameters}
+    text = summary(document)
+    assert "about gps_time 413215 s" in text and "between gps_time" not in text
 
 
 @pytest.mark.parametrize("kind", ["effect", "pair", "noise", "alike", "bump"])
