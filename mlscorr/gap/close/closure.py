@@ -122,7 +122,7 @@ def close_gap(
         unit,
         gap.before,
         gap.before if nothing else gap.after,
-        0.0 if nothing else share_gone(*held.square),
+        0.0 if nothing else held.gone,
         (0.0, 0.0) if nothing else held.interval,
         gap.null_band,
         folds.held_out,
@@ -157,6 +157,7 @@ class _Ruler:
         observations = Observations.of(rows, background(rows, case.survey))
         unknown = unknown_blocks(rows, case.survey)
         table = column_table(rows, case.signatures, unknown, observations.sigma)
+        observations = observations[~case.undecided[observations.row]]
         observations, _ = without_tails(observations, rows, steady_columns(observations, table))
         model = case.evidence.likely_model(case.cause.effect)
         scale = model.scale if noise.scale == 1.0 else noise.scale
@@ -169,51 +170,62 @@ class _Ruler:
         if self.kind == "systematic":
             given = self.observations, self.model, self.table, self.rows.residual
             return SystematicGap.of(*given, folds, self.used, among).measure(rng, self.probability)
-        before, after, chance, place = self._terms(folds, rng)
-        keep = among[place]
-        before, after, chance, place = (v[keep] for v in (before, after, chance, place))
+        *terms, place = self._terms(folds, rng)
+        before, after, chance, usual = (values[among[place]] for values in terms)
+        place = place[among[place]]
         both = np.column_stack([before, after])
         of_fold = folds.of_rows[place]
         folded = np.array([np.bincount(of_fold, v, len(folds.predicted)) for v in both.T]).T
         folded /= np.maximum(np.bincount(of_fold, minlength=len(folds.predicted)), 1)[:, None]
         squares = both.mean(axis=0), folded, chance.mean(axis=0)
+        usual = np.percentile(usual.mean(axis=0), INFERENCE.band[0])
         if self.kind == "returns":  # a mean of shares, not of squares
-            squares = tuple(np.sign(v) * v**2 for v in squares)
-        return Squares(*squares, _jackknife(both, folds.block[place], squares[0]))
+            *squares, usual = (np.sign(v) * v**2 for v in (*squares, usual))
+        gone = share_gone(*squares[0], usual)
+        return Squares(*squares, gone, _jackknife(both, folds.block[place], gone, usual))
 
     def _terms(self, folds, rng):
-        """Terms before, after (q,) and by chance (q, k), whose mean is the gap; their rows (q,)."""
+        """Terms before, after (q,) and by chance (q, k) where the simulator is right without the
+        cause and with it, whose means are gaps; their rows (q,).
+        """
         rows, nothing, replicas = self.rows, Predicted.nothing(self.rows), INFERENCE.replicas
         if self.kind == "position":
             observations = self.observations
             residual = observations.columns(rows.residual[:, None])
-            drawn = observations.whitener(nothing.model).draw(rng, replicas)
-            chance = position_terms(observations, nothing, drawn)
+            chance, usual = (self._replicas(p, rng) for p in (nothing, folds.whole))
             each = [position_terms(observations, p, residual)[:, 0] for p in folds.predicted]
             after = np.choose(folds.of_rows[observations.row], each)
             before = position_terms(observations, nothing, residual)[:, 0]
             keep = observations.second
-            return before[keep], after[keep], chance[keep], observations.row[keep]
+            terms = before, after, chance, usual, observations.row
+            return tuple(values[keep] for values in terms)
         of_kind = rows.channel == ("roughness" if self.kind == "scatter" else "return_rate")
         drawn = np.sqrt(rows.noise)[:, None] * rng.standard_normal((len(rows), replicas))
-        values = np.column_stack([rows.residual, drawn])
+        before = np.column_stack([rows.residual, drawn])
         if self.kind == "scatter":
             held = Predicted(nothing.shift, folds.held("growth"), nothing.extra)
-            before = scatter_terms(rows, nothing, values)
-            after = scatter_terms(rows, held, values[:, :1])
+            grown = np.column_stack([rows.residual, np.log1p(held.growth)[:, None] + drawn])
+            before, after = scatter_terms(rows, nothing, before), scatter_terms(rows, held, grown)
         else:
-            before, after = values, (rows.residual - folds.held("shift"))[:, None]
-        before, place = before[of_kind], np.flatnonzero(of_kind)
-        return before[:, 0], after[of_kind, 0], before[:, 1:], place
+            after = np.column_stack([rows.residual - folds.held("shift"), drawn])
+        before, after, place = before[of_kind], after[of_kind], np.flatnonzero(of_kind)
+        return before[:, 0], after[:, 0], before[:, 1:], after[:, 1:], place
+
+    def _replicas(self, predicted, rng):
+        """Terms (n, k) of the position where the simulator is right with what is predicted."""
+        o = self.observations
+        whitener = o.whitener(predicted.model, predicted.extra[o.row] * o.half)
+        drawn = whitener.draw(rng, INFERENCE.replicas) + o.columns(predicted.shift[:, None])
+        return position_terms(o, predicted, drawn)
 
 
-def _jackknife(both, block, square):
+def _jackknife(both, block, share, usual):
     """95 % of the share that is gone by terms (q, 2), by groups of blocks (q,) left out in turn."""
     groups = 2 * SETTINGS.folds
     group = np.unique((block * groups) // (block.max() + 1), return_inverse=True)[1]
     count, sums = np.bincount(group), np.array([np.bincount(group, v) for v in both.T]).T
     g = len(count)
     left = (both.sum(axis=0) - sums) / np.maximum(len(both) - count, 1)[:, None]
-    share, each = share_gone(*square), np.array([share_gone(*pair) for pair in left])
+    each = np.array([share_gone(*pair, usual) for pair in left])
     spread = INFERENCE.quantile * np.sqrt((g - 1) / g * ((each - each.mean()) ** 2).sum())
     return max(-1.0, share - spread), min(1.0, share + spread)

@@ -98,6 +98,21 @@ class FoundCause:
         """The parts of the cause that are no noise, with their estimates."""
         return [pair for pair in self.cause.parts if pair[0].name not in self.evidence.noisy]
 
+    @property
+    def undecided(self) -> np.ndarray:
+        """Rows (m,) bool of check points seen at the moment of a jump, between the used rows
+        next to it: nothing says on which side of it they are.
+        """
+        rows, undecided = self.rows, np.zeros(len(self.rows), bool)
+        known = rows.gps_time[self.used & rows.metric], rows.gps_time_2[self.used & rows.two_times]
+        known = np.sort(np.concatenate([[-np.inf], *known, [np.inf]]))
+        for part, _ in self.shifting:
+            if part.kind.moment() and "width" not in part.fixed:
+                after = np.searchsorted(known, rows.reference.start + part.fixed["time"])
+                between = (rows.gps_time > known[after - 1]) & (rows.gps_time < known[after])
+                undecided |= between & ~self.used
+        return undecided
+
     def columns(self) -> np.ndarray:
         """What these parts make of all rows (m, p), by their parameters."""
         bench, rng = Bench(self.rows, self.survey), np.random.default_rng(0)  # nothing is drawn
@@ -153,6 +168,11 @@ def make_folds(
     )
     if not used.all():
         held_out += f" {len(np.unique(rows.item[~used]))} looks at check points were never used."
+    if case.undecided.any():
+        held_out += (
+            f" {len(np.unique(rows.item[case.undecided]))} of these, at the moment of the jump, "
+            "can't judge: no other row says on which side of it they were."
+        )
     return Folds(block, fold, predicted, held_out, whole, columns)
 
 

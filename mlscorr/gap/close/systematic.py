@@ -22,17 +22,21 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 
 
-def share_gone(before: float, after: float) -> float:
+def share_gone(before: float, after: float, chance: float = -np.inf) -> float:
     """Share of a signed square that is gone, within [-1, 1]: negative where it grew.
 
     Parameters
     ----------
     before, after : float
+        Negative where the simulator errs more than reality does.
+    chance : float
+        What is after it at least, but for one right simulator in forty: below it the simulator
+        has too much of the cause, which is a gap, too.
 
-    >>> share_gone(100.0, 1.0), share_gone(100.0, -50.0), share_gone(50.0, 100.0)
+    >>> share_gone(100.0, 1.0), share_gone(100.0, -50.0, -60.0), share_gone(50.0, -100.0, -60.0)
     (0.99, 1.0, -0.5)
     """
-    before, after = max(before, 0.0), max(after, 0.0)
+    before, after = max(before, 0.0), -after if after < chance else max(after, 0.0)
     largest = max(before, after)
     return float((before - after) / largest) if largest > 0 else 0.0
 
@@ -40,12 +44,13 @@ def share_gone(before: float, after: float) -> float:
 @dataclass(frozen=True)
 class Squares:
     """Squares before and after (2,), in each fold (f, 2), before by chance (k,), in m^2 or in the
-    square of the gap's unit; and 95 % of the share that is gone.
+    square of the gap's unit; the share that is gone, and 95 % of it.
     """
 
     square: np.ndarray
     folds: np.ndarray
     chance: np.ndarray
+    gone: float
     interval: tuple[float, float]
 
 
@@ -137,7 +142,7 @@ class SystematicGap:
         chance = self.unit * (chance - usual)
         if not self.predicted.any():  # a signed gap, as it is
             square = np.repeat(self.unit * (largest - usual), 2)
-            return Squares(square, square[None], chance, (0.0, 0.0))
+            return Squares(square, square[None], chance, 0.0, (0.0, 0.0))
         gone, own, off = self._own(drawn)
         stays = self._explained_by_own(rest[:, None])[1][:, 0]
         other = max(float(largest - usual), own) if largest > limit else own
@@ -147,7 +152,7 @@ class SystematicGap:
         before = max(gone + left, 0.0)
         interval = self._interval(gone, own, other, off, probability)
         square = self.unit * np.array([before, left])
-        return Squares(square, self._folds(stays, left), chance, interval)
+        return Squares(square, self._folds(stays, left), chance, share_gone(*square), interval)
 
     def _interval(self, gone, own, other, off, probability):
         """95 % of the share that is gone: with others, unless they are improbable, and without."""
