@@ -2,6 +2,8 @@
 
 import numpy as np
 
+GAP = {"before": 17.04, "after": -1.52, "unit": "mm", "null_band": [-2.3, 3.9]}
+WITHIN = {"before": 1.04, "after": 1.04, "unit": "mm", "null_band": [-2.3, 3.9]}  # chance
 START = 413200.0  # s, GPS week seconds
 NAMES = [
     *("time_offset", "clock_drift", "range_bias", "range_scale", "range_walk"),
@@ -68,7 +70,7 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
             "lead": "height error that grows with speed squared" if label == "unknown" else "",
             "sentence": f"{label} explains it.",
         },
-        "gap": {"before": 17.04, "after": -1.52, "unit": "mm", "null_band": [-2.3, 3.9]},
+        "gap": WITHIN if label == "none" else GAP,
         "headline": "Observed and simulated differ by 17.0 mm; 38 % of it is in the axis E.",
         "agreement": [
             {"channel": "target", "things": 16, "rms_mm": 41.0, "stated_mm": 12.0},

@@ -19,12 +19,13 @@ from mlscorr.simulate.recording import (
 )
 
 
-def write_twin(folder, seed, other=None, duration=18.0, **scanner):
+def write_twin(folder, seed, other=None, duration=18.0, pos=None, **scanner):
     "A survey of a seed, or its twin by another seed"
     scanner = {"lines_per_second": 75, "points_per_line": 400} | scanner
     scenario = Scenario(
-        drive={"duration": duration}, targets={"control": 4, "check": 1}, scanner=[scanner]
-    )
+        drive={"duration": duration}, targets={"control": 4, "check": 1}, scanner=[scanner],
+        pos=pos or {},
+    )  # fmt: skip
     made = simulate(scenario, np.random.default_rng(seed))
     if other is not None:
         scan, pos, effects = np.random.default_rng(other).spawn(3)
@@ -53,7 +54,8 @@ def sampled(survey, change=None):
 
 
 def twins(folder, seed, **scanner):
-    "A survey, and its twin as its simulator's clouds"
+    "A survey, its twin as its simulator's clouds, and what puts a chunk of them on its trajectory"
     survey = mlscorr.read_survey(write_twin(folder / "real", seed, **scanner))
     other = write_twin(folder / "simulated", seed, seed + 1000, **scanner)
-    return survey, simulated_survey(other, survey)
+    simulated, placed = simulated_survey(other, survey)
+    return survey, simulated, lambda _, chunk: placed.apply(chunk)

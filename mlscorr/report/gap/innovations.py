@@ -121,12 +121,13 @@ def _draw(panel, time, values, channel, styles, limit):
 
 
 def _outside(values):
-    """How many innovations lie outside of the stripe, in words."""
+    """RMS of the innovations, and how many lie outside of the stripe, in words."""
     values, stripe = values[np.isfinite(values)], SETTINGS.stripe_sigmas
     if len(values) == 0:
         return "nothing to show"
-    share, expected = 100 * np.mean(np.abs(values) > stripe), 100 * erfc(stripe / sqrt(2))
-    return f"{share:.1f} % beyond ±{stripe:.0f} sigma ({expected:.1f} % when nothing is wrong)"
+    share, usual = 100 * np.mean(np.abs(values) > stripe), 100 * erfc(stripe / sqrt(2))
+    rms = np.sqrt(np.mean(values**2))
+    return f"RMS {rms:.2f} (expected 1), {share:.1f} % beyond ±{stripe:.0f} sigma ({usual:.1f} %)"
 
 
 def _draw_windows(panel, windows, start, end):

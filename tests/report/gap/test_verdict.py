@@ -64,6 +64,16 @@ def test_without_advice_the_page_says_what_to_measure():
     assert advice(gap_document(advice=[], next_data=[]))[1] == []
 
 
+def test_no_cause_and_a_gap_beyond_chance_do_not_contradict_each_other():
+    "6.0 mm where chance makes up to 4.5: no cause is named, and no word says that it is chance"
+    gap = {"before": 6.0, "after": 6.0, "unit": "mm", "null_band": [-4.0, 4.5]}
+    document = gap_document("none", 0.967, gap=gap)
+    assert verdict(document).tone == "open"
+    assert "more than 39 of 40 surveys do in which nothing is wrong" in summary(document)
+    assert "no more than chance" not in summary(document)
+    assert "no more than chance" in summary(KINDS["none"]())
+
+
 def test_a_pattern_within_chance_is_explained():
     "A cause named while the gap lies in the null band says that its pattern gives it away"
     gap = {"before": 2.4, "after": -1.5, "unit": "mm", "null_band": [1.2, 3.7]}
