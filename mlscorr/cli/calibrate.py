@@ -31,11 +31,12 @@ def calibrate(
         content = result.write(out, with_drift, clouds, overwrite, progress)
     print_json(content, as_json)
     terminal.say_statements(content["statements"])
-    if "scanners" in content:
-        _tell_scanners(content["scanners"])
-    else:
-        _tell_mounting(content)
-        _tell_misclosures(content)
+    for name, part in content.get("scanners", {}).items():
+        say(f"Scanner {name}")
+        terminal.say_statements(part["statements"])
+        _tell_estimates(part)
+    if "scanners" not in content:
+        _tell_estimates(content)
     say(f"Calibration: {out / 'calibration.json'}")
     say(f"Page:        {out / 'calibration.html'}")
     say(f"Survey:      {out / 'survey.toml'}, with the calibrated mounting")
@@ -43,44 +44,33 @@ def calibrate(
         say("Its clouds are still as the recorded mounting put them; --clouds writes them anew.")
 
 
-def _tell_scanners(scanners):
-    """What the recorded mounting of each scanner lacks, a line each."""
-    for name, content in scanners.items():
-        lacks = [
-            " ".join(
-                f"{value:.4f} ± {sigma:.4f}"
-                for value, sigma in zip(part["correction"], part["sigma"], strict=True)
-            )
-            for part in (content["lsc"][key] for key in ("lever_arm", "boresight"))
-        ]
-        say(
-            f"Scanner {name} lacks right, forward, up: lever arm {lacks[0]} m, boresight "
-            f"{lacks[1]} deg; determined: {sum(content['determined'])} of 6"
-        )
+def _tell_estimates(content):
+    """What one scanner's mounting lacks, and what that does to its targets."""
+    methods = {"LSC": content["lsc"], "LS": content["ls"]}
+    if not content["ls"]["control"]["n"]:  # it takes nothing but control
+        del methods["LS"]
+    _tell_mounting(content, methods)
+    _tell_misclosures(content, methods)
 
 
-def _tell_mounting(content):
-    """Recorded mounting, what it lacks by both methods, and what the site determines."""
-    say(f"{'What the recorded mounting lacks':34s}{'LSC':>9s}{'sigma':>8s}"
-        f"{'LS':>9s}{'sigma':>8s}  determined")  # fmt: skip
+def _tell_mounting(content, methods):
+    """Recorded mounting, what it lacks by each method, and what the site determines."""
+    titles = "".join(f"{title:>9s}{'sigma':>8s}" for title in methods)
+    say(f"{'What the recorded mounting lacks':34s}{titles}  determined")
     for start, part, unit in ((0, "lever_arm", "m"), (3, "boresight", "deg")):
         for axis, name in enumerate(("right", "forward", "up")):
-            numbers = [
-                content[method][part][kind][axis]
-                for method in ("lsc", "ls")
-                for kind in ("correction", "sigma")
-            ]
+            numbers = "".join(
+                f"{method[part]['correction'][axis]:9.4f}{method[part]['sigma'][axis]:8.4f}"
+                for method in methods.values()
+            )
             about = f"{part.replace('_', ' ')} {'about ' * (start > 0)}{name} ({unit})"
             determined = "yes" if content["determined"][start + axis] else "no"
-            say(
-                f"{about:34s}" + "{:9.4f}{:8.4f}{:9.4f}{:8.4f}".format(*numbers) + f"  {determined}"
-            )
+            say(f"{about:34s}{numbers}  {determined}")
 
 
-def _tell_misclosures(content):
-    methods = {"LSC": content["lsc"], "LS": content["ls"]}
+def _tell_misclosures(content, methods):
     if "with_drift" in content:
-        methods["LSC with drift"] = content["with_drift"]
+        methods = methods | {"LSC with drift": content["with_drift"]}
     rows = [
         (f"{role} points, {title}", method[role], "after")
         for role in ("control", "check")

@@ -88,14 +88,18 @@ def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
         Of one scanner. Units: m and deg.
     """
     names, known = iter(MOUNTING_COMPONENTS), iter(content["determined"])
+    known_by = {"lsc": True, "ls": content["ls"]["control"]["n"] > 0}  # LS takes control alone
     return [
         {
             "name": next(names),
             "unit": unit,
             "recorded": content["mounting"]["recorded"][part][axis],
             "calibrated": content["mounting"]["calibrated"][part][axis],
-            **{m: content[m][part]["correction"][axis] for m in ("lsc", "ls")},
-            **{f"{m}_sigma": content[m][part]["sigma"][axis] for m in ("lsc", "ls")},
+            **{
+                method + after: content[method][part][kind][axis] if is_known else None
+                for method, is_known in known_by.items()
+                for after, kind in (("", "correction"), ("_sigma", "sigma"))
+            },
             "determined": next(known),
         }
         for part, unit in zip(PARTS, ("m", "deg"), strict=True)

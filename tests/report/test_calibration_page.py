@@ -6,6 +6,7 @@ from mlscorr.evaluate.rows import SEEN_BY_OTHERS, TargetRow
 from mlscorr.report.calibration_page import (
     calibration_page,
     calibration_screen,
+    component_rows,
     scanners_screen,
 )
 from tests.beds.reports import drive, fabricate, score_of, words
@@ -54,6 +55,16 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
     assert content["rating"] == "amber"
     assert text.index(lacks) < text.index("How far the cloud is")
     assert all(row["sentence"] in text for row in content["statements"])
+
+
+def test_least_squares_without_control_has_no_result():
+    "It takes nothing but control: a dash, not the nought ± 5 deg of its prior, and no row of RMSE"
+    content = calibrated()
+    content["ls"] = content["ls"] | {"control": content["ls"]["control"] | {"n": 0}}
+    assert all(row["ls"] is row["ls_sigma"] is None for row in component_rows(content))
+    text = words(calibration_page({"name": "site", **content}).html())
+    assert "Check points, LSC" in text
+    assert "Check points, LS " not in text
 
 
 def test_points_that_another_scanner_alone_saw_are_called_so():
