@@ -13,7 +13,6 @@ import numpy as np
 from mlscorr.evaluate.scores import misclosures
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.simulate import DEMO, read_scenario, simulate
-from mlscorr.simulate.recording import join_passes
 from mlscorr.simulate.scenario import DriveScenario, PosScenario
 from mlscorr.survey import ControlPoints, Matched, TargetObservations, Trajectory
 
@@ -115,8 +114,8 @@ def feature_survey(scenario, seed):
     )
     is_check = simulated.is_check
     return FeatureSurvey(
-        join_passes([_thinned(true) for true, _ in pairs]),
-        join_passes([_thinned(recorded) for _, recorded in pairs]),
+        Trajectory.concatenate([_thinned(true) for true, _ in pairs]),
+        Trajectory.concatenate([_thinned(recorded) for _, recorded in pairs]),
         _points(targets, np.flatnonzero(~is_check), targets.position),
         observations[~is_check[target]],
         _points(targets, np.flatnonzero(is_check), simulated.true_centre),

@@ -26,8 +26,7 @@ from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import find_control
 from mlscorr.pipeline.tying import tie_passes
 from mlscorr.simulate import read_scenario, simulate
-from mlscorr.simulate.recording import join_passes
-from mlscorr.survey import PAINTED
+from mlscorr.survey import PAINTED, Trajectory
 from mlscorr.ties import TieCollector
 
 POINTS_PER_LINE = 400  # of 700: a survey takes two minutes
@@ -157,7 +156,7 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             simulated = simulate(drive, np.random.default_rng(seed))
             simulated.write(Path(folder) / "survey")
-            true = join_passes(simulated.true_passes)
+            true = Trajectory.concatenate(simulated.true_passes)
             with warnings.catch_warnings(action="ignore"):
                 survey = mlscorr.read_survey(Path(folder) / "survey")
                 found, features = read(survey)

@@ -25,10 +25,10 @@ from ties_files_study import rms, scenario
 import mlscorr
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.simulate import SimulatedSurvey, simulate
-from mlscorr.simulate.recording import join_passes
 from mlscorr.simulate.scan import Surfaces
 from mlscorr.simulate.scene import Mesh, build_scene
 from mlscorr.simulate.scene.section import section
+from mlscorr.survey import Trajectory
 from mlscorr.ties import SETTINGS, pair_features
 
 DURATION = 40.0  # s of each pass
@@ -218,7 +218,7 @@ def main():
                 made.write(Path(folder) / "survey")
                 recorded = mlscorr.read_survey(Path(folder) / "survey")
                 survey = with_control(recorded, arguments.control)
-                true = join_passes(made.true_passes)
+                true = Trajectory.concatenate(made.true_passes)
                 alone, _ = measure(survey, true, "off")
                 tied, estimate = measure(survey, true, "auto")
                 offered = wrong_share(recorded, true)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_sections import TrajectorySection
@@ -203,7 +202,7 @@ def join_sessions(
         Where two are at different places at the same time.
     """
     order = sorted(range(len(parts)), key=lambda i: (parts[i].gps_time[0], -len(parts[i])))
-    sessions, kept, notes = [_numbers(part) for part in parts], {}, []
+    sessions, kept, notes = [_numbers(part) for part in parts], [], []
     largest, bases = 1 + max(session.max() for session in sessions), {}
     for number, i in enumerate(order):
         bases[i], is_new = 1 + number * largest, np.ones(len(parts[i]), bool)
@@ -220,8 +219,11 @@ def join_sessions(
                 f"two there; those of {names[j]} are taken."
             )
             is_new &= ~is_common
-        kept[i] = is_new
-    return _stacked([(parts[i], kept[i], bases[i] + sessions[i]) for i in order]), notes
+        if is_new.any():
+            kept.append(replace(parts[i], session=bases[i] + sessions[i]).select(is_new))
+    parted = Trajectory.concatenate(kept)
+    whole = replace(parted, session=None)
+    return whole if np.array_equal(whole.gaps, parted.gaps) else parted, notes
 
 
 def _numbers(part):
@@ -258,27 +260,3 @@ def _compare(names, first, second, is_common, pos):
 
 def _rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
-
-
-def _stacked(rows):
-    """The Trajectory of rows (part, which of its epochs, session of each)."""
-
-    def stack(name):
-        values = [getattr(part, name) for part, _, _ in rows]
-        if any(value is None for value in values):
-            return None
-        both = zip(values, rows, strict=True)
-        return np.concatenate([value[kept] for value, (_, kept, _) in both])[order]
-
-    session = np.concatenate([numbers[kept] for _, kept, numbers in rows])
-    order = np.argsort(np.concatenate([part.gps_time[kept] for part, kept, _ in rows]))
-    attitude = Rotation.concatenate([part.attitude[kept] for part, kept, _ in rows if kept.any()])
-    trajectory = Trajectory(
-        stack("gps_time"),
-        stack("position"),
-        attitude[order],
-        stack("position_sigma"),
-        stack("attitude_sigma"),
-    )
-    parted = replace(trajectory, session=session[order])
-    return trajectory if np.array_equal(trajectory.gaps, parted.gaps) else parted

@@ -1,6 +1,6 @@
 """What POS, scanner and surveyor record of the truth, with the effects that act on it."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -111,30 +111,6 @@ def true_mounting(scanner: ScannerScenario) -> Mounting:
     """
     return Mounting(
         np.array(scanner.lever_arm), Rotation.from_euler("xyz", scanner.boresight, degrees=True)
-    )
-
-
-def join_passes(passes: Sequence[Trajectory]) -> Trajectory:
-    """One Trajectory of several that follow each other in time.
-
-    Parameters
-    ----------
-    passes : sequence of Trajectory
-        In the order of time.
-    """
-    if len(passes) == 1:
-        return passes[0]
-
-    def stack(name):
-        values = [getattr(trajectory, name) for trajectory in passes]
-        return None if any(value is None for value in values) else np.concatenate(values)
-
-    return Trajectory(
-        stack("gps_time"),
-        stack("position"),
-        Rotation.concatenate([trajectory.attitude for trajectory in passes]),
-        stack("position_sigma"),
-        stack("attitude_sigma"),
     )
 
 

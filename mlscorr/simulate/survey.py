@@ -83,12 +83,12 @@ class SimulatedSurvey(Summary):
     @cached_property
     def true_trajectory(self) -> Trajectory:
         """The true trajectory of all passes; between them are gaps."""
-        return recording.join_passes(self.true_passes)
+        return Trajectory.concatenate(self.true_passes)
 
     @cached_property
     def trajectory(self) -> Trajectory:
         """The recorded trajectory of all passes; between them are gaps."""
-        return recording.join_passes(self.passes)
+        return Trajectory.concatenate(self.passes)
 
     @property
     def mounting(self) -> Mounting:
@@ -234,7 +234,7 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     def with_effects(stage, value):
         return apply_effects(effects, stage, value, reference, streams)
 
-    recorded = recording.join_passes(
+    recorded = Trajectory.concatenate(
         recording.recorded_passes(scenario, scene, true_passes, pos_rng)
     )
     mountings = tuple(recording.true_mounting(scanner) for scanner in scenario.scanner)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -124,17 +125,34 @@ class Trajectory(Summary):
         interval = self.recorded_time(epochs[0], epochs[-1]) / max(len(epochs) - 1, 1)
         return interval if interval >= SAME_EPOCH else float(np.ptp(self.gps_time))
 
-    def select(self, rows: slice | np.ndarray) -> Trajectory:
-        """Some of its epochs.
+    def select(self, rows: slice | ArrayLike) -> Trajectory:
+        """Some of its epochs, in any order.
 
         Parameters
         ----------
         rows : slice, or (n,) bool or (m,) int array
-            In the order of time.
         """
-        optional = self.position_sigma, self.attitude_sigma, self.session
-        kept = (None if column is None else column[rows] for column in optional)
-        return Trajectory(self.gps_time[rows], self.position[rows], self.attitude[rows], *kept)
+        columns = (getattr(self, field.name) for field in fields(self))
+        return _Epochs(*(None if column is None else column[rows] for column in columns))
+
+    @classmethod
+    def concatenate(cls, parts: Iterable[Trajectory]) -> Trajectory:
+        """The epochs of several in the order of time, with the columns that all of them have.
+
+        Parameters
+        ----------
+        parts : iterable of Trajectory
+        """
+        table = [[getattr(part, field.name) for field in fields(cls)] for part in parts]
+        order = np.argsort(np.concatenate([row[0] for row in table]))
+
+        def joined(columns):
+            if any(column is None for column in columns):
+                return None
+            is_attitude = isinstance(columns[0], Rotation)
+            return (Rotation.concatenate if is_attitude else np.concatenate)(columns)[order]
+
+        return cls(*map(joined, zip(*table, strict=True)))
 
     def at(self, gps_time: ArrayLike) -> Trajectory:
         """Trajectory at other times, positions and sigmas linear, attitudes by slerp.

@@ -12,11 +12,11 @@ from mlscorr.io.las import read_chunks
 from mlscorr.io.simulated_clouds import simulated_survey
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.recording import (
-    join_passes,
     recorded_passes,
     split_passes,
     streams_by_file,
 )
+from mlscorr.survey import Trajectory
 
 
 def write_twin(folder, seed, other=None, duration=18.0, pos=None, **scanner):
@@ -29,7 +29,9 @@ def write_twin(folder, seed, other=None, duration=18.0, pos=None, **scanner):
     made = simulate(scenario, np.random.default_rng(seed))
     if other is not None:
         scan, pos, effects = np.random.default_rng(other).spawn(3)
-        recorded = join_passes(recorded_passes(scenario, made.scene, made.true_passes, pos))
+        recorded = Trajectory.concatenate(
+            recorded_passes(scenario, made.scene, made.true_passes, pos)
+        )
         passes = split_passes(recorded, map(len, made.true_passes))
         streams = streams_by_file(len(passes), 1, scan, effects)
         made = replace(made, passes=passes, streams=streams)

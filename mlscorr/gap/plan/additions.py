@@ -135,34 +135,19 @@ def _another_pass(name, rows, survey, backwards=False, faster=1.0):
 
     turn = Rotation.from_euler("z", np.pi if backwards else 0.0)
     order = slice(None, None, -1 if backwards else 1)
-    longer = _joined(
-        trajectory,
-        anew(trajectory.gps_time)[order],
-        trajectory.position[order],
-        (trajectory.attitude * turn)[order],
-        order,
-    )
+    time, attitude = anew(trajectory.gps_time)[order], (trajectory.attitude * turn)[order]
+    longer = _followed(trajectory, order, time, attitude=attitude)
     wider = replace(survey, trajectory=longer)
     more = _placed(once, wider, anew, lambda pulses: pulses.xyz, once.survey_item)
     return Addition(name, _both(rows, more), wider)
 
 
-def _joined(trajectory, time, position, attitude, order):
-    """A trajectory and epochs that follow it, with its own sigmas in an order."""
-    sigmas = [
-        None if values is None else np.vstack([values, values[order]])
-        for values in (trajectory.position_sigma, trajectory.attitude_sigma)
-    ]
-    session = trajectory.session
-    if session is not None:
-        session = np.append(session, session.max() + 1 + session[order])
-    return Trajectory(
-        np.append(trajectory.gps_time, time),
-        np.vstack([trajectory.position, position]),
-        Rotation.concatenate([trajectory.attitude, attitude]),
-        *sigmas,
-        session,
-    )
+def _followed(trajectory, rows, time, **changed):
+    """A trajectory, and some of its epochs once more: at other times, in a session of their own."""
+    more = replace(trajectory.select(rows), gps_time=time, **changed)
+    if more.session is not None:
+        more = replace(more, session=trajectory.session.max() + 1 + more.session)
+    return Trajectory.concatenate([trajectory, more])
 
 
 def _more_targets(name, rows, survey, items, farther=1.0):
@@ -192,9 +177,7 @@ def _stop(name, rows, survey, items):
     time = start + np.arange(0.0, SETTINGS.pause, step)
     n = len(time)
     nearest = np.full(n, np.argmin(np.abs(trajectory.gps_time - middle.gps_time[0])))
-    longer = _joined(
-        trajectory, time, trajectory.position[nearest], trajectory.attitude[nearest], nearest
-    )
+    longer = _followed(trajectory, nearest, time)
     low, high = once.gps_time.min(), once.gps_time.max()
 
     def anew(recorded):

@@ -21,7 +21,7 @@ from mlscorr.gap.train.errors import odd_patches, process, scatter
 from mlscorr.gap.train.features import Geometry, geometry
 from mlscorr.simulate.pos import PosError, interpolate, pos_error
 from mlscorr.simulate.scenario import PosScenario
-from mlscorr.survey import Survey, Trajectory
+from mlscorr.survey import Survey
 
 KINDS = ("sensors", "sensors", "sines", "walk")  # of errors, drawn evenly
 PATCHES = (60, 1000)  # drawn evenly by their logs: a short street to as many as are compared
@@ -126,8 +126,7 @@ def _recorded(survey, scenario, rng):
     true, parts = survey.trajectory, []
     for start, end in true.passes:
         inside = (true.gps_time >= start) & (true.gps_time <= end)
-        single = Trajectory(true.gps_time[inside], true.position[inside], true.attitude[inside])
-        parts.append(pos_error(single, scenario, rng))
+        parts.append(pos_error(true.select(inside), scenario, rng))
     columns = ("position", "attitude", "position_sigma", "attitude_sigma")
     error = PosError(*(np.concatenate([getattr(p, name) for p in parts]) for name in columns))
     recorded = replace(

@@ -19,7 +19,6 @@ from mlscorr.estimate import (
 )
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.joint import JointDrives
-from mlscorr.survey import Trajectory
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,14 +119,8 @@ def _cut(correction, trajectory, shift):
     first, last = np.searchsorted(whole.gps_time, trajectory.gps_time[[0, -1]] + shift)
     rows, way = slice(first, last + 1), np.diff(whole.position[: first + 1], axis=0)
     chainage = float(np.linalg.norm(way, axis=1).sum())
-    corrected = Trajectory(
-        trajectory.gps_time,
-        whole.position[rows],
-        whole.attitude[rows],
-        whole.position_sigma[rows],
-        whole.attitude_sigma[rows],
-        trajectory.session,
-    )
+    times = {"gps_time": trajectory.gps_time, "session": trajectory.session}
+    corrected = replace(whole.select(rows), **times)
     return Correction(trajectory, corrected, covariance=correction.covariance[rows]), chainage
 
 

@@ -29,7 +29,7 @@ from mlscorr.pipeline.project.file_tasks import (
     write,
 )
 from mlscorr.pipeline.project.tasks import VERSION, Task
-from mlscorr.survey import CloudFile, ControlPoints, Survey, Trajectory
+from mlscorr.survey import CloudFile, ControlPoints, Survey
 from mlscorr.targets import search_radius
 
 
@@ -43,7 +43,7 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
     tiles: dict[Path, tuple[Path, list[TileOwner]]] = {}
     for drive in project.drives:
         parts, whole = drive.parts, drive.trajectory
-        ends = Trajectory(whole.gps_time[[0, -1]], whole.position[[0, -1]], whole.attitude[[0, -1]])
+        ends = whole.select([0, -1])
         owner = TileOwner(drive.name, ends, parts.system, parts.settings.crs, drive.ids)
         for path in parts.files.clouds:
             tiles.setdefault(resolved(path), (path, []))[1].append(owner)
