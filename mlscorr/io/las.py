@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
-from mlscorr.io.las_points import decoding
+from mlscorr.io.las_points import decoding_points, read_records
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_order import in_time_order
@@ -128,12 +128,6 @@ def sha256(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _decoding(layout, first, end):
-    return decoding(
-        f"Points {first} to {end - 1} of {layout.points} in {layout.path} cannot be decoded"
-    )
-
-
 def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     """Records of a few points, of which only gps_time and point_source_id are sure to be decoded.
 
@@ -155,7 +149,7 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
         for k, place in enumerate(places.tolist()):
             is_ahead = place >= reached and place // size == reached // size
             raw = bytearray((place - reached if is_ahead else 0) * length + length)
-            with _decoding(layout, place, place + 1):
+            with decoding_points(layout, place, place + 1):
                 if not is_ahead:
                     decoder.seek(place)  # decodes the chunk from its start
                 decoder.decompress_many(raw)
@@ -177,46 +171,3 @@ def count_sources(layout: LasLayout) -> np.ndarray:
     for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
         counts += np.bincount(records["point_source_id"], minlength=len(counts))
     return counts
-
-
-def read_records(
-    layout: LasLayout,
-    chunk_size: int,
-    first: int = 0,
-    end: int | None = None,
-    is_brief: bool = False,
-) -> Iterator[np.ndarray]:
-    """Records chunk by chunk, each in the memory of the one before.
-
-    Parameters
-    ----------
-    layout : LasLayout
-    chunk_size : int
-        Points at a time.
-    first, end : int
-        As of read_chunks.
-    is_brief : bool
-        Whether gps_time and point_source_id do.
-
-    Yields
-    ------
-    (n,) structured array
-
-    Raises
-    ------
-    ValueError
-        For points that cannot be decoded.
-    """
-    length = layout.record_length
-    last = layout.points if end is None else end
-    buffer = np.empty(min(chunk_size, last - first) * length, np.uint8)
-    with open_file(layout.path) as file:
-        decoder = layout.decoder(file, is_brief=is_brief)
-        if first:
-            decoder.seek(first)
-        for start in range(first, last, chunk_size):
-            stop = min(start + chunk_size, last)
-            raw = buffer[: (stop - start) * length]
-            with _decoding(layout, start, stop):
-                decoder.decompress_many(raw)
-            yield raw.view(layout.record)

@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.las_layout import LasLayout
-from mlscorr.io.las_points import decoding
-from mlscorr.io.opening import open_file
+from mlscorr.io.las_points import read_records
 from mlscorr.io.preparation import looked_points, progress_of, temporary_folder
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.spool import Spool, check_space
@@ -63,7 +62,7 @@ def _in_order(layout, _state):
     with open(target, "w+b") as file:
         file.write(head)
         spool = Spool(file, np.bincount(group, weights=counts), layout.record_length)
-        for records in _blocks(layout):
+        for records in read_records(layout, SETTINGS.chunk_points):
             rows = np.searchsorted(seconds, _second(records))
             spool.put(records.view(f"V{layout.record_length}"), group[rows])
             done(len(records))
@@ -84,7 +83,7 @@ def _count_seconds(layout, done):
     Units: s.
     """
     seconds, counts = np.empty(0), np.empty(0, np.int64)
-    for records in _blocks(layout, is_brief=True):
+    for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
         some, number = np.unique(_second(records), return_counts=True)
         seconds, which = np.unique(np.concatenate([seconds, some]), return_inverse=True)
         counts = np.bincount(which, weights=np.concatenate([counts, number])).astype(np.int64)
@@ -95,14 +94,3 @@ def _count_seconds(layout, done):
 def _second(records):
     """The second of each time; infinite of what is not a number."""
     return np.floor(np.nan_to_num(records["gps_time"], nan=np.inf, posinf=np.inf, neginf=-np.inf))
-
-
-def _blocks(layout, is_brief=False):
-    """Records as they stand in the file."""
-    with open_file(layout.path) as file, decoding(f"{layout.path} cannot be decoded"):
-        decoder = layout.decoder(file, is_brief=is_brief)
-        for first in range(0, layout.points, SETTINGS.chunk_points):
-            count = min(SETTINGS.chunk_points, layout.points - first)
-            records = np.empty(count * layout.record_length, np.uint8)
-            decoder.decompress_many(records)
-            yield records.view(layout.record)
