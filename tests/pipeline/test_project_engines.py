@@ -133,7 +133,7 @@ def test_a_lost_worker_is_counted_and_its_task_done_again(tmp_path):
         assert results == {f"square-{n}": n * n for n in range(6)} | {"end_at_first-7": 49}
         assert chosen.lost >= 3
     (fault,) = run.faults
-    assert fault.name == "end-8" and "its worker was lost 2 times" in fault.fault
+    assert fault.task.name == "end-8" and "its worker was lost 2 times" in fault.fault
     assert len(ends) == len(tasks)
 
 

@@ -120,8 +120,8 @@ def project_document(
     """
     rows = [_row(result, report) for result, report in drives]
     faults = [
-        {"drive": fault.drive, "name": fault.name, "stage": fault.kind, "fault": fault.fault}
-        for fault in run.faults
+        {"drive": task.drive, "name": task.name, "stage": task.kind, "fault": fault.fault}
+        for fault, task in ((fault, fault.task) for fault in run.faults)
     ]
     facts = [*_statements(project, rows, drives, faults), *_lost(run.engine.lost), *_left(older)]
     content = document(

@@ -10,46 +10,20 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Protocol
 
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-class Engine(Protocol):
-    """Works on calls by an Executor, which may lose a worker."""
-
-    width: int  # calls at a time
-
-    @property
-    def lost(self) -> int:
-        """Number of workers so far that ended without an answer."""
-
-    def submit(self, function: Callable, *arguments: object) -> Future:
-        """The Future of a call."""
-
-    def is_lost(self, error: BaseException) -> bool:
-        """Whether an error means that a worker was lost, and not what it worked on.
-
-        Parameters
-        ----------
-        error : BaseException
-        """
-
-
 class Loop:
-    """No process but this, one call after the other."""
+    """No process but this, one call after the other: what loses it ends the run."""
 
-    width, lost = 1, 0
+    width, lost, losses = 1, 0, ()
 
     def submit(self, function: Callable, *arguments: object) -> Future:
         """A Future that is done."""
         future: Future = Future()
         future.set_result(function(*arguments))
         return future
-
-    def is_lost(self, error: BaseException) -> bool:
-        """Never: it would be lost itself."""
-        return isinstance(error, BrokenProcessPool)
 
 
 class Processes:
@@ -60,6 +34,8 @@ class Processes:
     width : int
         Number of them.
     """
+
+    losses = (BrokenProcessPool,)
 
     def __init__(self, width: int) -> None:
         self.width, self.lost = width, 0
@@ -80,10 +56,6 @@ class Processes:
             context = multiprocessing.get_context("spawn")  # a fork may inherit held locks
             self._executor = ProcessPoolExecutor(self.width, context, _start_worker)
         return self._executor
-
-    def is_lost(self, error: BaseException) -> bool:
-        """Whether a process ended without an answer; the next call starts all anew."""
-        return isinstance(error, BrokenProcessPool)
 
     def close(self) -> None:
         """End the processes, whatever they are at."""
@@ -134,7 +106,7 @@ class Cluster:
 
     def __init__(self, scheduler: str) -> None:
         try:
-            from distributed import Client
+            from distributed import Client, KilledWorker
         except ImportError:
             raise ImportError(
                 "A cluster needs dask.distributed, which is not installed: pip install "
@@ -154,18 +126,12 @@ class Cluster:
                 f"The scheduler at {scheduler} has no worker. Start some, as dask worker "
                 f"{scheduler} --nworkers 8 --nthreads 1, or let its cluster scale."
             )
-        self._gone = self._removed()
+        self._gone, self.losses = self._removed(), (KilledWorker,)  # tried in vain again and again
         self._executor = self._client.get_executor(pure=False)
 
     def submit(self, function: Callable, *arguments: object) -> Future:
         """The Future of a call."""
         return self._executor.submit(_in_single_threads, function, *arguments)
-
-    def is_lost(self, error: BaseException) -> bool:
-        """Whether workers ended without an answer, more often than the scheduler tries again."""
-        from distributed import KilledWorker
-
-        return isinstance(error, KilledWorker)
 
     @property
     def lost(self) -> int:
@@ -180,6 +146,10 @@ class Cluster:
     def close(self) -> None:
         """Leave the cluster as it is."""
         self._client.close()
+
+
+# Works on calls, ``width`` at a time; one of ``losses`` tells that it lost a worker by a call.
+Engine = Loop | Processes | Cluster
 
 
 @contextmanager

@@ -89,20 +89,20 @@ class Progress:
         ----------
         outcome : Outcome
         """
-        counts, is_new = self.counts, outcome.seconds > 0
+        counts, task, is_new = self.counts, outcome.task, outcome.seconds > 0
         counts["done"] += 1
-        counts["points"] += outcome.points
+        counts["points"] += task.points
         counts["worked"] += is_new
         counts["faults"] += bool(outcome.fault)
         for text in outcome.warnings:
-            self.say(f"Warning: {outcome.name}: {text}")
+            self.say(f"Warning: {task.name}: {text}")
         if outcome.fault:
-            self.say(f"Failed: {outcome.name}: {outcome.fault}")
+            self.say(f"Failed: {task.name}: {outcome.fault}")
         elif is_new:
-            self.note(f"{outcome.kind}: {outcome.name} in {outcome.seconds:.1f} s")
+            self.note(f"{task.kind}: {task.name} in {outcome.seconds:.1f} s")
         if monotonic() >= self.due:
             self.due = monotonic() + SETTINGS.interval
-            self.say(self._sentence(outcome.kind))
+            self.say(self._sentence(task.kind))
 
     def _sentence(self, kind):
         """How far a stage has come, its rate, and the time that is left."""

@@ -11,7 +11,7 @@ from typing import Any
 from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.project.engine import Engine
 from mlscorr.pipeline.project.settings import SETTINGS
-from mlscorr.pipeline.project.tasks import Outcome, Task, Written, carry_out, ended
+from mlscorr.pipeline.project.tasks import Outcome, Task, Written, carry_out
 
 LOSS = (
     "its worker was lost {} times while nothing else was at work: the system may have ended it for "
@@ -55,8 +55,9 @@ class Run:
                 rest.append(task)
                 continue
             results[task.name], texts = result
-            self.watch(ended(task, texts=texts))
-        for task, outcome in self._outcomes(rest):
+            self.watch(Outcome(task, warnings=texts))
+        for outcome in self._outcomes(rest):
+            task = outcome.task
             self.watch(outcome)
             if outcome.fault:
                 self.faults.append(outcome)
@@ -92,8 +93,8 @@ class Run:
             return None
         return result, texts
 
-    def _outcomes(self, tasks) -> Iterator[tuple[Task, Outcome]]:
-        """Each task with its Outcome, as they end; long ones are begun first, so that all workers
+    def _outcomes(self, tasks) -> Iterator[Outcome]:
+        """The Outcome of each task, as they end; long ones are begun first, so that all workers
         end at about the same time.
         """
         waiting = deque(sorted(tasks, key=lambda task: -task.points - task.near_points))
@@ -110,12 +111,10 @@ class Run:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 task, was_single = running.pop(future)
                 try:
-                    yield task, future.result()
-                except Exception as error:
-                    if not self.engine.is_lost(error):
-                        raise
+                    yield future.result()
+                except self.engine.losses:
                     losses[task.name] = losses.get(task.name, 0) + was_single
                     if losses[task.name] >= SETTINGS.losses:
-                        yield task, ended(task, LOSS.format(SETTINGS.losses))
+                        yield Outcome(task, LOSS.format(SETTINGS.losses))
                     else:
                         suspects.append(task)

@@ -55,8 +55,7 @@ class Outcome:
 
     Parameters
     ----------
-    kind, key, drive, name, points
-        As of the Task.
+    task : Task
     fault : str
         Why it has no result; empty where it has.
     warnings : tuple of str
@@ -64,11 +63,7 @@ class Outcome:
         That it took; none where its result was there.
     """
 
-    kind: str
-    key: str
-    drive: str
-    name: str
-    points: int
+    task: Task
     fault: str = ""
     warnings: tuple[str, ...] = ()
     seconds: float = 0.0
@@ -95,24 +90,7 @@ def carry_out(task: Task, folder: Path) -> Outcome:
             fault = str(error) or type(error).__name__
         except Exception as error:  # a night's work doesn't end by what nobody thought of
             fault = f"{type(error).__name__}: {error}. Please report this."
-    return ended(task, fault, tuple(texts), time.perf_counter() - start)
-
-
-def ended(
-    task: Task, fault: str = "", texts: tuple[str, ...] = (), seconds: float = 0.0
-) -> Outcome:
-    """The Outcome of a task.
-
-    Parameters
-    ----------
-    task : Task
-    fault : str
-    texts : tuple of str
-        Its warnings.
-    seconds : float
-    """
-    named = task.kind, task.key, task.drive, task.name, task.points
-    return Outcome(*named, fault, texts, seconds)
+    return Outcome(task, fault, tuple(texts), time.perf_counter() - start)
 
 
 @dataclass(frozen=True)
