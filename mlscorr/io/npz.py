@@ -1,10 +1,11 @@
 """Writing .npz files whose arrays are longer than memory, block by block."""
 
+import math
 import zipfile
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Self
+from typing import BinaryIO, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,7 +45,7 @@ class NpzWriter:
     def __init__(self, path: str | Path) -> None:
         self._path = Path(path)
         self._whole: dict[str, np.ndarray] = {}
-        self._growing: dict[str, _Spool] = {}
+        self._growing: dict[str, tuple[BinaryIO, np.ndarray]] = {}  # file, and no rows as in it
         self._files = ExitStack()
         self.watch: Callable[[int], object] = lambda _: None  # bytes of growing arrays just copied
 
@@ -61,13 +62,13 @@ class NpzWriter:
                 ):
                     self._assemble(archive)
         finally:
-            for spool in self._growing.values():
-                spool.path.unlink(missing_ok=True)
+            for file, _ in self._growing.values():
+                Path(file.name).unlink(missing_ok=True)
 
     @property
     def growing(self) -> int:
         """Size of the growing arrays so far. Units: bytes."""
-        return sum(spool.size for spool in self._growing.values())
+        return sum(file.tell() for file, _ in self._growing.values())
 
     def put(self, name: str, array: ArrayLike) -> None:
         """Take a whole array."""
@@ -90,42 +91,28 @@ class NpzWriter:
         rows = np.ascontiguousarray(rows)
         if name not in self._growing:
             path = self._path.with_name(f"{self._path.name}.{name}.part")
-            self._growing[name] = _Spool(path, self._files.enter_context(path.open("wb")), rows)
-        self._growing[name].append(rows)
+            self._growing[name] = self._files.enter_context(path.open("wb")), rows[:0]
+        file, none = self._growing[name]
+        if (rows.dtype, rows.shape[1:]) != (none.dtype, none.shape[1:]):
+            raise ValueError(
+                f"Rows of {rows.dtype} {rows.shape[1:]} don't fit those of {none.dtype} "
+                f"{none.shape[1:]} before them."
+            )
+        file.write(rows.data)
 
     def _assemble(self, archive):
-        for name, spool in self._growing.items():
-            header = {
-                "descr": np.lib.format.dtype_to_descr(spool.dtype),
-                "fortran_order": False,
-                "shape": (spool.length, *spool.shape),
-            }
+        for name, (file, none) in self._growing.items():
+            path, shape = Path(file.name), none.shape[1:]
+            length = path.stat().st_size // (none.dtype.itemsize * math.prod(shape))
+            header = np.lib.format.header_data_from_array_1_0(none) | {"shape": (length, *shape)}
             # the date that ZipInfo starts with, so that the same arrays give the same bytes
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_2_0(member, header)
-                with open(spool.path, "rb") as rows:
+                with open(path, "rb") as rows:
                     while block := rows.read(SETTINGS.copied_bytes):
                         member.write(block)
                         self.watch(len(block))
-            spool.path.unlink()
+            path.unlink()
         for name, array in self._whole.items():
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
-
-
-class _Spool:
-    """Rows of one growing array in a file of their own."""
-
-    def __init__(self, path, file, rows):
-        self.path, self.file = path, file
-        self.dtype, self.shape, self.length, self.size = rows.dtype, rows.shape[1:], 0, 0
-
-    def append(self, rows):
-        if (rows.dtype, rows.shape[1:]) != (self.dtype, self.shape):
-            raise ValueError(
-                f"Rows of {rows.dtype} {rows.shape[1:]} don't fit those of {self.dtype} "
-                f"{self.shape} before them."
-            )
-        self.file.write(rows)
-        self.length += len(rows)
-        self.size += rows.nbytes
