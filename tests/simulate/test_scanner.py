@@ -12,7 +12,7 @@ from mlscorr.simulate.scan.noise import noise_streams
 from mlscorr.simulate.scan.rays import Platform
 from mlscorr.simulate.scan.scanner import MeasuredPulses, pulses_of_a_pass, shoot
 from mlscorr.simulate.scenario import ScannerScenario
-from mlscorr.simulate.scene.shapes import box, join, quads
+from mlscorr.simulate.scene.shapes import Mesh, box, quads
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.survey import Mounting, Trajectory
 
@@ -108,7 +108,7 @@ def test_the_fast_georeferencing_is_the_plain_one():
 def test_blocks_of_any_size_give_the_same_pulses(scanner):
     "Memory is one block of pulses, and its size leaves no trace, whatever is random"
     scanner = with_(scanner, beam_divergence=1.0, loss=0.3)
-    mesh = join([ROOM, _fence()])
+    mesh = Mesh.concatenate([ROOM, _fence()])
     whole = scan(mesh, drive(), MOUNTING, scanner)
     assert whole.number_of_returns.max() > 1
     for block in (1_000, 33_333):
@@ -129,7 +129,7 @@ def test_noise_is_as_stated():
 
 def test_one_noise_switched_off_leaves_all_others():
     "Every source of noise has its own random stream, and so have later echoes"
-    mesh = join([ROOM, _fence()])
+    mesh = Mesh.concatenate([ROOM, _fence()])
     setting = mesh, drive(), MOUNTING
     scanner = with_(LINE, beam_divergence=1.0)
     full = scan(*setting, scanner)
@@ -257,7 +257,7 @@ def _step(depth):
     "A wall that steps back by a depth (m) at x = 0, seen at 8 m, and its range"
     near = quads(np.array([-20.0, 8.0, -5.0]), [20.0, 0.0, 0.0], [0.0, 0.0, 10.0], 0.5)
     far = quads(np.array([-20.0, 8.0 + depth, -5.0]), [40.0, 0.0, 0.0], [0.0, 0.0, 10.0], 0.5)
-    return join([near, far])
+    return Mesh.concatenate([near, far])
 
 
 def test_mixed_points_lie_at_edges_between_the_surfaces():
@@ -299,7 +299,7 @@ def test_returns_are_numbered_within_their_pulse():
     "Numbers run from 1 to the count, with range; echoes are a pulse length apart; loss keeps this"
     for loss in (0.0, 0.5):
         scanner = with_(LINE, points_per_line=4000, beam_divergence=3.0, loss=loss, **QUIET)
-        pulses = scan(join([ROOM, _fence()]), drive(), MOUNTING, scanner)
+        pulses = scan(Mesh.concatenate([ROOM, _fence()]), drive(), MOUNTING, scanner)
         first = np.unique(pulses.gps_time, return_index=True)[1]
         assert (np.diff(pulses.gps_time) >= 0).all()
         count = np.diff(np.append(first, len(pulses)))
@@ -320,7 +320,7 @@ def test_a_tree_gives_first_and_last_returns():
     rng = np.random.default_rng(3)
     crown = leaves(np.array([7.0, 9.0, 1.0]), np.full(3, 2.0), np.array([0.0, 1.0, 0.0]), 400, rng)
     scanner = with_(LINE, points_per_line=4000, beam_divergence=1.0, **QUIET)
-    pulses = scan(join([ROOM, crown]), drive(), MOUNTING, scanner)
+    pulses = scan(Mesh.concatenate([ROOM, crown]), drive(), MOUNTING, scanner)
     several = pulses.number_of_returns > 1
     assert several.sum() > 100
     in_crown = pulses.triangle >= len(ROOM)

@@ -12,7 +12,7 @@ from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.mesh import MeshSite
 from mlscorr.simulate.scene.placing import Targets, place_targets
 from mlscorr.simulate.scene.river import River
-from mlscorr.simulate.scene.shapes import UP, Mesh, join
+from mlscorr.simulate.scene.shapes import UP, Mesh
 from mlscorr.simulate.scene.street import Street
 from mlscorr.survey import Trajectory
 
@@ -60,10 +60,10 @@ def build_scene(scenario: Scenario, line: CentreLine, length: float, rng: Genera
     site_rng, target_rng = rng.spawn(2)
     site = SITES[scenario.scene.kind](scenario, line, length, site_rng)
     placed = place_targets(scenario.targets, length, site, _yaw(scenario.scanner), target_rng)
-    surroundings = join([site.mesh, site.furniture(placed)])
+    surroundings = Mesh.concatenate([site.mesh, site.furniture(placed)])
     number = np.repeat(np.arange(len(placed.targets)), [len(mesh) for mesh in placed.meshes])
     return Scene(
-        join([surroundings, *placed.meshes]),
+        Mesh.concatenate([surroundings, *placed.meshes]),
         np.concatenate([np.full(len(surroundings), -1), number]),
         placed.targets,
         line,

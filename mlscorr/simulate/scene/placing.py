@@ -10,7 +10,7 @@ from numpy.random import Generator
 
 from mlscorr.simulate.scenario import TargetScenario
 from mlscorr.simulate.scene.centre_line import CentreLine
-from mlscorr.simulate.scene.shapes import UP, Mesh, box, join, post
+from mlscorr.simulate.scene.shapes import UP, Mesh, box, post
 from mlscorr.simulate.scene.things import target
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.survey.columns import Columns
@@ -144,7 +144,7 @@ def _placed(kinds, spots, size, hidden, posts):
         target(kind, spot.centre, spot.u, spot.v, size)
         for kind, spot in zip(kinds, spots, strict=True)
     )
-    return Placed(targets, meshes, join([nothing, *posts]), spots)
+    return Placed(targets, meshes, Mesh.concatenate([nothing, *posts]), spots)
 
 
 def _half(kind, size):

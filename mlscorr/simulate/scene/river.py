@@ -14,7 +14,7 @@ from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene.bank import Bank
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, scatter
-from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, join, unit
+from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, unit
 from mlscorr.simulate.scene.things import car, house, lamp, leaves, tree
 from mlscorr.simulate.settings import SETTINGS
 
@@ -112,7 +112,7 @@ class River:
             near, far = self._front(row)
             inward = unit(np.cross(far - near, UP))
             pieces.append(house(near, far, inward, row[3], self._house_rng.uniform(0.2, 0.5)))
-        return join(pieces)
+        return Mesh.concatenate(pieces)
 
     def _bank(self, stretch):
         """A reach's profile drawn along the shore, in strips of 2 m at most."""
@@ -121,7 +121,7 @@ class River:
         for (x, z, reflectance), (next_x, next_z, _) in pairwise(self.bank.profile(stretch.kind)):
             near, far = self.place(s, x, z), self.place(s, next_x, next_z)
             strips.append(four_corners(near[:-1], near[1:], far[1:], far[:-1], reflectance))
-        return join(strips)
+        return Mesh.concatenate(strips)
 
     def _cross_wall(self, s):
         """A wall with a parapet, from the water up to the promenade."""
@@ -249,7 +249,7 @@ class River:
             start, end = -SETTINGS.margin + 3.0, self.length + SETTINGS.margin - 3.0
             for s, _ in scatter(density, start, end, is_free, rng):
                 pieces.append(make(s, inland, rng))
-        return join(pieces)
+        return Mesh.concatenate(pieces)
 
     def _foot(self, s, inland):
         return self.place(s, inland, self.bank.height(self._kind_at(s, 0.0) or "quay", inland))

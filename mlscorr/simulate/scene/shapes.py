@@ -1,6 +1,5 @@
 """Pieces of surface as triangles: quads, boxes, posts; and rays that meet them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -36,16 +35,6 @@ class Mesh(Columns):
     def offset(self) -> np.ndarray:
         """Distance (n,) of each triangle's plane from the origin, along its normal. Units: m."""
         return np.einsum("ij,ij->i", self.normal, self.triangles[:, 0])
-
-
-def join(meshes: Sequence[Mesh]) -> Mesh:
-    """One mesh of several.
-
-    Parameters
-    ----------
-    meshes : sequence of Mesh
-    """
-    return Mesh.concatenate(meshes)
 
 
 def four_corners(
@@ -101,7 +90,7 @@ def box(
     sides = [(u, v), (v, w), (w, u)]
     near = [quads(corner, p, q, reflectance) for p, q in sides]
     far = [quads(corner + o, p, q, reflectance) for (p, q), o in zip(sides, (w, u, v), strict=True)]
-    return join(near + far)
+    return Mesh.concatenate(near + far)
 
 
 def post(foot: np.ndarray, height: float, width: float, reflectance: float) -> Mesh:

@@ -12,7 +12,7 @@ from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, eyes, scatter
 from mlscorr.simulate.scene.section import section
-from mlscorr.simulate.scene.shapes import UP, Mesh, four_corners, join, sees, unit
+from mlscorr.simulate.scene.shapes import UP, Mesh, four_corners, sees, unit
 from mlscorr.simulate.scene.things import car, house, lamp, tree
 from mlscorr.simulate.settings import SETTINGS
 
@@ -80,7 +80,7 @@ class Street:
             inward = unit(front.side * np.cross(front.far - front.near, UP))
             height, reflectance = rng.uniform(*low_high), rng.uniform(0.2, 0.5)
             pieces.append(house(front.near, front.far, inward, height, reflectance))
-        return join(pieces)
+        return Mesh.concatenate(pieces)
 
     def _ground(self):
         """Carriageway with crown, kerbs, pavements and gardens, as strips of 1 m."""
@@ -107,7 +107,7 @@ class Street:
             owned = self._owns(s[:-1], (left[:-1] + right[1:]) / 2, (x + next_x)[:-1] / 2)
             quad = (left[:-1], right[:-1], right[1:], left[1:])
             strips.append(four_corners(*(c[owned] for c in quad), reflectance[surface]))
-        return join(strips)
+        return Mesh.concatenate(strips)
 
     def _markings(self):
         """Paint on the carriageway: a dashed middle line, and a line along each kerb."""
@@ -242,7 +242,7 @@ class Street:
                 taken.append((s, side, extent))
                 lateral = side * (float(self.section.half_width(s)) + from_kerb)
                 pieces.append(make(s, side, lateral, rng))
-        return join(pieces)
+        return Mesh.concatenate(pieces)
 
     def _has_room(self, s, lateral, extent, placed):
         """Whether a thing may stand there: before no target, in no other way, in no U-turn."""

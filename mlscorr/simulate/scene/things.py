@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.random import Generator
 
-from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, join, post, quads
+from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, post, quads
 from mlscorr.simulate.settings import SETTINGS
 
 
@@ -35,7 +35,9 @@ def target(kind: str, centre: np.ndarray, u: np.ndarray, v: np.ndarray, size: fl
     edge = centre + SETTINGS.board_edge * size / 2 * to_edge * ray
     fan = np.stack([np.broadcast_to(centre, rim[1:].shape), rim[:-1], rim[1:]], axis=1)
     disc = Mesh(fan, np.full(segments, SETTINGS.white))
-    return join([disc, four_corners(rim[:-1], edge[:-1], edge[1:], rim[1:], SETTINGS.black)])
+    return Mesh.concatenate(
+        [disc, four_corners(rim[:-1], edge[:-1], edge[1:], rim[1:], SETTINGS.black)]
+    )
 
 
 def facade(
@@ -76,7 +78,7 @@ def facade(
     column, row = np.meshgrid(np.arange(columns), np.arange(rows))
     u, v = along / columns, storey * UP
     cell = corner + ground * UP + column.reshape(-1, 1) * u + row.reshape(-1, 1) * v
-    return join([plain, _windows(cell, u, v, 0.18 * inward, reflectance)])
+    return Mesh.concatenate([plain, _windows(cell, u, v, 0.18 * inward, reflectance)])
 
 
 def _windows(cell, u, v, depth, reflectance, glass=0.1):
@@ -95,7 +97,7 @@ def _windows(cell, u, v, depth, reflectance, glass=0.1):
         quads(window, wv, depth, reflectance),
         quads(window + wu, wv, depth, reflectance),
     ]
-    return join([*frame_and_reveal, quads(window + depth, wu, wv, glass)])
+    return Mesh.concatenate([*frame_and_reveal, quads(window + depth, wu, wv, glass)])
 
 
 def house(
@@ -128,14 +130,16 @@ def house(
     ends = quads(np.array([base, base + along]), back, height * UP, reflectance)
     if not is_house:
         top = quads(base + height * UP, along, back, reflectance)
-        return join([quads(base, along, height * UP, reflectance), ends, top])
+        return Mesh.concatenate([quads(base, along, height * UP, reflectance), ends, top])
     ground = 3.2 + 0.5 + abs(far[2] - near[2])  # windows start above both corners
     eaves = np.array([base + height * UP, base + height * UP + back])
     slopes = np.array([back / 2 + ridge * UP, -back / 2 + ridge * UP])
     roof = quads(eaves, along, slopes, 0.3)
     gable = eaves[0] + np.array([0.0 * back, back, back / 2 + ridge * UP])
     gables = Mesh(np.array([gable, gable + along]), np.full(2, reflectance))
-    return join([facade(base, along, height, inward, reflectance, ground), ends, roof, gables])
+    return Mesh.concatenate(
+        [facade(base, along, height, inward, reflectance, ground), ends, roof, gables]
+    )
 
 
 def leaves(
@@ -186,7 +190,7 @@ def tree(foot: np.ndarray, forward: np.ndarray, crown: np.ndarray, rng: Generato
     trunk = rng.uniform(2.9, 3.4)
     middle = foot + (trunk + crown[2]) * UP
     count = int(min(1500, rng.uniform(150.0, 320.0) * np.prod(crown)))
-    return join(
+    return Mesh.concatenate(
         [
             post(foot - 0.3 * UP, trunk + 0.3 + crown[2], rng.uniform(0.18, 0.3), bark),
             leaves(middle, crown, forward, count, rng),
@@ -206,7 +210,7 @@ def lamp(foot: np.ndarray, towards: np.ndarray) -> Mesh:
     """
     side = np.cross(UP, towards)
     arm = box(foot + 5.9 * UP - 0.1 * side, 1.2 * towards, 0.2 * side, 0.12 * UP, 0.3)
-    return join([post(foot - 0.3 * UP, 6.3, 0.14, 0.3), arm])
+    return Mesh.concatenate([post(foot - 0.3 * UP, 6.3, 0.14, 0.3), arm])
 
 
 def car(place: np.ndarray, forward: np.ndarray, right: np.ndarray, reflectance: float) -> Mesh:
@@ -232,4 +236,4 @@ def car(place: np.ndarray, forward: np.ndarray, right: np.ndarray, reflectance: 
         for m, s in ((middle - width / 2 * right, near), (middle + width / 2 * right, far))
     ]
     sides = np.concatenate(sides)
-    return join([skin, Mesh(sides, np.full(len(sides), reflectance))])
+    return Mesh.concatenate([skin, Mesh(sides, np.full(len(sides), reflectance))])
