@@ -7,12 +7,10 @@ from scipy.stats import chi2
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
 from mlscorr.io.pos_error_series import PosErrorSeries, read_pos_error_series
-from mlscorr.simulate.pos import alignment, inertial, kalman
+from mlscorr.simulate.pos import alignment, gnss, inertial, kalman, navigation
 from mlscorr.simulate.pos.errors import given_error, pos_error, record
-from mlscorr.simulate.pos.gnss import gnss_fixes
 from mlscorr.simulate.pos.inertial import GRADES, GRAVITY, MEMS, TACTICAL
 from mlscorr.simulate.pos.kalman import Measurement
-from mlscorr.simulate.pos.navigation import angle_errors, navigate
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Trajectory
 from tests.beds.shared import shared
@@ -143,14 +141,18 @@ def test_the_smoother_equals_dense_least_squares():
 
 
 @pytest.mark.parametrize("grade", ["tactical", "mems"])
-def test_the_sigmas_are_right_when_filter_and_truth_agree(grade):
+def test_the_sigmas_are_right_when_filter_and_truth_agree(grade, monkeypatch):
     "Open sky, figures known: normalised errors squared lie within their 95 % band over seeds"
+    known = {"reflected": 0.0, "suspect": np.inf, "caution": 1.0, "doubt": 1.0}  # white errors
+    monkeypatch.setattr(gnss, "RECEIVER", replace(gnss.RECEIVER, **known))
+    tuned = replace(navigation.SETTINGS, mistuning=1.0, unmodelled=1.0)
+    monkeypatch.setattr(navigation, "SETTINGS", tuned)
     imu = replace(GRADES[grade], gyro_scale=0.0, accelerometer_scale=0.0, misalignment=0.0)
     position, attitude = [], []
     for seed in range(40):
         rng = np.random.default_rng(seed)
-        navigation = navigate(SHORT, PosScenario(grade=grade), imu, rng, agree=True)
-        error = navigation.at([START + 15.0])
+        navigated = navigation.navigate(SHORT, PosScenario(grade=grade), imu, rng)
+        error = navigated.at([START + 15.0])
         position.append(((error.position / error.position_sigma) ** 2).sum())
         attitude.append(((error.attitude / error.attitude_sigma) ** 2).sum())
     low, high = chi2.interval(0.95, 3 * 40)
@@ -231,7 +233,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(mems):
 def test_an_outage_changes_neither_sensors_nor_satellites():
     "Free inertial navigation and the remaining fixes stay bit for bit what they were"
     lost = PosScenario(outages=((5.0, 10.0),))
-    a, b = (navigate(SHORT, s, TACTICAL, np.random.default_rng(3), start=START)
+    a, b = (navigation.navigate(SHORT, s, TACTICAL, np.random.default_rng(3), start=START)
             for s in (PosScenario(), lost))  # fmt: skip
     np.testing.assert_array_equal(a.error, b.error)
     np.testing.assert_array_equal(a.fixes.error, b.fixes.error)
@@ -251,10 +253,11 @@ def test_outages_count_from_the_start_of_the_drive():
 def test_walls_take_satellites_away():
     "Fewer satellites, larger sigmas, and below four no fix"
     times, heading = START + np.arange(60.0), np.full(60, 0.7)
+    hidden = (np.full((60, 2), np.radians(walls)) for walls in (0.0, 55.0, 85.0))
     open_, canyon, slot = (
-        [gnss_fixes(times, heading, np.full((60, 2), np.radians(walls)), np.random.default_rng(s))
-         for s in range(20)] for walls in (0.0, 55.0, 85.0)
-    )  # fmt: skip
+        [gnss.gnss_fixes(times, heading, walls, np.random.default_rng(s)) for s in range(20)]
+        for walls in hidden
+    )
     assert np.median([f.satellites for f in open_]) > 9
     assert 3 < np.median([f.satellites for f in canyon]) < 8
     assert np.mean([f.valid for f in slot]) < 0.2
@@ -314,7 +317,7 @@ def test_errors_of_angles_match_the_rotation():
     attitude = attitude_from_angles(*angles.T)
     turn = 1e-4 * rng.standard_normal((50, 3))
     turned = np.column_stack(angles_from_attitude(Rotation.from_rotvec(turn) * attitude))
-    error, sigma = angle_errors(attitude, turn, np.tile(1e-8 * np.eye(3), (50, 1, 1)))
+    error, sigma = navigation.angle_errors(attitude, turn, np.tile(1e-8 * np.eye(3), (50, 1, 1)))
     np.testing.assert_allclose(error, turned - angles, atol=1e-7)  # rad
     assert (sigma > 0.99e-4).all()
 

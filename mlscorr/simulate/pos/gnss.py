@@ -86,11 +86,7 @@ class Fixes:
 
 
 def gnss_fixes(
-    gps_time: np.ndarray,
-    heading: np.ndarray,
-    walls: np.ndarray,
-    rng: Generator,
-    white_only: bool = False,
+    gps_time: np.ndarray, heading: np.ndarray, walls: np.ndarray, rng: Generator
 ) -> Fixes:
     """Fixes at the times (n,) of a vehicle, in s.
 
@@ -101,8 +97,6 @@ def gnss_fixes(
     walls : (n, 2) array
         Elevation below which the sky is hidden square to the left and right. Units: rad.
     rng : Generator
-    white_only : bool
-        Without reflections, and with sigmas that state exactly the noise.
     """
     sky_rng, noise_rng, path_rng = rng.spawn(3)
     azimuth, elevation = _constellation(gps_time, sky_rng)
@@ -110,9 +104,8 @@ def gnss_fixes(
     oblique = np.hypot(1.0, 1 / np.sin(np.maximum(elevation, RECEIVER.mask)))
     sigma = np.sqrt(2) * RECEIVER.phase_noise * oblique  # against a base station as good
     error = sigma * noise_rng.standard_normal(sigma.shape)
-    if not white_only:
-        error += _reflections(gps_time, walls, path_rng)
-    return _solve(azimuth, elevation, visible, sigma, error, white_only)
+    error += _reflections(gps_time, walls, path_rng)
+    return _solve(azimuth, elevation, visible, sigma, error)
 
 
 def wall_elevation(azimuth: np.ndarray, heading: np.ndarray, walls: np.ndarray) -> np.ndarray:
@@ -168,7 +161,7 @@ def _reflections(gps_time, walls, rng):
     return np.sqrt(2) * RECEIVER.reflected * ground + WAVELENGTH / 4 * hidden * wall
 
 
-def _solve(azimuth, elevation, visible, sigma, error, exact):
+def _solve(azimuth, elevation, visible, sigma, error):
     """Fixes by weighted least squares for position and clock at every epoch."""
     flat = np.cos(elevation)
     design = np.stack(
@@ -187,13 +180,11 @@ def _solve(azimuth, elevation, visible, sigma, error, exact):
     cofactor = np.linalg.inv(normal)
     right = np.einsum("kmi,km,km->ki", design[valid], weight[valid], error[valid])
     solution = np.einsum("kij,kj->ki", cofactor, right)
-    factor = np.ones(valid.sum())
-    if not exact:
-        residual = error[valid] - np.einsum("kmi,ki->km", design[valid], solution)
-        redundancy = np.maximum(count[valid] - 4, 1)
-        ratio = np.sqrt(np.einsum("km,km->k", weight[valid], residual**2) / redundancy)
-        factor = RECEIVER.caution * np.where(ratio > RECEIVER.suspect, ratio, 1.0)
-        factor *= np.where(count[valid] < RECEIVER.fixing, RECEIVER.doubt, 1.0)
+    residual = error[valid] - np.einsum("kmi,ki->km", design[valid], solution)
+    redundancy = np.maximum(count[valid] - 4, 1)
+    ratio = np.sqrt(np.einsum("km,km->k", weight[valid], residual**2) / redundancy)
+    factor = RECEIVER.caution * np.where(ratio > RECEIVER.suspect, ratio, 1.0)
+    factor *= np.where(count[valid] < RECEIVER.fixing, RECEIVER.doubt, 1.0)
 
     fixes = np.zeros((len(count), 3))
     covariance = np.zeros((len(count), 3, 3))

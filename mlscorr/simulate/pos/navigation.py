@@ -105,12 +105,8 @@ def navigate(
     rng: Generator,
     sky: np.ndarray | None = None,
     start: float | None = None,
-    agree: bool = False,
 ) -> Navigation:
-    """Navigation of a pass with an Imu.
-
-    With agree, the filter knows the noise as it is: GNSS errors are white and figures not
-    mistuned. For the other parameters see pos_error.
+    """Navigation of a pass with an Imu; for the parameters see pos_error.
 
     Parameters
     ----------
@@ -122,8 +118,6 @@ def navigate(
         Elevation below which the sky is hidden. Units: rad.
     start : float, optional
         gps_time from which outages and canyons count.
-    agree : bool
-        Whether the filter knows the noise as it is: white, and not mistuned.
     """
     sensor_rng, gnss_rng, belief_rng, odometer_rng = rng.spawn(4)
     start = trajectory.gps_time[0] if start is None else start
@@ -137,7 +131,7 @@ def navigate(
     fix_time = gps_time[::every]
     walls = _walls(fix_time, trajectory, scenario, sky, start)
     heading = angles_from_attitude(attitude[::every])[2]
-    fixes = gnss_fixes(fix_time, heading, walls, gnss_rng, white_only=agree)
+    fixes = gnss_fixes(fix_time, heading, walls, gnss_rng)
     lost = _inside(fix_time, trajectory, scenario.outages, start)
     fixes = replace(fixes, valid=fixes.valid & ~lost)
     velocity = np.gradient(position, moved.step, axis=0)[::every]
@@ -146,10 +140,8 @@ def navigate(
         wheels = odometer(error[::every], velocity, attitude[::every], odometer_rng)
 
     # What the software makes of them, believing its own figures.
-    process, fix_scale = 1.0, 1.0
-    if not agree:
-        process, fix_scale = SETTINGS.mistuning ** belief_rng.uniform(-1.0, 1.0, 2)
-        process *= SETTINGS.unmodelled
+    process, fix_scale = SETTINGS.mistuning ** belief_rng.uniform(-1.0, 1.0, 2)
+    process *= SETTINGS.unmodelled
     noise = process**2 * imu.densities**2 * moved.step
     at_fixes = _measurements(error[::every, POSITION], fixes, fix_scale, wheels)
     measurements = dict(zip(range(0, len(error), every), at_fixes, strict=True))
