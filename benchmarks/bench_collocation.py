@@ -13,8 +13,9 @@ from rich.console import Console
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation import Noise, Signal, collocate, collocate_dense
+from mlscorr.collocation import Noise, Signal, collocate
 from mlscorr.collocation.covariance import FAMILIES, Covariance
+from tests.beds.dense import collocate_dense
 
 try:
     import celerite2

@@ -9,7 +9,7 @@
 - literal: the paper's own predictor, whose covariances don't fit each other
 """
 
-from mlscorr.collocation.dense import collocate_dense, collocate_rows_dense, covariance_given
+from mlscorr.collocation.dense import collocate_rows_dense, covariance_given
 from mlscorr.collocation.information import InformationSolver
 from mlscorr.collocation.linked import LeftOut, collocate_rows, leave_each_out, reweight
 from mlscorr.collocation.literal import LiteralCollocation, LiteralSignal, collocate_literal

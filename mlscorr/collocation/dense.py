@@ -20,8 +20,6 @@ from mlscorr.collocation.model import (
     LARGEST_ERROR,
     NOT_POSITIVE,
     Collocation,
-    Noise,
-    Signal,
     solve_trend,
 )
 from mlscorr.collocation.sparse_rows import SparseRows
@@ -30,34 +28,6 @@ from mlscorr.collocation.states import Layout
 CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
 # Time lag in units of 1 / rate at which rounding leaves no correlation, of exp(-x / 2) neither
 UNCORRELATED_LAG = float(-np.log(np.square(np.finfo(float).eps)))
-
-
-def collocate_dense(
-    gps_time: np.ndarray,
-    misclosure: np.ndarray,
-    noise: Noise | np.ndarray,
-    design: np.ndarray,
-    signals: Sequence[Signal],
-) -> Collocation:
-    """Collocation by the dense formula: result as of collocate.
-
-    Parameters
-    ----------
-    gps_time, misclosure, design, signals
-        As in collocate.
-    noise : Noise, or (n r, n r) array
-        The covariance matrix may be a full one. Units: m^2.
-
-    Raises
-    ------
-    ValueError
-        Where the covariance is not positive definite or the trend is not determined.
-    """
-    n, r = np.shape(misclosure)
-    total = noise.matrix if isinstance(noise, Noise) else noise
-    none = Noise(np.zeros((n, r, r)))  # beside the matrix
-    rows = SparseRows(np.reshape(gps_time, (n, 1)), misclosure, none, design, signals)
-    return _collocate([rows], total)
 
 
 def collocate_rows_dense(rows: Sequence[SparseRows]) -> Collocation:
@@ -70,7 +40,7 @@ def collocate_rows_dense(rows: Sequence[SparseRows]) -> Collocation:
     Raises
     ------
     ValueError
-        As of collocate_dense.
+        Where the covariance is not positive definite or the trend is not determined.
 
     Examples
     --------
@@ -82,7 +52,24 @@ def collocate_rows_dense(rows: Sequence[SparseRows]) -> Collocation:
     >>> collocate_rows_dense([tie]).predict(np.array([900.0]), none, [np.ones((1, 1, 1))])[0]
     array([[0.14999993]])
     """
-    return _collocate(rows, block_diag(*(part.noise.matrix for part in rows)))
+    sides = _all_sides(rows)
+    total = _covariance(sides, block_diag(*(part.noise.matrix for part in rows)))
+    try:
+        factor = cholesky(total, lower=True)
+    except LinAlgError as problem:
+        raise LinAlgError(NOT_POSITIVE.format(len(total))) from problem
+    error = np.finfo(float).eps * (np.diag(total) / np.diag(factor) ** 2).sum()
+    if error > LARGEST_ERROR:
+        raise LinAlgError(
+            f"Rounding leaves the log-likelihood of {len(total)} misclosures wrong by {error:.1g} "
+            f"(limit {LARGEST_ERROR:g}): their noise is next to nothing beside the signals. Give "
+            "each observation the sigma that it has."
+        )
+    covariances = tuple(signal.covariance for signal in rows[0].signals)
+    solver = DenseSolver(sides.clocks, sides.mixings, covariances, sides.first, factor)
+    return solve_trend(
+        solver, np.concatenate([np.ravel(p.misclosure) for p in rows]), _design(rows)
+    )
 
 
 def covariance_given(
@@ -101,7 +88,7 @@ def covariance_given(
     Raises
     ------
     ValueError
-        As of collocate_dense.
+        As of collocate_rows_dense.
 
     Examples
     --------
@@ -124,28 +111,6 @@ def covariance_given(
     left = (_design(sought) - half.T @ trend) @ solved.trend_root
     prior = np.tril(total[m:, m:]) + np.tril(total[m:, m:], -1).T
     return np.asarray(prior - half.T @ half + left @ left.T)
-
-
-def _collocate(rows, noise):
-    """The Collocation of SparseRows whose noise has the covariance (m, m)."""
-    sides = _all_sides(rows)
-    total = _covariance(sides, noise)
-    try:
-        factor = cholesky(total, lower=True)
-    except LinAlgError as problem:
-        raise LinAlgError(NOT_POSITIVE.format(len(total))) from problem
-    error = np.finfo(float).eps * (np.diag(total) / np.diag(factor) ** 2).sum()
-    if error > LARGEST_ERROR:
-        raise LinAlgError(
-            f"Rounding leaves the log-likelihood of {len(total)} misclosures wrong by {error:.1g} "
-            f"(limit {LARGEST_ERROR:g}): their noise is next to nothing beside the signals. Give "
-            "each observation the sigma that it has."
-        )
-    covariances = tuple(signal.covariance for signal in rows[0].signals)
-    solver = DenseSolver(sides.clocks, sides.mixings, covariances, sides.first, factor)
-    return solve_trend(
-        solver, np.concatenate([np.ravel(p.misclosure) for p in rows]), _design(rows)
-    )
 
 
 def signal_covariance(rows: Sequence[SparseRows]) -> np.ndarray:

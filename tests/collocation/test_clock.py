@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Noise, Signal, collocate, collocate_dense
+from mlscorr.collocation import Noise, Signal, collocate
 from mlscorr.collocation.covariance import Covariance
+from tests.beds.dense import collocate_dense
 
 START = 413200.0  # s
 RESTARTS = START + np.array([100.0, 180.0])

@@ -8,21 +8,15 @@ from mlscorr.collocation import (
     Noise,
     Signal,
     SparseRows,
-    collocate_dense,
     collocate_rows_dense,
     covariance_given,
 )
 from mlscorr.collocation.covariance import FAMILIES, INTEGRATED, Covariance
+from tests.beds.dense import collocate_correlated
 from tests.beds.linked_rows import Street
 
 START = 413_200.0  # s of week
 SPAN = 200.0  # s
-
-
-def collocate(gps_time, misclosure, noise, design, signals):
-    "Dense collocation of single rows, whose noise may be correlated in any manner"
-    signals = [Signal(signal.mixing[:, None], signal.covariance) for signal in signals]
-    return collocate_dense(gps_time, misclosure[:, None], noise, design[:, None], signals)
 
 
 def legendre(gps_time, order):
@@ -53,7 +47,9 @@ class Case:
         return [Signal(m, c) for m, c in zip(self.mixing, self.covariances, strict=True)]
 
     def solve(self):
-        return collocate(self.gps_time, self.misclosure, self.noise, self.design, self.signals)
+        return collocate_correlated(
+            self.gps_time, self.misclosure, self.noise, self.design, self.signals
+        )
 
     def joint(self):
         "Covariance of all signals at observations and asked epochs, both ways written as B D B^T"
@@ -122,7 +118,9 @@ def test_equals_gaussian_process_regression_without_a_trend(family, nu):
     process.fit(time[:, None], values)
     expected, sigma = process.predict(asked[:, None], return_std=True)
     signal = Signal(np.full((30, 1), 0.2), Covariance(family, 25.0))
-    solved = collocate(START + time, values, 1e-4 * np.eye(30), np.zeros((30, 0)), [signal])
+    solved = collocate_correlated(
+        START + time, values, 1e-4 * np.eye(30), np.zeros((30, 0)), [signal]
+    )
     asked_mixing = [np.full((50, 1, 1), 0.2)]
     mean, covariance = solved.predict(START + asked, np.zeros((50, 1, 0)), asked_mixing)
     assert np.abs(mean[:, 0] - expected).max() < 1e-8
@@ -174,7 +172,7 @@ def test_a_polynomial_is_recovered_whatever_the_signal(order):
     truth = rng.normal(size=order + 1)
     signal = Signal(np.full((12, 1), 0.5), Covariance("matern32", 40.0))
     design = legendre(gps_time, order)
-    solved = collocate(gps_time, design @ truth, 1e-6 * np.eye(12), design, [signal])
+    solved = collocate_correlated(gps_time, design @ truth, 1e-6 * np.eye(12), design, [signal])
     mean, _ = solved.predict(asked, legendre(asked, order)[:, None], [np.full((100, 1, 1), 0.5)])
     assert np.abs(solved.trend - truth).max() < 1e-9  # m
     assert np.abs(mean[:, 0] - legendre(asked, order) @ truth).max() < 1e-9  # m
@@ -184,7 +182,7 @@ def test_observations_without_noise_are_predicted_back():
     "As the noise falls to 1 um the prediction at the observations becomes the observations"
     case = Case(3, order=0)
     for sigma, worst in ((1e-2, 0.1), (1e-4, 1e-5), (1e-6, 1e-8)):
-        solved = collocate(
+        solved = collocate_correlated(
             case.gps_time[::3],
             case.misclosure[::3],
             sigma**2 * np.eye(12),
@@ -247,7 +245,7 @@ def test_leave_out_equals_leaving_out(seed):
 def test_rows_that_carry_the_trend_cannot_be_left_out():
     "A trend that needs an observation is not predicted without it: refused, with the numbers"
     gps_time, design = START + np.array([0.0, 0.0, 100.0]), np.array([[1, 0], [1, 0], [1, 1.0]])
-    solved = collocate(gps_time, np.zeros(3), 1e-4 * np.eye(3), design, [])
+    solved = collocate_correlated(gps_time, np.zeros(3), 1e-4 * np.eye(3), design, [])
     assert [solved.determined_without([row]) for row in range(3)] == [True, True, False]
     with pytest.raises(ValueError, match=r"Without the 1 observations .* the other 2 do not"):
         solved.leave_out([2])
@@ -260,7 +258,7 @@ def test_origin_of_time_and_order_of_observations_do_not_matter():
     mean, covariance = solved.predict(case.asked, case.asked_design, case.asked_mixing)
     order = case.rng.permutation(len(case.gps_time))
     case.mixing = [mixing[order] for mixing in case.mixing]
-    again = collocate(
+    again = collocate_correlated(
         case.gps_time[order] + day,
         case.misclosure[order],
         case.noise[np.ix_(order, order)],
@@ -291,7 +289,7 @@ def test_a_trend_without_enough_observations_is_refused():
     "Three observations at two epochs do not determine a parabola"
     gps_time = START + np.array([0.0, 100.0, 100.0])
     with pytest.raises(ValueError, match="3 trend parameters are not determined by 3 misclosures"):
-        collocate(gps_time, np.zeros(3), 1e-4 * np.eye(3), legendre(gps_time, 2), [])
+        collocate_correlated(gps_time, np.zeros(3), 1e-4 * np.eye(3), legendre(gps_time, 2), [])
 
 
 def test_contradicting_observations_without_noise_are_refused():
@@ -299,4 +297,4 @@ def test_contradicting_observations_without_noise_are_refused():
     gps_time, one = START + np.array([0.0, 50.0, 50.0]), np.ones((3, 1))
     signal = Signal(one, Covariance("matern32", 30.0))
     with pytest.raises(ValueError, match="not positive definite: two observations of one time"):
-        collocate(gps_time, np.zeros(3), np.zeros((3, 3)), one, [signal])
+        collocate_correlated(gps_time, np.zeros(3), np.zeros((3, 3)), one, [signal])

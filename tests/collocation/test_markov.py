@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Noise, Signal, collocate, collocate_dense
+from mlscorr.collocation import Noise, Signal, collocate
 from mlscorr.collocation.covariance import FAMILIES, Covariance
+from tests.beds.dense import collocate_dense
 
 START = 413_200.0  # s of week
 SPAN = 200.0  # s

@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import lstsq
 
-from mlscorr.collocation import Noise, Signal, collocate, collocate_dense
+from mlscorr.collocation import Noise, Signal, collocate
 from mlscorr.collocation.covariance import Covariance
 from mlscorr.collocation.model import signal_clocks, solve_trend
+from tests.beds.dense import collocate_dense
 
 START = 413_200.0  # s of week
 

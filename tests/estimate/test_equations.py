@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.collocation import collocate_dense, collocate_rows
+from mlscorr.collocation import collocate_rows
 from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
 from mlscorr.collocation.trend import polynomial_design
 from mlscorr.estimate import estimate_correction, with_ties
@@ -14,6 +14,7 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.signals import drift_alone, pose_signals
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps
+from tests.beds.dense import collocate_dense
 from tests.beds.pos_errors import CONSTANT, EPOCHS, LENGTH, START, Case, even, smooth_case
 from tests.beds.tied_passes import tied_passes
 
