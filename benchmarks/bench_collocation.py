@@ -13,9 +13,8 @@ from rich.console import Console
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation import Noise, Signal, collocate
+from mlscorr.collocation import Noise, Signal, SparseRows, collocate, collocate_rows_dense
 from mlscorr.collocation.covariance import FAMILIES, Covariance
-from tests.beds.dense import collocate_dense
 
 try:
     import celerite2
@@ -157,8 +156,12 @@ def beside_others():
     CONSOLE.print(table)
 
 
+def _by_dense(gps_time, *given):
+    return collocate_rows_dense([SparseRows(gps_time[:, None], *given)])
+
+
 def _dense(component):
-    mean, variance = component.both(collocate_dense)
+    mean, variance = component.both(_by_dense)
     return mean[:, 0], variance[:, 0, 0]
 
 
@@ -217,7 +220,7 @@ def six_components():
     )
     pose = Pose(600, 18_000)
     results = []
-    for name, way, repeats in (("recursion", collocate, 3), ("dense", collocate_dense, 1)):
+    for name, way, repeats in (("recursion", collocate, 3), ("dense", _by_dense, 1)):
         solving, solved = best(lambda w=way: pose.solve(w), repeats)
         seconds, result = best(lambda s=solved: pose.predict(s), repeats)
         results.append(result)

@@ -16,7 +16,7 @@ from mlscorr.gap.infer.separability import explained_square
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Rows, background
 from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import Signature, signature, signatures
+from mlscorr.gap.signatures.signatures import Signature, signature
 from mlscorr.simulate.displacement import RecordedPoints
 from mlscorr.survey import Survey
 
@@ -176,9 +176,7 @@ def shift_by(ruler: Ruler, move: Callable[[RecordedPoints], np.ndarray]) -> np.n
     return np.einsum("mi,mi->m", rows.direction, total[np.searchsorted(items, rows.item)])
 
 
-def likeness(
-    ruler: Ruler, shift: np.ndarray, known: Sequence[Signature] | None = None
-) -> dict[str, float]:
+def likeness(ruler: Ruler, shift: np.ndarray, known: Sequence[Signature]) -> dict[str, float]:
     """Share of a shift's squared signal that each effect of the library explains.
 
     Parameters
@@ -186,10 +184,9 @@ def likeness(
     ruler : Ruler
     shift : (m,) array
         Of the residuals.
-    known : sequence of Signature, optional
+    known : sequence of Signature
         All that the library has in this survey; of an event the best of its times counts.
     """
-    known = signatures(ruler.rows, ruler.survey)[0] if known is None else known
     known = [sign for sign in known if sign.jacobian[ruler.rows.metric].any()]
     if not shift[ruler.rows.metric].any():
         return {}
