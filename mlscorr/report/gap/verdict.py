@@ -225,22 +225,25 @@ def in_hundred(share: float | None) -> str:
 
 
 def chance(p_value: float | None) -> str:
-    """How often a survey in which nothing is wrong would look as odd.
+    """How often a survey would look as odd whose POS alone errs, by as much as fits this one.
 
     Parameters
     ----------
     p_value : float or None
 
-    >>> chance(0.04976), chance(1e-19)
-    ('Of 100 surveys in which nothing is wrong, 5 would look as odd.', 'Of 10 000 surveys in which
-    nothing is wrong, not one would look as odd.')
+    >>> chance(0.04976)
+    'Of 100 surveys with a POS as bad as fits this one, and nothing else wrong, 5 would look as
+    odd.'
     """
     if not known(p_value):
         return ""
     number = next((n for n in (100, 1000) if round(n * p_value) > 0), 10_000)
     count = f"{number * p_value:.0f}" if p_value >= 1e-4 else "not one"
     words = f"{number:,}".replace(",", " ") if number > 1000 else number
-    return f"Of {words} surveys in which nothing is wrong, {count} would look as odd."
+    return (
+        f"Of {words} surveys with a POS as bad as fits this one, and nothing else wrong, {count} "
+        "would look as odd."
+    )
 
 
 def advice(document: dict) -> tuple[str, list[str]]:
