@@ -9,16 +9,19 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.gap.observe.patches import Patches
-from mlscorr.gap.observe.plane_fit import fit_patches
+from mlscorr.gap.observe.plane_fit import block_chance, fit_patches, place_key
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.io.las import read_chunks
 from mlscorr.survey import CloudFile, PointCloud, Survey
+from mlscorr.targets import NO_POINTS, number_passes
 
 
 class PatchCollector:
     """Keeps at most `pool` flat patches of the chunks that it is given, spread over the place.
 
     Which blocks of the ground are kept is told by a hash of their place: the same in all passes.
+    Points of the moments about the end of a chunk are held until those that follow have come. So
+    patches do not depend on chunks, where points come about in order of time, up or down.
 
     Parameters
     ----------
@@ -28,36 +31,53 @@ class PatchCollector:
 
     def __init__(self, survey: Survey, pool: int | None = None):
         self._survey, self._pool = survey, SETTINGS.pool if pool is None else pool
-        self._parts, self._starts, self._share, self._read = [], {}, 1.0, 0
+        self._parts, self._starts, self._share, self._file, self._read = [], {}, 1.0, None, 0
+        self._held, self._number = NO_POINTS, np.empty(0, int)
 
     def add(self, file: CloudFile, chunk: PointCloud) -> None:
-        """Take the patches of a chunk of a file."""
+        """Take a chunk of a file; the chunks of a file follow each other."""
+        if file != self._file:
+            self._close(np.inf)
+            self._file, self._read = file, 0
         segment = self._survey.trajectory.segment(chunk.gps_time)
-        for number in np.unique(segment[segment >= 0]):
-            inside, key = segment == number, (file, int(number))
-            self._starts[key] = min(self._starts.get(key, np.inf), chunk.gps_time[inside].min())
-            patches = fit_patches(self._survey, chunk, inside, self._share)
-            if patches is not None:
-                self._parts.append((key, patches))
+        for number in np.unique(segment[segment >= 0]).tolist():
+            start = chunk.gps_time[segment == number].min()
+            self._starts[file, number] = min(self._starts.get((file, number), np.inf), start)
+        rows = np.flatnonzero((segment >= 0) & (block_chance(chunk.xyz) < self._share))
+        self._held = PointCloud.concatenate([self._held, chunk[rows]])
+        self._number = np.append(self._number, self._read + rows)
         self._read += len(chunk)
-        while self._in_the_end() > self._pool:
-            self._share /= 2
-            self._parts = [(key, p[p.block < self._share]) for key, p in self._parts]
+        self._close(chunk.gps_time[-1] if len(chunk) else np.inf)
 
-    def _in_the_end(self):
-        """How many patches there will be, going on like this: the fewer kept, the less to do."""
-        whole = sum(file.points for file in self._survey.clouds)
-        return sum(len(p) for _, p in self._parts) * max(1.0, whole / max(self._read, 1))
+    def _close(self, time):
+        """Keep the patches of held points, but those of the moments about a time (s)."""
+        moment = np.floor(self._held.gps_time / SETTINGS.moment)
+        # beams that take turns come a little late
+        is_open = np.abs(moment - np.floor(time / SETTINGS.moment)) <= 1
+        segment = self._survey.trajectory.segment(self._held.gps_time)
+        rows = np.lexsort((moment, segment))
+        rows = rows[~is_open[rows]]
+        is_next = (np.diff(segment[rows]) != 0) | (np.diff(moment[rows]) != 0)
+        for part in np.split(rows, np.flatnonzero(is_next) + 1):  # memory follows the largest
+            patches = fit_patches(self._survey, self._held, self._number, part)
+            if patches is not None:
+                key = self._file, int(segment[part[0]])
+                self._parts.append((key, patches[patches.block < self._share]))
+            while sum(len(patches) for _, patches in self._parts) > self._pool:
+                self._share /= 2
+                self._parts = [(key, p[p.block < self._share]) for key, p in self._parts]
+        self._held, self._number = self._held[is_open], self._number[is_open]
 
     def patches(self) -> Patches | None:
-        """Patches of all chunks so far with the numbers of their passes; None where none is."""
-        order = {key: i for i, key in enumerate(sorted(self._starts, key=self._starts.get), 1)}
-        parts = [
-            replace(patches, pass_number=np.full(len(patches), order[key]))
-            for key, patches in self._parts
-            if len(patches)
-        ]
-        return Patches.concatenate(parts) if parts else None
+        """Patches of all chunks, of which none follows, by pass and place; None where none is."""
+        self._close(np.inf)
+        if not any(len(patches) for _, patches in self._parts):
+            return None
+        order = number_passes(self._starts)
+        patches = Patches.concatenate(patches for _, patches in self._parts)
+        number = np.repeat([order[key] for key, _ in self._parts], [len(p) for _, p in self._parts])
+        rows = np.lexsort((place_key(patches.xyz[:, 0], patches.time[:, 0]), number))
+        return replace(patches, pass_number=number)[rows]
 
 
 def find_patches(

@@ -11,33 +11,29 @@ from mlscorr.ties.thinning import integer_hash
 
 
 def fit_patches(
-    survey: Survey, chunk: PointCloud, inside: np.ndarray, share: float
+    survey: Survey, cloud: PointCloud, number: np.ndarray, rows: np.ndarray
 ) -> Patches | None:
-    """Patches of a chunk and pass, without their pass number; None where there is none.
+    """Patches of a pass in order of their place_key, without its number; None where there is none.
 
     Parameters
     ----------
     survey : Survey
-    chunk : PointCloud
+    cloud : PointCloud
         n points.
-    inside : (n,) bool array
-        Those of the pass.
-    share : float
-        Of the blocks of the ground, that are looked at.
+    number : (n,) int array
+        Of each in its file: points of numbers that follow each other were measured so.
+    rows : (k,) int array
+        Those to look at, of one pass.
     """
-    block = block_chance(chunk.xyz)
-    rows = np.flatnonzero(inside & (block < share))
-    key = place_key(chunk.xyz[rows], chunk.gps_time[rows])
+    key = place_key(cloud.xyz[rows], cloud.gps_time[rows])
     order = np.argsort(key, kind="stable")
     rows, key = rows[order], key[order]
-    first = np.flatnonzero(np.append(True, key[1:] != key[:-1])) if len(rows) else np.empty(0, int)
+    first = np.flatnonzero(np.append(True, key[1:] != key[:-1])[: len(key)])
     count = np.diff(np.append(first, len(rows)))
     keep = count >= SETTINGS.plane_points
     if not keep.any():
         return None
-    rows = rows[np.repeat(keep, count)]
-    count = count[keep]
-    return _fit(survey, chunk, rows, count, block)
+    return _fit(survey, cloud, number, rows[np.repeat(keep, count)], count[keep])
 
 
 def block_chance(xyz: np.ndarray) -> np.ndarray:
@@ -76,7 +72,7 @@ def chance(*numbers: np.ndarray) -> np.ndarray:
     return (integer_hash(np.column_stack(numbers)) >> np.uint64(11)) / float(1 << 53)
 
 
-def _fit(survey, chunk, rows, count, block):
+def _fit(survey, chunk, number, rows, count):
     """Planes through groups of points: rows (n,) of the chunk, count (g,) of each group."""
     first, group = np.cumsum(count) - count, np.repeat(np.arange(len(count)), count)
     local = chunk.xyz[rows] - chunk.xyz[rows[first]][group]
@@ -88,17 +84,17 @@ def _fit(survey, chunk, rows, count, block):
     good &= values[:, 1] >= SETTINGS.narrowest**2
     if not good.any():
         return None
-    fired, returned = _misses(chunk.gps_time, rows, first, group)
+    fired, returned = _misses(chunk.gps_time[rows], number[rows], first, group)
     away = np.einsum("ni,ni->n", local - mean[group], axes[group, :, 0])
     sample = rows[_taken(weight > 0, first)[good]]
-    begin = chunk.gps_time[rows[0]]
-    time = np.add.reduceat(weight * (chunk.gps_time[rows] - begin), first) / held
+    begin = chunk.gps_time[rows[first]]
+    time = np.add.reduceat(weight * (chunk.gps_time[rows] - begin[group]), first) / held
     normal = axes[good, :, 0]
     slant = np.einsum("pi,pi->p", normal, _sight(survey, chunk, sample))
     normal *= np.sign(slant)[:, None]
     return Patches(
         pass_number=np.zeros(good.sum(), int),
-        gps_time=begin + time[good],
+        gps_time=(begin + time)[good],
         centre=chunk.xyz[rows[first]][good] + mean[good],
         normal=normal,
         variance=variance[good],
@@ -107,7 +103,7 @@ def _fit(survey, chunk, rows, count, block):
         points=held[good].astype(int),
         fired=fired[good],
         returned=returned[good],
-        block=block[rows[first]][good],
+        block=block_chance(chunk.xyz[rows[first]][good]),
         xyz=chunk.xyz[sample],
         time=chunk.gps_time[sample],
         intensity=chunk.intensity[sample].astype(float),
@@ -210,14 +206,14 @@ def _sight(survey, chunk, sample):
     return away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
-def _misses(gps_time, rows, first, group):
+def _misses(gps_time, number, first, group):
     """Pulses fired and returned within the scan lines of a group, their ends not counted.
 
     The step of pulses is the least one of the group. Nothing is counted where pauses are not whole
     multiples of it (jitter, another order), or too many are long (a cloud that was thinned there).
     """
-    pause = np.diff(gps_time[rows], append=gps_time[rows[-1]])
-    follows = np.append((np.diff(rows) == 1) & (np.diff(group) == 0), False) & (pause > 0)
+    pause = np.diff(gps_time, append=gps_time[-1])
+    follows = np.append((np.diff(number) == 1) & (np.diff(group) == 0), False) & (pause > 0)
     step = np.minimum.reduceat(np.where(follows, pause, np.finfo(float).max), first)
     pulses = np.where(follows, pause / step[group], np.finfo(float).max)
     near = pulses <= SETTINGS.longest_miss

@@ -25,7 +25,7 @@ def wall(survey, rng, bent=0.0):
 def test_a_wall_gives_its_normal_and_its_noise(survey):
     "One patch whose normal is known to 2 mrad, its variance to 10 %, with at most 400 points"
     cloud = wall(survey, np.random.default_rng(1))
-    patches = fit_patches(survey, cloud, np.ones(len(cloud), bool), 1.0)
+    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
     assert len(patches) == 1
     assert np.abs(patches.normal[0] @ [1.0, 0.0, 0.0]) == pytest.approx(1.0, abs=2e-6)
     assert np.sqrt(patches.variance[0]) == pytest.approx(NOISE, rel=0.1)
@@ -36,7 +36,7 @@ def test_a_wall_gives_its_normal_and_its_noise(survey):
 def test_what_is_bent_is_rougher_than_its_noise(survey):
     "A bow of 5 cm has ten times the variance of the noise, or is no patch at all"
     cloud = wall(survey, np.random.default_rng(1), bent=0.3)
-    patches = fit_patches(survey, cloud, np.ones(len(cloud), bool), 1.0)
+    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
     assert patches is None or patches.ripple[0] > 3
 
 
