@@ -3,7 +3,6 @@
 import io
 import os
 import secrets
-import shutil
 import socket
 import tempfile
 import threading
@@ -56,19 +55,22 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
 
 
-def remove_folder(folder: Any) -> None:
-    """Remove a folder and all that is in it.
+def remove_files(folder: Any, pattern: str) -> None:
+    """Remove files in a folder by a pattern; all else stays.
 
     Parameters
     ----------
     folder : Path
+    pattern : str
     """
     if not is_remote(folder):
-        shutil.rmtree(folder)
+        for path in folder.glob(pattern):
+            path.unlink()
         return
     with asking(folder):
         folder.fs.invalidate_cache()
-        folder.fs.rm(folder.path, recursive=True)
+        if paths := folder.fs.glob(f"{folder.path}/{pattern}"):
+            folder.fs.rm(paths)
 
 
 def publish(source: Path, target: Any) -> None:

@@ -17,10 +17,18 @@ from scipy.spatial.transform import Rotation
 from mlscorr.io.folders import remove
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.output import PART, fcntl
-from mlscorr.io.publishing import locked_in_store, make_folder, names_in, publish, scratch_folder
+from mlscorr.io.publishing import (
+    locked_in_store,
+    make_folder,
+    names_in,
+    publish,
+    remove_files,
+    scratch_folder,
+)
 from mlscorr.io.storage import is_remote
 
 SUFFIX = ".result"
+LOCK = "lock"
 KINDS = (str, int, float, Path, np.generic)  # of values that are told by what they print
 ROOMS = ("mlscorr", "numpy", "scipy", "pathlib", "upath")  # whose classes results hold
 MAKERS = {  # functions that make values; no other is called while a result is loaded
@@ -105,6 +113,20 @@ class TaskStore:
     """
 
     folder: Path
+
+    @property
+    def plan(self) -> Path:
+        """Where a run lists its tasks: the mark that a folder is of a run."""
+        return self.folder / "plan.json"
+
+    def is_begun(self) -> bool:
+        """Whether a run began here, if only by its lock, after which it writes the plan."""
+        names = {*names_in(self.folder)}
+        return self.plan.name in names or {LOCK} <= names <= {LOCK, self.plan.name + PART}
+
+    def clear(self) -> None:
+        """Remove all results; what else is in the folder stays."""
+        remove_files(self.folder, f"*/{'[0-9a-f]' * len(digest())}{SUFFIX}")
 
     def path(self, kind: str, key: str) -> Path:
         """Where a result stands, or would stand.
@@ -215,11 +237,11 @@ class TaskStore:
             Where another run is at work.
         """
         if is_remote(self.folder):
-            with locked_in_store(self.folder / "lock"):
+            with locked_in_store(self.folder / LOCK):
                 yield
             return
         self.folder.mkdir(parents=True, exist_ok=True)
-        with open(self.folder / "lock", "w") as lock:
+        with open(self.folder / LOCK, "a") as lock:
             try:
                 if fcntl is not None:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -217,6 +217,42 @@ def test_a_folder_of_others_is_wrong_use_as_of_a_survey(project, tmp_path):
             assert f"The output folder {out} holds" in ended.stderr and words in ended.stderr
 
 
+@pytest.mark.parametrize("options", [Options(overwrite=True), Options(resume=True)])
+def test_a_folder_of_tasks_that_no_run_made_is_refused(project, tmp_path, options):
+    "Neither --overwrite nor --resume touches anything beside a folder `tasks` without a plan"
+    texts = {"tasks/mine/todo.txt": "a", "tasks/lock": "b", "first/tile-1.laz": "c"}
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=r"tasks is not of a run: .* choose another folder"):
+        correct_project(project, tmp_path, options)
+    there = {str(p.relative_to(tmp_path)): p for p in tmp_path.rglob("*") if p.is_file()}
+    assert {name: path.read_text() for name, path in there.items()} == texts
+
+
+def test_overwriting_removes_results_of_tasks_alone(project, copy):
+    "All tasks are done again, and what somebody keeps among their results stays"
+    notes = copy / "tasks" / "mine" / "todo.result"
+    notes.parent.mkdir()
+    notes.write_text("precious")
+    correct_project(project, copy, Options(page=False, overwrite=True))
+    assert notes.read_text() == "precious"
+    assert {kind for kind, _ in worked(copy)} == {"tiles", "findings", "clouds", "reports"}
+
+
+@pytest.mark.parametrize("left", [(), ("plan.json.part",)])
+def test_a_run_that_was_ended_before_its_plan_is_resumed(project, corrected, tmp_path, left):
+    "Only its lock, an empty log and half a plan are there: the same results as of a new folder"
+    out = tmp_path / "out"
+    (out / "tasks").mkdir(parents=True)
+    for name in ("log.txt", "tasks/lock", *(f"tasks/{name}" for name in left)):
+        (out / name).touch()
+    with pytest.raises(ValueError, match="--resume does what is missing"):
+        correct_project(project, out, QUICK)
+    correct_project(project, out, Options(page=False, resume=True))
+    assert outputs(out) == outputs(corrected[1])
+
+
 def test_resume_does_what_is_missing_or_damaged(project, copy):
     """A cloud that is gone, and a result of which a bit fell over, are made again; nothing else.
 

@@ -12,7 +12,7 @@ import numpy as np
 from mlscorr.io.output import check_output, output_file, write_json
 from mlscorr.io.project_file import ProjectParts, read_project
 from mlscorr.io.project_sections import SHARED_TILES
-from mlscorr.io.publishing import check_store_output, make_folder, remove_folder
+from mlscorr.io.publishing import check_store_output
 from mlscorr.io.storage import as_path, is_folder, is_remote
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.io.trajectory_exports import check_exports
@@ -110,11 +110,9 @@ def correct_project(
     check_exports(options.trajectories, project.crs, is_read=True)
     check_project_output(project, out, options)
     store = TaskStore(out / STORE)
-    if options.overwrite and not options.resume and is_folder(store.folder):
-        with store.locked():
-            remove_folder(store.folder)
-    make_folder(out)
-    with store.locked(), logged(out / "log.txt", store.folder / "plan.json", tell) as progress:
+    with store.locked(), logged(out / "log.txt", store.plan, tell) as progress:
+        if options.overwrite and not options.resume:
+            store.clear()
         with engine(options.workers, options.scheduler) as chosen:
             work = _Work(project, out, options, Run(store, chosen, progress.ended), progress)
             result = work.result()
@@ -124,7 +122,13 @@ def correct_project(
 
 def check_project_output(project: ProjectParts, out: Path, options: Options) -> None:
     """Refuse a folder for the results that holds others, or an input."""
-    is_ours = is_folder(out / STORE)
+    store = TaskStore(out / STORE)
+    is_ours = store.is_begun()
+    if not is_ours and is_folder(store.folder):
+        raise ValueError(
+            f"{store.folder} is not of a run: it has no {store.plan.name}. Results of tasks go "
+            "there, and what is there may be another's. Move it away, or choose another folder."
+        )
     if is_ours and not (options.resume or options.overwrite):
         raise ValueError(
             f"{out} holds results of a project already. --resume does what is missing or changed "

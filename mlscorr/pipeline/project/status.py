@@ -33,13 +33,13 @@ def project_status(out: str | Path) -> dict:
         Where no project was ever corrected into the folder.
     """
     out = as_path(out)
-    plan = out / STORE / "plan.json"
-    if not is_there(plan):
+    store = TaskStore(out / STORE)
+    if not is_there(store.plan):
         raise ValueError(
             f"{out} holds no results of a project, or its run has not begun with any file yet: "
             "mlscorr correct project.toml -o OUT makes them."
         )
-    stages, store = json.loads(read_bytes(plan)), TaskStore(out / STORE)
+    stages = json.loads(read_bytes(store.plan))
     done = {kind: store.keys(kind) for kind in stages}
     tasks = [
         {**task, "kind": kind, "is_done": task["key"] in done[kind]}
