@@ -164,9 +164,9 @@ def _drive(path, settings, name, section):
         files = CloudSection(files=section.files, gps_time=settings.cloud.gps_time)
         given = {"name": name, "crs": settings.crs, "cloud": files} | shared | own
         own_settings = SurveyFile(trajectory=section.trajectory, **given)
-        return DriveParts(
-            name, read_parts(path, own_settings), ids=_ids(path, name, section, own_settings)
-        )
+        ids = _ids(path, name, section, own_settings)
+        key = f"files of [[drive]] {name}"
+        return DriveParts(name, read_parts(path, own_settings, key), ids=ids)
     toml = survey_toml(beside(path, section.survey))
     stated = read_survey_file(toml)
     given = {n: getattr(settings, n) for n in BELIEFS if n in settings.model_fields_set}

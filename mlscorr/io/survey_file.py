@@ -140,7 +140,7 @@ class SurveyParts:
         )
 
 
-def read_parts(path: Path, settings: PlannedSurveyFile) -> SurveyParts:
+def read_parts(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") -> SurveyParts:
     """All of a survey but its clouds.
 
     Parameters
@@ -149,8 +149,10 @@ def read_parts(path: Path, settings: PlannedSurveyFile) -> SurveyParts:
         Beside which the files lie that are named.
     settings : PlannedSurveyFile
         What raises is as of read_survey.
+    key : str
+        As of files_of.
     """
-    files = files_of(path, settings)
+    files = files_of(path, settings, key)
     inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
     recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
     surveyed = read_surveyed(files.control, settings.control, recorded.trajectory)

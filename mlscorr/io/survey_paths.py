@@ -41,7 +41,7 @@ class SurveyPaths:
         return [(what, file) for what, file in named if file is not None]
 
 
-def files_of(path: Path, settings: PlannedSurveyFile) -> SurveyPaths:
+def files_of(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") -> SurveyPaths:
     """Paths of the files that a survey.toml names.
 
     Parameters
@@ -49,6 +49,8 @@ def files_of(path: Path, settings: PlannedSurveyFile) -> SurveyPaths:
     path : Path
         Of survey.toml.
     settings : PlannedSurveyFile
+    key : str
+        That names the clouds.
 
     Raises
     ------
@@ -58,9 +60,9 @@ def files_of(path: Path, settings: PlannedSurveyFile) -> SurveyPaths:
         For a file that is named twice, and for two clouds of one name.
     """
     names = settings.cloud.files if settings.cloud else ()
-    clouds = [cloud for name in names for cloud in matching(path, "cloud.files", name)]
+    clouds = [cloud for name in names for cloud in matching(path, key, name)]
     if clouds:
-        check_distinct(path, clouds)
+        check_distinct(path, clouds, key)
     sessions = [session_file(path, section) for section in settings.trajectories]
     check_sessions(path, sessions)
     control = None if settings.control is None else settings.control.file
@@ -199,7 +201,7 @@ def existing(path: Path, key: str, name: str) -> Path:
     return there
 
 
-def check_distinct(path: Path, clouds: list[Path]) -> None:
+def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> None:
     """Refuse a cloud that is named twice or by a copy, and two of one name: outputs keep names.
 
     Parameters
@@ -207,6 +209,8 @@ def check_distinct(path: Path, clouds: list[Path]) -> None:
     path : Path
         Of survey.toml.
     clouds : list of Path
+    key : str
+        That names them.
 
     Raises
     ------
@@ -220,9 +224,9 @@ def check_distinct(path: Path, clouds: list[Path]) -> None:
     for kind, values in kinds.items():
         value, count = Counter(values).most_common(1)[0]
         if count > 1:
-            raise ValueError(f"cloud.files of {path} {kind} {value} ({count} times).")
+            raise ValueError(f"{key} of {path} {kind} {value} ({count} times).")
     for copy, first in find_copies(clouds).items():
         raise ValueError(
-            f"cloud.files of {path} names {copy}, which is a copy of {first}: all of its points "
+            f"{key} of {path} names {copy}, which is a copy of {first}: all of its points "
             "would count twice, as a pass of its own. Leave out one of the two."
         )

@@ -80,6 +80,14 @@ def test_what_is_wrong_is_said(city, parts, words):
         read_project(write(city, *parts))
 
 
+def test_the_key_of_a_drives_clouds_is_named(city):
+    "`files` of the [[drive]], which is what stands in project.toml, for none and for one twice"
+    for files, words in (('"a/b*.laz"', "no file is like .*b"), ('"a/*.laz", "a/t*"', "2 times")):
+        drive = DRIVE.format("a").replace('"a/*.laz"', files)
+        with pytest.raises((ValueError, OSError), match=rf"^files of \[\[drive\]\] a of .*{words}"):
+            read_project(write(city, drive))
+
+
 def test_a_copy_of_another_drives_cloud_is_refused(city):
     "Both files and drives are named; by point_source_ids of their own two drives may share copies"
     for name in ("a", "b"):
