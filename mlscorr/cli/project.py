@@ -100,3 +100,8 @@ def status(
     for line in content["failures"]:
         terminal.warn(line)
     terminal.say(f"Last: {content['log']}")
+    if content["is_running"] is False:
+        is_done = {stage["stage"]: stage["share"] == 1 for stage in content["all"]}
+        is_whole = is_done.get("reports") and all(is_done.values())
+        rest = "all is done" if is_whole else "the same command with --resume goes on"
+        terminal.say(f"Not running: {rest}.")

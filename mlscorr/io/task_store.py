@@ -25,7 +25,7 @@ from mlscorr.io.publishing import (
     remove_files,
     scratch_folder,
 )
-from mlscorr.io.storage import is_remote
+from mlscorr.io.storage import is_remote, is_there
 
 SUFFIX = ".result"
 LOCK = "lock"
@@ -123,6 +123,23 @@ class TaskStore:
         """Whether a run began here, if only by its lock, after which it writes the plan."""
         names = {*names_in(self.folder)}
         return self.plan.name in names or {LOCK} <= names <= {LOCK, self.plan.name + PART}
+
+    def is_locked(self) -> bool | None:
+        """Whether a run is at work; None where that can't be told.
+
+        A lock in a store may be of a run that was killed, and Windows has none.
+        """
+        lock = self.folder / LOCK
+        if not is_there(lock):
+            return False
+        if is_remote(lock) or fcntl is None:
+            return None
+        with open(lock, "rb") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return True
+        return False
 
     def clear(self) -> None:
         """Remove all results; what else is in the folder stays."""

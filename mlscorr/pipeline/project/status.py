@@ -25,7 +25,8 @@ def project_status(out: str | Path) -> dict:
     -------
     dict
         ``all`` and ``drives[]``: tasks and points done and planned, stage by stage; ``failures``
-        of all runs, and the last line of the ``log``, which says rate and time left.
+        of what isn't done yet, the last line of the ``log``, which says rate and time left, and
+        whether a run ``is_running``: None where that can't be told.
 
     Raises
     ------
@@ -49,16 +50,26 @@ def project_status(out: str | Path) -> dict:
     drives: dict[str, list[dict]] = {}
     for task in (task for task in tasks if task["drive"]):  # an area is of many
         drives.setdefault(task["drive"], []).append(task)
+    is_running = store.is_locked()
     lines = read_bytes(out / "log.txt").decode().splitlines()
     return document(
         "status",
         {
             "all": _stages(tasks),
             "drives": [{"name": name, "stages": _stages(own)} for name, own in drives.items()],
-            "failures": [line for line in lines if " Failed: " in line],
+            "failures": _failures(tasks, lines),
             "log": lines[-1] if lines else "",
+            "is_running": is_running,
         },
     )
+
+
+def _failures(tasks, lines):
+    """The last failure of each file or area of which a task isn't done; none of repaired ones."""
+    failed = [line for line in lines if " Failed: " in line]
+    left = dict.fromkeys(" ".join(task["name"].split()) for task in tasks if not task["is_done"])
+    own = [[line for line in failed if f" Failed: {name}: " in line] for name in left]
+    return [some[-1] for some in own if some]
 
 
 def _stages(tasks):

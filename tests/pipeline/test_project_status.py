@@ -1,0 +1,54 @@
+"""What status says of a run by what it keeps: failures that stand, and whether it is at work."""
+
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from mlscorr.cli import app
+from mlscorr.io.task_store import TaskStore
+from mlscorr.pipeline.project import project_status
+from mlscorr.pipeline.project.progress import logged
+from mlscorr.pipeline.project.tasks import Task, carry_out
+
+
+def tiles(folder, *names):
+    "A task of each file, which reads it"
+    return [
+        Task("tiles", f"key of {name}", "first", name, 1, Path.read_bytes, (folder / name,))
+        for name in names
+    ]
+
+
+def run(out, tasks):
+    "Work on tasks, and status of their run while it is at work"
+    store = TaskStore(out / "tasks")
+    with store.locked(), logged(out / "log.txt", store.plan, str) as progress:
+        progress.begin("tiles", tasks)
+        for task in tasks:
+            progress.ended(carry_out(task, store.folder))
+        return project_status(out)
+
+
+def test_a_failure_that_was_repaired_is_none(tmp_path):
+    "Of two files that failed twice, the one that a third run reads is shown no more"
+    tasks = tiles(tmp_path, "a  tile.laz", "b.laz")
+    run(tmp_path, tasks)
+    failures = run(tmp_path, tasks)["failures"]
+    assert [line.split(" Failed: ")[1].split(": ")[0] for line in failures] == [
+        "a tile.laz",
+        "b.laz",
+    ]
+    (tmp_path / "a  tile.laz").write_bytes(b"whole")
+    (failure,) = run(tmp_path, tasks)["failures"]
+    assert " Failed: b.laz: " in failure
+
+
+def test_a_run_that_is_no_more_is_said(tmp_path):
+    "Its lock tells one at work from one that was killed, which --resume goes on with"
+    (tmp_path / "a.laz").write_bytes(b"whole")
+    assert run(tmp_path, tiles(tmp_path, "a.laz"))["is_running"] is True
+    assert project_status(tmp_path)["is_running"] is False
+    said = CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
+    assert "Not running: the same command with --resume goes on." in said
+    with TaskStore(tmp_path / "tasks").locked():
+        assert "Not running" not in CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
