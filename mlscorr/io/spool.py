@@ -1,13 +1,16 @@
 """Point records parted into groups on disk, where memory does not hold them."""
 
+import errno
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.storage import is_remote
 
 
 class Spool:
@@ -101,3 +104,28 @@ def check_space(folder: Path, needed: int, what: str) -> None:
         raise OSError(
             f"{folder} has {free / 1e9:.1f} GB free of {needed / 1e9:.1f} GB that are needed {what}"
         )
+
+
+@contextmanager
+def telling_space(folder: Path) -> Iterator[None]:
+    """Where a project writes: of a full disk it is said which, and how much is left.
+
+    Parameters
+    ----------
+    folder : path
+
+    Raises
+    ------
+    OSError
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno != errno.ENOSPC or is_remote(folder):
+            raise
+        free = shutil.disk_usage(folder).free / 1e6
+        raise OSError(
+            f"{error.strerror}: the disk of {folder} has {free:.1f} MB free. Corrected clouds take "
+            "as much as those they are made of (mlscorr check tells how much). Make room, and "
+            "--resume goes on."
+        ) from error

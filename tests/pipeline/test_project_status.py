@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
@@ -52,3 +53,15 @@ def test_a_run_that_is_no_more_is_said(tmp_path):
     assert "Not running: the same command with --resume goes on." in said
     with TaskStore(tmp_path / "tasks").locked():
         assert "Not running" not in CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
+
+
+def test_a_full_disk_is_named_with_what_it_has_left(tmp_path):
+    "By a task that writes, and where the log takes no line any more"
+    full = Path("/dev/full")
+    task = Task("tiles", "key", "first", "a.laz", 1, full.write_text, ("half",))
+    words = f"No space left on device: the disk of {tmp_path}"
+    fault = carry_out(task, tmp_path).fault
+    assert fault.startswith(words) and " MB free" in fault
+    (tmp_path / "log.txt").symlink_to(full)
+    with pytest.raises(OSError, match=words), logged(tmp_path / "log.txt", tmp_path, str) as log:
+        log.note("x")

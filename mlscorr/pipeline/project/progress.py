@@ -13,6 +13,7 @@ from typing import TextIO
 
 from mlscorr.io.output import output_file
 from mlscorr.io.publishing import appended
+from mlscorr.io.spool import telling_space
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task
 
@@ -130,7 +131,7 @@ def logged(log: Path, plan: Path, tell: Callable[[str], object]) -> Iterator[Pro
     plan, tell
         As of Progress.
     """
-    with appended(log) as stream:
+    with telling_space(log.parent), appended(log) as stream:
         progress = Progress(stream, plan, tell)
         try:
             yield progress

@@ -13,6 +13,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from mlscorr.io.identity import FileIdentity
+from mlscorr.io.spool import telling_space
 from mlscorr.io.task_store import TaskStore
 
 VERSION = version("mlscorr")  # results of another one are made again
@@ -82,10 +83,11 @@ def carry_out(task: Task, folder: Path) -> Outcome:
     recorded = warnings.catch_warnings(record=True, action="always")
     with recorded as caught, threadpool_limits(limits=1):
         try:
-            result = task.function(*task.arguments)
-            spoken = [w for w in caught if issubclass(w.category, UserWarning)]
-            texts = list(dict.fromkeys(str(warning.message) for warning in spoken))
-            store.put(task.kind, task.key, (result, tuple(texts)))
+            with telling_space(folder):
+                result = task.function(*task.arguments)
+                spoken = [w for w in caught if issubclass(w.category, UserWarning)]
+                texts = list(dict.fromkeys(str(warning.message) for warning in spoken))
+                store.put(task.kind, task.key, (result, tuple(texts)))
         except (ValueError, OSError) as error:
             fault = str(error) or type(error).__name__
         except Exception as error:  # a night's work doesn't end by what nobody thought of
