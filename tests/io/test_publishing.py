@@ -10,7 +10,7 @@ import pytest
 from mlscorr.io.output import output_file, write_json
 from mlscorr.io.publishing import appended, check_store_output, locked_in_store, names_in, publish
 from mlscorr.io.storage import as_path
-from mlscorr.io.task_store import TaskStore
+from mlscorr.io.task_store import TaskStore, digest
 from tests.beds.object_store import object_store
 
 BEAT = 0.5  # s, three of which a busy machine does not miss
@@ -83,6 +83,19 @@ def test_results_of_tasks_are_kept_in_a_store(store):
             results.get("tiles", "key")
     finally:
         store.lost = ""
+
+
+def test_results_are_removed_and_nothing_else(store):
+    "Of a run's folder, begun with its lock; a text among the results stays, by any suffix"
+    results = TaskStore(as_path("s3://results/again/tasks"))
+    assert not results.is_begun() and results.is_locked() is False
+    with results.locked():
+        assert results.is_begun() and results.is_locked() is None
+    results.put("tiles", digest("a"), 1)
+    store.files.pipe_file("results/again/tasks/tiles/mine.result", b"precious")
+    assert not results.is_begun()
+    results.clear()
+    assert results.keys("tiles") == {"mine"}
 
 
 def test_a_log_goes_on_where_it_ended(store):

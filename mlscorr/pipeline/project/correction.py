@@ -123,8 +123,8 @@ def correct_project(
 def check_project_output(project: ProjectParts, out: Path, options: Options) -> None:
     """Refuse a folder for the results that holds others, or an input."""
     store = TaskStore(out / STORE)
-    is_ours = store.is_begun()
-    if not is_ours and is_folder(store.folder):
+    is_ours = is_folder(store.folder)
+    if is_ours and not store.is_begun():
         raise ValueError(
             f"{store.folder} is not of a run: it has no {store.plan.name}. Results of tasks go "
             "there, and what is there may be another's. Move it away, or choose another folder."
