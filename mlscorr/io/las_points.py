@@ -154,9 +154,8 @@ class ChunkedPoints:
 
 def decoding_points(layout: LasLayout, first: int, end: int) -> AbstractContextManager:
     """Where lazrs reads some points of a file."""
-    return decoding(
-        f"Points {first} to {end - 1} of {layout.points} in {layout.path} cannot be decoded"
-    )
+    points = f"Points {first} to {end - 1}" if end - first > 1 else f"Point {first}"
+    return decoding(f"{points} of {layout.points} in {layout.path} cannot be decoded")
 
 
 def read_records(

@@ -18,6 +18,7 @@ from mlscorr.frames import attitude_from_angles
 from mlscorr.io.las import (
     read_chunks,
     read_layout,
+    read_records,
     records_at,
     sample_gps_times,
     sha256,
@@ -434,3 +435,17 @@ def test_coordinates_that_overflow_are_refused(tmp_path):
     with pytest.raises(ValueError, match="do not fit the file's scale"):
         write_corrected(cloud_of(path), tmp_path / "out.laz", covering(path, (3e6, 0.0, 0.0)))
     assert os.listdir(tmp_path) == ["in.laz"]
+
+
+def test_a_single_point_that_cannot_be_decoded_is_named_as_one(tmp_path):
+    "Point 4999 of 5000 in a file that is cut off meanwhile; two are points 4998 to 4999"
+    path = tmp_path / "tile.las"
+    cloud = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    cloud.x, cloud.gps_time = 532_000 + np.arange(5000.0), 357_700 + np.arange(5000) / 7
+    cloud.write(path)
+    layout = read_layout(path)
+    path.write_bytes(path.read_bytes()[:-9000])
+    with pytest.raises(ValueError, match=r"^Point 4999 of 5000 in "):
+        records_at(layout, [4999])
+    with pytest.raises(ValueError, match=r"^Points 4998 to 4999 of 5000 in "):
+        list(read_records(layout, 100, 4998, 5000))

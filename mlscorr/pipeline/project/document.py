@@ -17,6 +17,7 @@ from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.corrected import STATES, DriveState
 from mlscorr.pipeline.project.running import Run
 from mlscorr.report import headline
+from mlscorr.survey.summary import counted
 
 RATINGS = {"controlled": "green", "tied": "green", "relative": "red", "uncorrected": "red"}
 
@@ -199,8 +200,8 @@ def _statements(project, rows, drives, faults):
         yield headline.Statement(
             "Failures",
             "red",
-            f"{len(faults)} files could not be corrected, and all else was. When they are whole, "
-            "--resume does what is missing.",
+            f"{counted(len(faults), 'file')} could not be corrected, and all else was. When "
+            "the cause is gone, --resume does what is missing.",
             tuple((fault["name"], fault["fault"]) for fault in faults),
         )
 
