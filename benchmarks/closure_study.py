@@ -17,7 +17,8 @@ from gap_mechanisms import STUDIED, sized
 from gap_study import Bed
 
 from mlscorr.gap.close import cause_for_simulator, close_gap
-from mlscorr.gap.close.folds import FoundCause, make_folds
+from mlscorr.gap.close.folds import make_folds
+from mlscorr.gap.close.found_cause import FoundCause
 from mlscorr.gap.infer.causes import infer_causes
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.observe.rows import background

@@ -7,7 +7,8 @@ import numpy as np
 from gap_mechanisms import ACTUAL
 
 from mlscorr.gap.close.closure import close_gap
-from mlscorr.gap.close.folds import FoundCause, make_folds
+from mlscorr.gap.close.folds import make_folds
+from mlscorr.gap.close.found_cause import FoundCause
 from mlscorr.gap.infer.causes import cause_of
 from mlscorr.gap.infer.labels import weigh_labels
 from mlscorr.gap.infer.observations import Observations

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.close.folds import FoundCause, Simulated, make_folds
+from mlscorr.gap.close.folds import Simulated, make_folds
+from mlscorr.gap.close.found_cause import FoundCause
 from mlscorr.gap.close.over_sigma import OverSigma, errors_over_sigma
 from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.gap.close.systematic import Squares, SystematicGap, share_gone

@@ -13,18 +13,17 @@ from scipy.optimize import minimize_scalar
 
 from mlscorr.effects import Effect
 from mlscorr.gap.close.cross_fit import cross_fitted
+from mlscorr.gap.close.found_cause import FoundCause
 from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.gap.infer.causes import Cause, Inference, cause_of
 from mlscorr.gap.infer.error_models import ErrorModel
-from mlscorr.gap.infer.labels import LabelEvidence, weigh_labels
+from mlscorr.gap.infer.labels import weigh_labels
 from mlscorr.gap.infer.measure import Predicted
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
 from mlscorr.gap.observe.rows import Rows, background
-from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.expectation import expected
-from mlscorr.gap.signatures.signatures import Signature, select, signature
-from mlscorr.survey import Survey
+from mlscorr.gap.signatures.signatures import Signature, select
 
 Simulated = Callable[[tuple[Effect, ...]], np.ndarray] | np.ndarray
 
@@ -64,60 +63,6 @@ class Folds:
         """A column (m,) of Predicted by its name, of each row as of its own fold."""
         each = np.array([getattr(predicted, name) for predicted in self.predicted])
         return each[self.of_rows, np.arange(len(self.fold))]
-
-
-@dataclass(frozen=True)
-class FoundCause:
-    """A cause, and what it was found in.
-
-    Parameters
-    ----------
-    rows : Rows
-        All of them, check points too.
-    used : (m,) bool array
-        False for those of check points.
-    survey : Survey
-        With what the simulator believes.
-    signatures : sequence of Signature
-        Of all rows.
-    evidence : LabelEvidence
-        Of the used rows.
-    cause : Cause
-        From them.
-    """
-
-    rows: Rows
-    used: np.ndarray
-    survey: Survey
-    signatures: Sequence[Signature]
-    evidence: LabelEvidence
-    cause: Cause
-
-    @property
-    def shifting(self) -> list[tuple[Signature, np.ndarray]]:
-        """The parts of the cause that are no noise, with their estimates."""
-        return [pair for pair in self.cause.parts if pair[0].name not in self.evidence.noisy]
-
-    @property
-    def undecided(self) -> np.ndarray:
-        """Rows (m,) bool of check points seen at the moment of a jump, between the used rows
-        next to it: nothing says on which side of it they are.
-        """
-        rows, undecided = self.rows, np.zeros(len(self.rows), bool)
-        known = rows.gps_time[self.used & rows.metric], rows.gps_time_2[self.used & rows.two_times]
-        known = np.sort(np.concatenate([[-np.inf], *known, [np.inf]]))
-        for part, _ in self.shifting:
-            if part.kind.moment() and "width" not in part.fixed:
-                after = np.searchsorted(known, rows.reference.start + part.fixed["time"])
-                between = (rows.gps_time > known[after - 1]) & (rows.gps_time < known[after])
-                undecided |= between & ~self.used
-        return undecided
-
-    def columns(self) -> np.ndarray:
-        """What these parts make of all rows (m, p), by their parameters."""
-        bench, rng = Bench(self.rows, self.survey), np.random.default_rng(0)  # nothing is drawn
-        parts = [signature(bench, p.kind, p.fixed, rng).jacobian for p, _ in self.shifting]
-        return np.hstack([np.zeros((len(self.rows), 0)), *parts])
 
 
 def make_folds(

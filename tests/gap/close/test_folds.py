@@ -9,7 +9,7 @@ from mlscorr.effects import make_effect
 from mlscorr.effects.vehicle import PositionStep
 from mlscorr.gap.close.folds import Folds, cause_for_simulator
 from mlscorr.gap.close.settings import SETTINGS
-from mlscorr.gap.infer.causes import Cause, Inference
+from mlscorr.gap.infer.causes import Inference
 from mlscorr.gap.infer.measure import Predicted
 from mlscorr.gap.infer.verdict import GapVerdict
 from mlscorr.gap.signatures.changes import Bench
@@ -104,19 +104,3 @@ def test_without_a_known_cause_nothing_is_added(late):
     share = {"unknown": 0.8, "none": 0.2}
     cause = cause_for_simulator(late.rows, late.signs, inference(late, "unknown", share))
     assert cause.effect == "none"
-
-
-def test_check_points_at_the_moment_of_a_jump_dont_judge(late):
-    "Seen within a second of it, where no used row tells before from after; all others do"
-    rows, time = late.rows, 20.0
-    near = np.abs(rows.gps_time - rows.reference.start - time) < 1.0
-    near_2 = rows.two_times & (np.abs(rows.gps_time_2 - rows.reference.start - time) < 1.0)
-    jump = signature(
-        Bench(rows, late.survey), PositionStep, {"time": time}, np.random.default_rng(0)
-    )
-    size = np.array([1.0, 0.0, 0.0])
-    cause = Cause("position_step", 1.0, (), ((jump, size),), jump.jacobian @ size)
-    case = replace(late.found(cause), used=~(near | near_2))
-    assert 0 < near.sum() < len(rows)
-    np.testing.assert_array_equal(case.undecided, near)
-    assert not late.found(late.cause("time_offset")).undecided.any()
