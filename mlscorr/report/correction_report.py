@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field, replace
 import numpy as np
 
 from mlscorr.estimate import NextControl, Support
+from mlscorr.estimate.support import DRIFT, REASONS
 from mlscorr.evaluate.rows import PointCounts, Score, Statistics, TargetRow
 from mlscorr.survey import PointCloud
 
@@ -180,6 +181,12 @@ class CorrectionReport:
         """
         is_whole = not self.support.weak and self.coverage.points_outside_trajectory == 0
         return is_whole and not self.points("check").missing
+
+    @property
+    def is_held_by_others(self) -> bool:
+        """Whether control of other drives holds it, without its own: no part lacks it all."""
+        whys = {stretch.why for stretch in self.support.weak}
+        return self.points("control").scored == 0 and whys <= {REASONS[DRIFT]}
 
     @property
     def cloud_points(self) -> int:

@@ -90,7 +90,7 @@ def headline(report: CorrectionReport) -> str:
     report : CorrectionReport
     """
     check, control = check_statement(report.points("check")).sentence, _control(report).sentence
-    if report.points("control").surveyed == 0:
+    if report.points("control").surveyed == 0 and not report.is_held_by_others:
         return f"{control} {check}"
     return f"{check} Control: {control} {_weakest(report).sentence}"
 
@@ -160,9 +160,12 @@ def _away(points):
 def _control(report):
     """The control points, or what a result without any is relative to."""
     points = report.points("control")
-    if points.surveyed == 0:
-        return Statement("Control points", "red", _uncontrolled(report))
-    return control_statement(points)
+    if points.surveyed:
+        return control_statement(points)
+    if report.is_held_by_others:
+        sentence = "No point of its own takes part: those of other drives hold it, through ties."
+        return Statement("Control points", "amber", sentence)
+    return Statement("Control points", "red", _uncontrolled(report))
 
 
 def control_statement(points: PointCounts) -> Statement:
@@ -201,7 +204,7 @@ def _weakest(report):
     They are no matter where their sigma is below the largest residual that the verdict rests on.
     """
     weak = report.support.weak
-    if not weak and report.points("control").scored == 0:
+    if not weak and report.is_held_by_others:
         sentence = "Control points of other drives hold the whole drive, through ties."
         return Statement("Weakest", "amber", sentence)
     if not weak:

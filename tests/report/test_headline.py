@@ -7,6 +7,7 @@ import pytest
 
 from mlscorr.cli.correct import tell
 from mlscorr.estimate import Support, WeakStretch
+from mlscorr.estimate.support import DRIFT, NO_CONTROL, REASONS
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.report.headline import first_screen, headline, statements
 from tests.beds.reports import drive, fabricate, page, words
@@ -160,3 +161,17 @@ def test_a_drive_without_control_of_its_own_is_not_held_by_it():
     report = replace(report, targets=rows, support=Support())
     (row,) = (row for row in statements(report) if row.what == "Weakest")
     assert row.rating == "amber" and "of other drives" in row.sentence
+
+
+@pytest.mark.parametrize("weak", [(), (WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[DRIFT]),)])
+def test_a_drive_that_others_hold_is_nowhere_said_to_stand_on_the_pos_alone(weak):
+    "Without control of its own, and with a part of which theirs tells little, it is not red"
+    report = fabricate(drive())[2]
+    rows = [row for row in report.targets if row.role == "check"]
+    report = replace(report, targets=rows, support=Support(weak))
+    (row,) = (row for row in statements(report) if row.what == "Control points")
+    assert row.rating == "amber" and "those of other drives hold it" in row.sentence
+    assert headline(report).startswith("2 of 2 surveyed check points were seen and scored.")
+    assert "nothing but the POS" not in " ".join(row.sentence for row in statements(report))
+    alone = (WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[NO_CONTROL]),)
+    assert headline(replace(report, support=Support(alone))).startswith("No control point takes")
