@@ -184,7 +184,9 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
         _result(report, before.rmse[:3], after.rmse[:3], kind),
     ]
     if worse:
-        sentences.append(f"After the correction it is worse than before: {', '.join(worse)}.")
+        points = count(report, "check" if kind == "check" else "control")
+        axes = ", ".join(worse)
+        sentences.append(f"After the correction it is worse than before: {axes} (RMS of {points}).")
     return sentences, bool(worse or report.points("check").missing)
 
 

@@ -208,19 +208,30 @@ def _statements(project, rows, drives, faults):
 
 def _minded(rows, reports):
     """A statement on drives whose own first screen isn't green: the worst of each, red first."""
-    doubts = []
-    for row, report in zip(rows, reports, strict=True):
-        facts = [fact for fact in report["statements"] if fact["rating"] == row["rating"]]
-        why = facts[0]["sentence"] if facts else row["meaning"]
-        if facts and facts[0]["what"] == "Warnings":  # whose sentence counts them alone
-            why = facts[0]["items"][0]["text"]
-        doubts.append((row["rating"], row["name"], why))
-    doubts = [doubt for doubt in doubts if doubt[0] != "green"]
+    doubts = [
+        (row["rating"], row["name"], _reason(row, report))
+        for row, report in zip(rows, reports, strict=True)
+        if row["rating"] != "green"
+    ]
     if doubts:
         doubts.sort(key=lambda doubt: -headline.RATINGS.index(doubt[0]))
         sentence = f"{len(doubts)} of {len(rows)} drives have something to mind."
         items = headline.capped(doubt[1:] for doubt in doubts)
         yield headline.Statement("Doubts", doubts[0][0], sentence, items)
+
+
+def _reason(row, report):
+    """Why a drive is rated as it is: a result says first what the correction brought."""
+    facts = [fact for fact in report["statements"] if fact["rating"] == row["rating"]]
+    if not facts:
+        return row["meaning"]
+    first, texts = facts[0], [item["text"] for item in facts[0]["items"]]
+    if first["what"] == "Warnings":  # whose sentence counts them alone
+        return texts[0]
+    if first["what"] == "Result" and texts:
+        _, *worse = texts  # after the figures
+        return worse[0] if worse else facts[1]["sentence"]  # check points: none, or some missing
+    return first["sentence"]
 
 
 def _lost(number):

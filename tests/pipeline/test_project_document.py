@@ -1,0 +1,36 @@
+"""What a project says first of its drives."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.estimate import Support
+from mlscorr.evaluate.rows import TargetRow
+from mlscorr.pipeline.project.document import _reason
+from mlscorr.report.headline import first_screen
+from tests.beds.reports import drive, fabricate
+
+CHANGES = {  # what a drive lacks, and what of its first screen says so
+    "hidden check point": "1 check point was not seen although the cloud covers the surroundings",
+    "no check point": "No check point was surveyed, so nothing independent tests this result.",
+    "worse axis": "it is worse than before: N by 0.012 m (RMS of 2 points).",
+    "warning": "The clock may be wrong.",
+}
+
+
+@pytest.mark.parametrize("lack", CHANGES)
+def test_a_doubt_is_told_by_its_reason(lack):
+    "Not by the result, which may be good: 77 cm became 8 cm, and a check point is missing"
+    checks = lack != "no check point"
+    report = replace(fabricate(drive(), checks=checks)[2], support=Support())
+    if lack == "hidden check point":
+        lost = TargetRow.unobserved("C9", None, "check", np.zeros(3), "C9 is hidden.")
+        report = replace(report, targets=[*report.targets, lost])
+    if lack == "worse axis":
+        report.check.after.rmse[1] = report.check.before.rmse[1] + 0.012
+    if lack == "warning":
+        report.model["warnings"] = [CHANGES[lack]]
+    content = first_screen(report)
+    assert content["rating"] != "green"
+    assert CHANGES[lack] in _reason({"rating": content["rating"], "meaning": ""}, content)
