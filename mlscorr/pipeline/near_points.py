@@ -93,7 +93,8 @@ def check_control(survey: Survey) -> None:
     if len(survey.control) == 0:
         raise ValueError(
             f"{survey.path} names {counted(len(survey.check), 'check point')} and no control "
-            "point: check points never enter an estimate. Give some of them the role control."
+            "point: check points never enter an estimate. Give some of them the role control, or "
+            "bring passes that overlap together without any: mlscorr correct --ties-only."
         )
 
 

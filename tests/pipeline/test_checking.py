@@ -136,6 +136,14 @@ def test_a_survey_without_control_points_has_a_fault(lines, survey):
     assert sentences(checked) == [str(refused.value)]
 
 
+def test_a_survey_of_check_points_alone_names_what_does_without_control(survey):
+    "Passes that overlap can still be brought together: the refusal says how"
+    text = (survey / "control.csv").read_text().replace(",control", ",check")
+    (survey / "control.csv").write_text(text)
+    with pytest.raises(ValueError, match=r"no control point: .* role control, .* --ties-only"):
+        mlscorr.correct(mlscorr.read_survey(survey))
+
+
 @pytest.mark.parametrize(
     ("number", "words"), [(1, "1 control point takes"), (2, "2 control points")]
 )
