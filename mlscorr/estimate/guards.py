@@ -91,7 +91,7 @@ def find_guards(
     ratio = _variance_ratio(equations, parameters, corrected)
     test = None if equations.ties is not None else _global_test(equations, parameters)
     everywhere = Guards((0.0, 0.0), (), ratio, test)
-    return guards_of(equations.trajectory.passes, equations.observed, everywhere)
+    return guards_of(equations.trajectory.scanned_passes, equations.observed, everywhere)
 
 
 def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guards:
@@ -100,7 +100,7 @@ def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guard
     Parameters
     ----------
     passes : (k, 2) array
-        Start and end of each. Units: s.
+        Start and end of what was scanned in each. Units: s.
     observed : (n,) array
         Times of control points. Units: s.
     guards : Guards
@@ -230,7 +230,9 @@ def guard_warnings(
     yield from _extrapolated(equations, time)
     length = guards.gap[1] - guards.gap[0]
     first, last = equations.span
-    if length > SETTINGS.faded_times * time and first <= guards.gap[0] and guards.gap[1] <= last:
+    scanned = _scanned_times(equations)
+    away = np.minimum(scanned - guards.gap[0], guards.gap[1] - scanned).max(initial=0.0)
+    if 2 * away > SETTINGS.faded_times * time and first <= guards.gap[0] and guards.gap[1] <= last:
         yield (
             f"No control point for {length:.0f} s from {guards.gap[0]:.1f} s "
             f"({length / time:.1f} correlation times): only the trend applies in the middle of it."
@@ -259,10 +261,15 @@ def global_test_warnings(guards: Guards) -> Iterator[str]:
         )
 
 
+def _scanned_times(equations):
+    """Times (k,) of the trajectory with points of the clouds. Units: s."""
+    return equations.trajectory.gps_time[equations.trajectory.scanned_rows]
+
+
 def _extrapolated(equations, time):
     """Sentences about both ends beyond the control span."""
     first, last = equations.span
-    ends = equations.trajectory.gps_time[[0, -1]]
+    ends = _scanned_times(equations)[[0, -1]]
     for length, where in ((first - ends[0], "before the first"), (ends[1] - last, "past the last")):
         if length > time:
             effect = (

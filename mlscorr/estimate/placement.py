@@ -136,7 +136,7 @@ def _places(equations, families, sigma):
     """NextControl, at most PLACES, by the 3D sigma (n,) at all epochs of the trajectory."""
     families = [family for family in families if family[1] > SETTINGS.smallest_share]
     trajectory, regular = equations.trajectory, _even_rows(equations.trajectory)
-    candidates = np.unique(_candidate_rows(regular, sigma))
+    candidates = np.unique(_candidate_rows(trajectory, regular, sigma))
     rows = np.union1d(regular, candidates)
     is_even, at = np.isin(rows, regular), np.searchsorted(rows, candidates)
     sights = [_passing(trajectory, equations, row) for row in candidates]
@@ -193,16 +193,18 @@ def _reason(observed, names, time, drive, share, limit, passes):
 
 
 def _even_rows(trajectory):
-    """Epochs, evenly over what was recorded."""
-    number = min(len(trajectory), EPOCHS)
-    return np.unique(np.linspace(0, len(trajectory) - 1, number).round().astype(int))
+    """Epochs, evenly over what was scanned."""
+    scanned = trajectory.scanned_rows
+    number = min(len(scanned), EPOCHS)
+    return scanned[np.unique(np.linspace(0, len(scanned) - 1, number).round().astype(int))]
 
 
-def _candidate_rows(regular, sigma):
+def _candidate_rows(trajectory, regular, sigma):
     """Epochs at even shares of the variance along the drive: where it is large they are dense."""
     total = np.cumsum(sigma[regular] ** 2)
     shares = (np.arange(CANDIDATES) + 0.5) / CANDIDATES * total[-1]
-    return np.interp(shares, total, regular).round().astype(int)
+    scanned = trajectory.scanned_rows
+    return scanned[np.interp(shares, total, np.searchsorted(scanned, regular)).round().astype(int)]
 
 
 def _variance(equations, families, rows):
@@ -219,7 +221,8 @@ def _passing(trajectory, equations, row):
     arms = equations.partials[: len(equations.names), :, 3:]
     sight = np.sqrt((arms**2).sum(axis=(1, 2)) / 2).max()  # |G|, by Phi(G)
     away = np.linalg.norm(trajectory.position - trajectory.position[row], axis=1)
-    near = np.flatnonzero(away <= sight)
+    scanned = trajectory.scanned_rows
+    near = scanned[away[scanned] <= sight]
     ends = np.searchsorted(trajectory.gps_time, trajectory.passes[:, 1])
     is_new = (np.diff(near) > 1) | np.isin(near[:-1], ends)
     parts = np.split(near, np.flatnonzero(is_new) + 1)

@@ -200,6 +200,8 @@ def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakSt
     time, part = trajectory.gps_time, trajectory.segment(trajectory.gps_time)
     size = np.linalg.norm(trajectory.position_sigma, axis=1)
     way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+    is_empty = ~np.isin(np.arange(len(time)), trajectory.scanned_rows)
+    codes = np.where(is_empty, HELD, codes)  # where no point was measured is nothing to hold
     cuts = np.flatnonzero(np.diff(codes) | np.diff(part)) + 1
     for first, end in pairwise([0, *cuts.tolist(), len(time)]):
         if codes[first] != HELD and end - first > 1:

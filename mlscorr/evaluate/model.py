@@ -50,6 +50,8 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
 def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[str, float] | None:
     """3D sigma of a trajectory's position in m: ``median``, ``largest``, and the latter's ``time``.
 
+    Of the epochs with points of the clouds.
+
     Parameters
     ----------
     trajectory : Trajectory
@@ -59,11 +61,12 @@ def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[
     """
     if trajectory.position_sigma is None:
         return None
-    sigma = np.linalg.norm(trajectory.position_sigma, axis=1)
-    time = float(trajectory.gps_time[sigma.argmax()])
+    scanned = trajectory.scanned_rows
+    sigma = np.linalg.norm(trajectory.position_sigma[scanned], axis=1)
+    time = float(trajectory.gps_time[scanned[sigma.argmax()]])
     result = {"median": float(np.median(sigma)), "largest": float(sigma.max()), "time": time}
     if survey is not None:
-        stated = stated_sigma(survey.trajectory, survey.pos).position
+        stated = stated_sigma(survey.trajectory, survey.pos).position[scanned]
         result["stated"] = float(np.median(np.linalg.norm(stated, axis=1)))
     return result
 

@@ -29,6 +29,8 @@ class FileFinding:
         On beams that can't have been measured so, and on points outside the trajectory.
     features : TieFeatures
         Planes and poles; the number of the pass is that of the segment.
+    seconds : (k,) int array
+        Whole seconds of gps_time with points of it.
     """
 
     starts: dict[int, float]
@@ -38,6 +40,7 @@ class FileFinding:
     warnings: tuple[str, ...]
     uncovered: tuple[str, ...]
     features: TieFeatures
+    seconds: np.ndarray
 
 
 def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> FileFinding:
@@ -67,6 +70,7 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
         warnings=tuple(near.beams.warnings()),
         uncovered=tuple(near.beams.outside()),
         features=replace(features, pass_number=np.array(numbers, int)),
+        seconds=candidates.seconds,
     )
 
 
@@ -92,7 +96,8 @@ def join_findings(survey: Survey, files: Sequence[FileFinding]) -> tuple[Finding
     ]
     targets.sort(key=lambda pair: (pair[0], pair[1].gps_time))
     unplaced = PointCloud.concatenate([NO_POINTS, *(file.unplaced for file in files)])
-    candidates = Candidates(unplaced=unplaced, passes=passes, starts=starts)
+    seconds = np.concatenate([file.seconds for file in files])
+    candidates = Candidates(unplaced=unplaced, passes=passes, starts=starts, seconds=seconds)
     if len(survey.surveyed):
         finding = match_targets(targets, candidates, survey)
     else:

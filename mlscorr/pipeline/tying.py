@@ -98,6 +98,8 @@ def estimate_survey(
     else:
         control, check, finding = find_control(survey, rng, progress, read)
     features = None if ties == "off" else collector.features()
+    trajectory = survey.trajectory.scanned_at(finding.candidates.seconds)
+    survey = replace(survey, trajectory=trajectory)
     estimate = estimate_together(survey, control, features, order)
     if ties == "only" and estimate.ties is None:
         raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")

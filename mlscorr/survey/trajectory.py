@@ -33,6 +33,8 @@ class Trajectory(Summary):
         One sigma of E, N, H (m) and of roll, pitch, heading (rad).
     session : (n,) int array, optional
         Number of the session of the POS of each epoch, where steps alone don't part sessions.
+    scanned : (n,) bool array, optional
+        Which epochs have points of the clouds about them, where somebody looked.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Trajectory(Summary):
     position_sigma: np.ndarray | None = None
     attitude_sigma: np.ndarray | None = None
     session: np.ndarray | None = None
+    scanned: np.ndarray | None = None
 
     def __post_init__(self):
         check_lengths(self)
@@ -104,6 +107,34 @@ class Trajectory(Summary):
         starts, ends = self.passes.T
         number = np.searchsorted(starts, gps_time, side="right") - 1
         return np.where(gps_time <= ends[number], number, -1)
+
+    @property
+    def scanned_rows(self) -> np.ndarray:
+        """Numbers (k,) of the epochs with points of the clouds; of all where none is known."""
+        known = self.scanned is not None and self.scanned.any()
+        return np.flatnonzero(self.scanned) if known else np.arange(len(self))
+
+    @property
+    def scanned_passes(self) -> np.ndarray:
+        """Start and end (k, 2) of what was scanned in the parts without a gap. Units: s."""
+        time = self.gps_time[self.scanned_rows]
+        segment = self.segment(time)
+        first = np.flatnonzero(np.diff(segment, prepend=-1))
+        return np.column_stack([time[first], time[np.append(first[1:], len(time)) - 1]])
+
+    def scanned_at(self, seconds: np.ndarray) -> Trajectory:
+        """The same, which knows that points of the clouds lie in some seconds alone.
+
+        Parameters
+        ----------
+        seconds : (k,) int array
+            Whole seconds of gps_time.
+        """
+        inside, segment = np.isin(np.floor(self.gps_time), seconds), self.segment(self.gps_time)
+        scanned, is_step = inside.copy(), np.diff(segment) == 0
+        scanned[1:] |= inside[:-1] & is_step  # points lie up to the next epoch
+        scanned[:-1] |= inside[1:] & is_step
+        return replace(self, scanned=scanned)
 
     def recorded_time(self, start: float, end: float) -> float:
         """Time from start to end without the gaps that lie whole between them. Units: s."""

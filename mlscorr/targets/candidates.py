@@ -30,6 +30,8 @@ class Candidates:
         Numbers of passes by (number of the file, segment of the trajectory).
     starts : dict
         When these begin, likewise. Units: s.
+    seconds : (k,) int array
+        Whole seconds of gps_time with points of the clouds.
     """
 
     cloud: PointCloud = NO_POINTS
@@ -37,6 +39,7 @@ class Candidates:
     unplaced: PointCloud = NO_POINTS
     passes: dict[tuple[int, int], int] = field(default_factory=dict)
     starts: dict[tuple[int, int], float] = field(default_factory=dict)
+    seconds: np.ndarray = field(default_factory=lambda: np.empty(0, int))
 
 
 def search_radius(survey: Survey, points: ControlPoints) -> np.ndarray:
@@ -146,7 +149,7 @@ def collect(
     """
     trajectory, points = survey.trajectory, survey.surveyed
     near = Neighbourhoods(points.position, search_radius(survey, points))
-    unplaced, starts = [NO_POINTS], {}
+    unplaced, starts, seconds = [NO_POINTS], {}, [np.empty(0, int)]
 
     def hand_on(file, held, before, latest):
         for index in held.passed(before):
@@ -160,6 +163,7 @@ def collect(
             for part in np.unique(segment[segment >= 0]).tolist():
                 start = chunk.gps_time[segment == part].min()
                 starts[number, part] = min(starts.get((number, part), np.inf), start)
+            seconds.append(_whole_seconds(chunk.gps_time[segment >= 0]))
             rows = near.contains(chunk.xyz)
             has_pose = segment[rows] >= 0
             unplaced.append(chunk[rows[~has_pose]])
@@ -174,7 +178,14 @@ def collect(
             del chunk, segment, rows, has_pose, placed  # large, and needed no more
         hand_on(number, held, np.inf, np.inf)
     cloud = PointCloud.concatenate(unplaced)
-    return Candidates(unplaced=cloud, passes=number_passes(starts), starts=starts)
+    passes, times = number_passes(starts), np.unique(np.concatenate(seconds))
+    return Candidates(unplaced=cloud, passes=passes, starts=starts, seconds=times)
+
+
+def _whole_seconds(gps_time):
+    """The seconds with points (k,): sorted where they change, as neighbours mostly share them."""
+    seconds = np.floor(gps_time).astype(int)
+    return np.unique(seconds[np.flatnonzero(np.diff(seconds, prepend=-1))])
 
 
 def number_passes(starts: dict[tuple[int, int], float]) -> dict[tuple[int, int], int]:

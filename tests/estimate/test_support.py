@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate import Support, WeakStretch, estimate_correction
+from mlscorr.estimate import Support, WeakStretch, estimate_correction, place_control
+from mlscorr.evaluate.model import largest_sigma
 from mlscorr.survey import Pos
 from tests.beds.lying_pos import START, TIME, survey, walk
 
@@ -60,6 +61,45 @@ def test_the_start_of_a_drive_without_control_is_extrapolated():
     support, _ = support_of(3, (80.0, 140.0), EVEN[EVEN > 150.0])
     weak = weak_times(support)
     assert weak[(TIME < 150.0)].all() and not weak[(TIME > 160.0) & (TIME < 236.0)].any()
+
+
+def scanned_from(begin, end, *more):
+    "Whole seconds of a drive from which clouds hold points"
+    spans = ((begin, end), *more)
+    return np.concatenate([START + np.arange(*span) for span in spans]).astype(int)
+
+
+def test_times_at_which_nothing_was_scanned_are_not_extrapolated():
+    "Clouds of 100 to 180 s of a drive of 240 s: its ends matter to nobody, 2 s on each side do"
+    rng = np.random.default_rng(1)
+    trajectory, matched = survey(rng, walk(rng, 300.0, 300.0), np.linspace(102.0, 178.0, 12))
+    trajectory = trajectory.scanned_at(scanned_from(100, 180))
+    estimate = estimate_correction(trajectory, matched, Pos(position_sigma=0.5))
+    spans = [(stretch.start - START, stretch.end - START) for stretch in estimate.support.weak]
+    assert np.ravel(spans) == pytest.approx([99.9, 101.0, 179.0, 180.0], abs=0.15)
+    assert not any("extrapolated" in sentence for sentence in estimate.warnings)
+    assert estimate.guards.gap[1] - estimate.guards.gap[0] < 8.0
+    sigma, places = largest_sigma(estimate.correction.corrected), place_control(estimate)
+    times = np.array([sigma["time"], *(place.gps_time for place in places)]) - START
+    assert len(places) == 3 and (times > 99.8).all() and (times < 180.2).all()
+
+
+def test_a_pause_of_the_scanner_between_control_points_lacks_none():
+    "60 s without points: no control is missing there, and none would help there"
+    rng = np.random.default_rng(2)
+    times = np.concatenate([np.linspace(3.0, 87.0, 8), np.linspace(153.0, 237.0, 8)])
+    trajectory, matched = survey(rng, walk(rng, 80.0, 160.0), times)
+    estimates = [
+        estimate_correction(recorded, matched, Pos(position_sigma=0.5))
+        for recorded in (trajectory, trajectory.scanned_at(scanned_from(0, 90, (150, 240))))
+    ]
+    inside = [
+        [90.2 < t.start - START < 149.8 or 90.2 < t.end - START < 149.8 for t in e.support.weak]
+        for e in estimates
+    ]
+    assert any(inside[0]) and not any(inside[1])
+    between = [[90.2 < p.gps_time - START < 149.8 for p in place_control(e)] for e in estimates]
+    assert any(between[0]) and not any(between[1])
 
 
 def test_times_are_counted_once_at_the_edges():

@@ -168,3 +168,16 @@ def test_each_epoch_has_a_pose(positions, attitudes, counts):
     """Three times with two positions or attitudes are no trajectory."""
     with pytest.raises(ValueError, match=counts):
         Trajectory(np.arange(3.0), np.zeros((positions, 3)), attitudes)
+
+
+def test_epochs_with_points_about_them_are_known_by_seconds():
+    "20 s of points in the first of two passes: to the next epoch on both sides, and kept by select"
+    time = 413_200.0 + np.concatenate([np.arange(0.0, 100.0, 0.1), np.arange(150.0, 200.0, 0.1)])
+    place = np.tile([528_000.0, 3_379_000.0, 20.0], (len(time), 1))
+    trajectory = Trajectory(time, place, Rotation.identity(len(time)))
+    assert trajectory.scanned_passes == pytest.approx(trajectory.passes)
+    scanned = trajectory.scanned_at(np.arange(413_210, 413_230))
+    assert scanned.scanned_passes - 413_200.0 == pytest.approx(np.array([[9.9, 30.0]]), abs=1e-6)
+    assert scanned.select(slice(150, None)).scanned_passes[0, 0] == pytest.approx(413_215.0)
+    end = trajectory.scanned_at(np.array([413_299])).scanned_passes - 413_200.0
+    assert end == pytest.approx(np.array([[98.9, 99.9]]), abs=1e-6)

@@ -57,6 +57,8 @@ def found_drive(survey: Survey, files: Sequence[FileFinding]) -> FoundDrive:
         Of each of its clouds.
     """
     finding, features = join_findings(survey, files)
+    trajectory = survey.trajectory.scanned_at(finding.candidates.seconds)
+    survey = replace(survey, trajectory=trajectory)
     return FoundDrive(survey, finding, features, *finding.matches.by_role(survey))
 
 

@@ -96,7 +96,7 @@ def _part(joint, estimate, number, note):
         tests=tuple(test for test in estimate.screening.tests if test.name in names),
     )
     equations = _equations(estimate.equations, rows[estimate.used], trajectory, shift)
-    guards = guards_of(trajectory.passes, equations.observed, estimate.guards)
+    guards = guards_of(trajectory.scanned_passes, equations.observed, estimate.guards)
     return DriveEstimate(
         correction=correction,
         equations=equations,

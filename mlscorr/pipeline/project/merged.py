@@ -109,7 +109,9 @@ def _estimate(drive, parts, home, main):
         ),
         used=used,
         left_out=left_out,
-        guards=guards_of(survey.trajectory.passes, equations.observed, main.estimate.guards),
+        guards=guards_of(
+            survey.trajectory.scanned_passes, equations.observed, main.estimate.guards
+        ),
         notes=_distinct([part.estimate.notes for part in parts]),
         ties=_ties(parts, correction),
         support=_support(parts, home, correction.corrected),
