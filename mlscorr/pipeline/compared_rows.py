@@ -174,7 +174,10 @@ def compare_with_clouds(
     is_check = np.isin(first.targets.name, survey.check.name)
     used = (first.survey_item < 0) | ~is_check[first.survey_item]
     apart = rng.spawn(1)[0]
-    channels = contrast_clouds(believed, *samples[:2], apart), cloud_distances(samples, apart)
+    channels = (
+        contrast_clouds(believed, samples[0], samples[1], apart),
+        cloud_distances(samples, apart),
+    )
     if following:
         change = first.residual - following[0].residual
         return ComparedRows(first, used, change, absence, notes, *channels)

@@ -31,7 +31,8 @@ class PatchCollector:
 
     def __init__(self, survey: Survey, pool: int | None = None):
         self._survey, self._pool = survey, SETTINGS.pool if pool is None else pool
-        self._parts, self._starts, self._share, self._file, self._read = [], {}, 1.0, None, 0
+        self._parts, self._starts, self._share, self._read = [], {}, 1.0, 0
+        self._file: CloudFile | None = None
         self._held, self._number = NO_POINTS, np.empty(0, int)
 
     def add(self, file: CloudFile, chunk: PointCloud) -> None:
