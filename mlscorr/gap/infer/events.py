@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.gap.infer.columns import ColumnTable, column_table, is_of_one_target
-from mlscorr.gap.infer.error_models import ErrorModel
+from mlscorr.gap.infer.error_models import ErrorModel, shares
 from mlscorr.gap.infer.evidence import BlockEvidence, weigh_blocks
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
@@ -70,8 +70,24 @@ def refine_events(
         models = tuple(evidence.models[s] for s in np.argsort(-score)[:3])  # others add little
         share, none = sum(bank.blocks[i].weight for i in numbers), float(evidence.total[0])
         search = _Search(rows, survey, observations, models, none)
-        refined[label] = search.best(signatures[member], share)
+        event, times = signatures[member], [s.fixed["time"] for s in signatures if s.name == label]
+        refined[label] = search.best(event, share, spacing_of(times))
     return refined
+
+
+def spacing_of(times: Sequence[float]) -> float:
+    """Time between those at which events of one kind were tried. Units: s.
+
+    Parameters
+    ----------
+    times : sequence of float
+        In any order, once for each width.
+
+    >>> spacing_of([3.0, 1.0, 5.0])
+    2.0
+    """
+    apart = np.diff(np.unique(times))
+    return float(np.median(apart)) if len(apart) else SIGNATURES.step_spacing
 
 
 @dataclass(frozen=True)
@@ -90,47 +106,92 @@ class _Search:
         gain = evidence.gain + evidence.total - self.none
         return float(np.logaddexp.reduce(table.weighed(gain)[:, 0])), table
 
-    def changed(self, event, key, step):
+    def moved(self, event, **fixed):
         """The signature at another time or width, or None where there is none."""
-        fixed = dict(event.fixed)
-        if key == "time":
-            fixed["time"] = round(
-                fixed["time"] + step * fixed.get("width", SIGNATURES.step_spacing), 3
-            )
-        else:
-            fixed["width"] = float(fixed["width"] * np.exp(2 * step))
         bench = Bench(self.rows, self.survey)
         try:
-            moved = signature(bench, event.kind, fixed, np.random.default_rng(0))
+            moved = signature(bench, event.kind, event.fixed | fixed, np.random.default_rng(0))
         except ValueError:  # a time in no pass, or a width beyond its limits
             return None
         if is_of_one_target(self.rows, moved.jacobian):
             return None
         return moved if moved.jacobian[self.rows.metric].any() else None
 
-    def best(self, event, share):
+    def best(self, event, share, spacing):
         """The RefinedEvent near an event of the bank with a prior share."""
+        if "width" in event.fixed:
+            event, gain, table, sigma = self._by_steps(event)
+        else:
+            event, gain, table, sigma = self._between_rows(event, spacing)
+        return RefinedEvent(event, table, gain + np.log(share / SETTINGS.cell), sigma)
+
+    def _between_rows(self, event, spacing):
+        """An event without a width: between two rows its evidence is the same at all times, and
+        there are peaks beside the highest. The most probable interval, among those a part of the
+        spacing apart, then by halves.
+        """
+        time, parts = event.fixed["time"], int(4 / SETTINGS.event_steps[-1])
+        edges = self._edges(time, 2 * spacing)
+        middle, length = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+        times = np.append(np.linspace(edges[0], edges[-1], parts)[1:-1], time)
+        number = np.unique(np.searchsorted(edges, times) - 1)
+        tried = {i: self._at(event, middle[i]) for i in number.tolist()}
+        while True:
+            order = sorted(tried)
+            score = np.array([tried[i][0] for i in order]) + np.log(length[order])
+            at = int(np.argmax(score))
+            best = order[at]
+            beside = {(best + other) // 2 for other in (*order[:at][-1:], *order[at + 1 :][:1])}
+            if beside <= tried.keys():
+                break
+            tried |= {i: self._at(event, middle[i]) for i in beside - tried.keys()}
+        gain, table, event = tried[best]
+        off = (middle[order] - middle[best]) ** 2 + length[order] ** 2 / 12
+        return event, gain, table, {"time": float(np.sqrt(shares(score) @ off))}
+
+    def _edges(self, time, span):
+        """Times at which what an event changes does, as seen by rows and passes near one. s."""
+        rows, passes = self.rows, self.survey.trajectory.passes.ravel()
+        seen = rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]
+        known = np.unique(np.round(np.concatenate([passes, *seen]) - rows.reference.start, 2))
+        known = known[np.abs(known - time) < span]
+        return np.concatenate([[time - span], known, [time + span]])
+
+    def _at(self, event, time):
+        """Score, table and signature at another time; minus infinity where there is none."""
+        moved = self.moved(event, time=round(float(time), 3))
+        return (-np.inf, None, None) if moved is None else (*self.score(moved), moved)
+
+    def _by_steps(self, event):
+        """An event with a width."""
         gain, table = self.score(event)
         keys = event.kind.moment()
+        tries = [(key, sign) for key in keys for sign in (-1, 1)]
         for step in SETTINGS.event_steps:
-            for key in keys:
-                for change in (-step, step):
-                    moved = self.changed(event, key, change)
-                    if moved is None:
-                        continue
-                    value, other = self.score(moved)
+            gained = True
+            while gained:
+                gained = False
+                for key, sign in tries:
+                    moved = self._changed(event, key, sign * step)
+                    value, other = (-np.inf, None) if moved is None else self.score(moved)
                     if value > gain:
-                        event, gain, table = moved, value, other
-        sigma = {key: self._sigma(event, key, gain) for key in keys}
-        return RefinedEvent(event, table, gain + np.log(share / SETTINGS.cell), sigma)
+                        event, gain, table, gained = moved, value, other, True
+        return event, gain, table, {key: self._sigma(event, key, gain) for key in keys}
+
+    def _changed(self, event, key, step):
+        """The signature with another time or width, or None where there is none."""
+        time, width = event.fixed["time"], event.fixed["width"]
+        if key == "time":
+            return self.moved(event, time=round(time + step * width, 3))
+        return self.moved(event, width=float(width * np.exp(2 * step)))
 
     def _sigma(self, event, key, gain):
         """By the fall of the evidence one step to both sides; the step itself where there is
         none.
         """
-        step, fixed = SETTINGS.event_steps[-1], event.fixed
-        scale = fixed.get("width", SIGNATURES.step_spacing) if key == "time" else 2 * fixed["width"]
-        sides = [self.changed(event, key, change) for change in (-step, step)]
+        step, width = SETTINGS.event_steps[-1], event.fixed["width"]
+        scale = width if key == "time" else 2 * width
+        sides = [self._changed(event, key, change) for change in (-step, step)]
         falls = [gain - self.score(moved)[0] for moved in sides if moved is not None]
         fall = np.mean(falls) if falls else 0.0
         return float(step * scale * (1 / np.sqrt(2 * fall) if fall > 0.01 else 1 / step))

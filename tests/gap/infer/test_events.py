@@ -54,3 +54,15 @@ def test_a_refined_event_counts_over_none_as_all_models_have_it(study, seed):
         members = [s for s in signs if s.name == event.signature.name]
         expected = by_all - np.log(len(members) * SETTINGS.cell)
         assert event.gain == pytest.approx(expected, abs=1.0)
+
+
+@pytest.mark.parametrize("time", [18.4, 27.3, 33.1])
+@pytest.mark.parametrize("size", [0.4, 1.0])
+def test_a_jump_is_found_between_the_rows_next_to_it(with_surface, time, size):
+    "To three sigmas, and alone: at a wrong time a second cause would explain what is left"
+    g, signs = with_surface
+    rows = surveyed(g, 32, make_effect("position_step", magnitude=[size, 0.0, 0.0], time=time))
+    inference = infer_causes(rows, g.background, g.survey, signs, np.random.default_rng(1), 20)
+    assert inference.verdict.label == "position_step"
+    moment = next(p for p in inference.cause.parameters if p.name == "time")
+    assert abs(moment.estimate - time) < 3 * moment.sigma < 3.0
