@@ -150,10 +150,10 @@ class _Search:
         return event, gain, table, {"time": float(np.sqrt(shares(score) @ off))}
 
     def _edges(self, time, span):
-        """Times at which what an event changes does, as seen by rows and passes near one. s."""
+        """Times near one at which an event changes other rows: of rows and passes. Units: s."""
         rows, passes = self.rows, self.survey.trajectory.passes.ravel()
-        seen = rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]
-        known = np.unique(np.round(np.concatenate([passes, *seen]) - rows.reference.start, 2))
+        times = rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]
+        known = np.unique(np.round(np.concatenate([passes, *times]) - rows.reference.start, 2))
         known = known[np.abs(known - time) < span]
         return np.concatenate([[time - span], known, [time + span]])
 
