@@ -158,8 +158,8 @@ def compare_with_clouds(
     matched = _with_moved(finding, believed).matches.matched
     patches = None if patches is None else spread_patches(patches)
     compared = []
-    for simulated, placed in opened:
-        clouds, sample = _simulated_clouds(simulated, placed, patches, progress)
+    for simulated in opened:
+        clouds, sample = _simulated_clouds(simulated, patches, progress)
         samples.append(sample)
         rows, sentence = rows_against(believed, matched, finding.candidates, patches, clouds)
         compared.append(rows)
@@ -173,10 +173,11 @@ def compare_with_clouds(
         )
     is_check = np.isin(first.targets.name, survey.check.name)
     used = (first.survey_item < 0) | ~is_check[first.survey_item]
+    real, simulated_first = samples[:2]
     apart = rng.spawn(1)[0]
     channels = (
-        contrast_clouds(believed, samples[0], samples[1], apart),
-        cloud_distances(samples, apart),
+        contrast_clouds(believed, real, simulated_first, apart),
+        cloud_distances(real, simulated_first, samples[2] if following else None, apart),
     )
     if following:
         change = first.residual - following[0].residual
@@ -188,12 +189,12 @@ def compare_with_clouds(
     return ComparedRows(first, used, to_first_order, absence, (*notes, LINEAR), *channels)
 
 
-def _simulated_clouds(simulated, placed, patches, progress):
-    """SimulatedClouds of a simulated survey, and the ChannelSample on the other's trajectory."""
+def _simulated_clouds(simulated, patches, progress):
+    """SimulatedClouds and ChannelSample of a simulated survey, read once."""
     collector, sampler = PatchCollector(simulated), SampleCollector(simulated)
     beams = None if patches is None else SimulatedBeams(patches)
-    others = () if beams is None else (_chunks_alone(beams),)
-    read = read_into(collector.add, lambda _, chunk: sampler.add(placed.apply(chunk)), *others)
+    others = [sampler] if beams is None else [sampler, beams]
+    read = read_into(collector.add, *map(_chunks_alone, others))
     with warnings.catch_warnings(action="ignore"):  # of beams, which refuse the clouds
         finding, _ = find_or_compare_surfaces(simulated, read, None, progress)
     if finding.warnings:
@@ -203,13 +204,7 @@ def _simulated_clouds(simulated, placed, patches, progress):
         )
     flat = collector.patches()
     clouds = SimulatedClouds(simulated.name, finding.matches.matched, flat, beams)
-    return clouds, sampler.sample(None if flat is None else _moved(flat, placed))
-
-
-def _moved(patches, placed):
-    """Patches with their centres where a Correction puts them."""
-    moved, _ = placed.increments(patches.centre, patches.gps_time)
-    return replace(patches, centre=patches.centre + moved)
+    return clouds, sampler.sample(flat)
 
 
 def _chunks_alone(collector):

@@ -19,13 +19,12 @@ from mlscorr.simulate.recording import (
 from mlscorr.survey import Trajectory
 
 
-def write_twin(folder, seed, other=None, duration=18.0, pos=None, **scanner):
+def write_twin(folder, seed, other=None, duration=18.0, **scanner):
     "A survey of a seed, or its twin by another seed"
     scanner = {"lines_per_second": 75, "points_per_line": 400} | scanner
     scenario = Scenario(
-        drive={"duration": duration}, targets={"control": 4, "check": 1}, scanner=[scanner],
-        pos=pos or {},
-    )  # fmt: skip
+        drive={"duration": duration}, targets={"control": 4, "check": 1}, scanner=[scanner]
+    )
     made = simulate(scenario, np.random.default_rng(seed))
     if other is not None:
         scan, pos, effects = np.random.default_rng(other).spawn(3)
@@ -56,8 +55,7 @@ def sampled(survey, change=None):
 
 
 def twins(folder, seed, **scanner):
-    "A survey, its twin as its simulator's clouds, and what puts a chunk of them on its trajectory"
+    "A survey, and its twin as its simulator's clouds"
     survey = mlscorr.read_survey(write_twin(folder / "real", seed, **scanner))
     other = write_twin(folder / "simulated", seed, seed + 1000, **scanner)
-    simulated, placed = simulated_survey(other, survey)
-    return survey, simulated, lambda _, chunk: placed.apply(chunk)
+    return survey, simulated_survey(other, survey)

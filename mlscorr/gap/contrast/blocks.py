@@ -69,16 +69,14 @@ def joined_bins(weight: np.ndarray) -> list[slice]:
     return bins
 
 
-def weights_of(block: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def weights_of(blocks: int, rng: np.random.Generator) -> np.ndarray:
     """How often each block is drawn (replicas, blocks) by the bootstrap.
 
     Parameters
     ----------
-    block : (n,) int array
-        Of each thing.
+    blocks : int
     rng : numpy.random.Generator
     """
-    blocks = int(block.max()) + 1
     return rng.multinomial(blocks, np.full(blocks, 1 / blocks), SETTINGS.replicas).astype(float)
 
 

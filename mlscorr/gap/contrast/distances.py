@@ -4,7 +4,7 @@ Each stands beside what it is between two halves of one simulation: zero looks l
 estimators of energy distance and MMD have no bias, so that they may be negative.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,21 +109,24 @@ def _mean_of_pairs(table):
 
 
 def cloud_distances(
-    samples: Sequence[ChannelSample], rng: np.random.Generator
+    real: ChannelSample,
+    simulated: ChannelSample,
+    following: ChannelSample | None,
+    rng: np.random.Generator,
 ) -> tuple[DistributionDistance, ...]:
-    """Distances of a cloud from the simulator's, and from that of its next run.
+    """Distances of a cloud from the simulator's, and from those of its next run.
 
     Real pulses of one half are compared with simulated ones of the other, as the simulated halves
     are with each other: two clouds of the same beams lie on each other point by point.
 
     Parameters
     ----------
-    samples : sequence of 2 or 3 ChannelSample
-        Of the real cloud, the simulator's, and its next run's.
+    real, simulated : ChannelSample
+    following : ChannelSample or None
     rng : numpy.random.Generator
         For draws of both.
     """
-    clouds = of_shared_moments(samples)
+    clouds = of_shared_moments([c for c in (real, simulated, following) if c is not None])
     share = min(cloud.point_share for cloud in clouds)
     points = [sampled(cloud.points, share) for cloud in clouds]
     origin = points[0].xyz.mean(axis=0) if len(points[0]) else np.zeros(3)

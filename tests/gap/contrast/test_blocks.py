@@ -20,7 +20,7 @@ def mean(sums):
 
 def figures(values, block, rng):
     sums = sums_by_block(block, np.zeros(len(block), int), 1, [values, np.ones(len(values))])
-    return with_sigma(sums, mean, weights_of(block, rng))
+    return with_sigma(sums, mean, weights_of(block.max() + 1, rng))
 
 
 def test_the_sigma_is_that_of_blocks_and_not_of_things():

@@ -44,7 +44,7 @@ def test_the_chamfer_distance_of_a_moved_grid():
 def test_twins_lie_within_the_floor(pair):
     "No distance of a twin stands out by more than the floor's own scatter"
     _, real, simulated = pair
-    for each in cloud_distances([real, simulated, real], np.random.default_rng(0)):
+    for each in cloud_distances(real, simulated, real, np.random.default_rng(0)):
         assert each.before <= each.floor + 1.5 * (each.floor_high - each.floor), each
         assert np.isfinite(each.after)
 
@@ -56,7 +56,7 @@ def test_a_moved_cloud_stands_out(pair):
     def move(_, cloud):
         return type(cloud)(cloud.xyz + 0.3 * EAST, cloud.gps_time, cloud.intensity)
 
-    chamfer, *_ = cloud_distances([sampled(survey, move), simulated], np.random.default_rng(0))
+    chamfer, *_ = cloud_distances(sampled(survey, move), simulated, None, np.random.default_rng(0))
     assert (chamfer.figure, chamfer.unit) == ("chamfer", "m")
     assert chamfer.before > chamfer.floor_high
     assert np.isnan(chamfer.after)

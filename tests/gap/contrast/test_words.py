@@ -26,7 +26,7 @@ def said(channel, factors):
         figure = lambda s: np.log(s[..., 0] / s[..., 1])  # noqa: E731
     measure = Measure(
         channel, block, columns, figure, lambda s: (s[:, 0] / s[:, 1], np.ones(s.shape[0])),
-        weights_of(block, rng), None, (split,),
+        weights_of(30, rng), None, (split,),
     )  # fmt: skip
     table, sums = measure.table(split)
     return sentence(measure, table.judged(4), sums)
