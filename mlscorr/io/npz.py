@@ -91,7 +91,7 @@ class NpzWriter:
         rows = np.ascontiguousarray(rows)
         if name not in self._growing:
             path = self._path.with_name(f"{self._path.name}.{name}.part")
-            self._growing[name] = self._files.enter_context(path.open("wb")), rows[:0]
+            self._growing[name] = self._files.enter_context(path.open("wb")), rows[:0].copy()
         file, none = self._growing[name]
         if (rows.dtype, rows.shape[1:]) != (none.dtype, none.shape[1:]):
             raise ValueError(
