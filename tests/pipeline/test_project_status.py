@@ -9,7 +9,7 @@ from mlscorr.cli import app
 from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.project import project_status
 from mlscorr.pipeline.project.progress import logged
-from mlscorr.pipeline.project.tasks import Task, carry_out
+from mlscorr.pipeline.project.tasks import Outcome, Task, carry_out
 
 
 def tiles(folder, *names):
@@ -26,7 +26,7 @@ def run(out, tasks):
     with store.locked(), logged(out / "log.txt", store.plan, str) as progress:
         progress.begin("tiles", tasks)
         for task in tasks:
-            progress.ended(carry_out(task, store.folder))
+            progress.ended(Outcome(task, *carry_out(task, store.folder)))
         return project_status(out)
 
 
@@ -60,7 +60,7 @@ def test_a_full_disk_is_named_with_what_it_has_left(tmp_path):
     full = Path("/dev/full")
     task = Task("tiles", "key", "first", "a.laz", 1, full.write_text, ("half",))
     words = f"No space left on device: the disk of {tmp_path}"
-    fault = carry_out(task, tmp_path).fault
+    fault, _, _ = carry_out(task, tmp_path)
     assert fault.startswith(words) and " MB free" in fault
     (tmp_path / "log.txt").symlink_to(full)
     with pytest.raises(OSError, match=words), logged(tmp_path / "log.txt", tmp_path, str) as log:

@@ -111,7 +111,7 @@ class Run:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 task, was_single = running.pop(future)
                 try:
-                    yield future.result()
+                    yield Outcome(task, *future.result())
                 except self.engine.losses:
                     losses[task.name] = losses.get(task.name, 0) + was_single
                     if losses[task.name] >= SETTINGS.losses:

@@ -70,7 +70,7 @@ class Outcome:
     seconds: float = 0.0
 
 
-def carry_out(task: Task, folder: Path) -> Outcome:
+def carry_out(task: Task, folder: Path) -> tuple[str, tuple[str, ...], float]:
     """Work on a task, with one thread, and keep its result.
 
     Parameters
@@ -78,6 +78,11 @@ def carry_out(task: Task, folder: Path) -> Outcome:
     task : Task
     folder : Path
         Of the store.
+
+    Returns
+    -------
+    fault, warnings, seconds
+        As of the Outcome. Its task stays with who gave it: no worker sends trajectories back.
     """
     start, store, fault, texts = time.perf_counter(), TaskStore(folder), "", []
     recorded = warnings.catch_warnings(record=True, action="always")
@@ -92,7 +97,7 @@ def carry_out(task: Task, folder: Path) -> Outcome:
             fault = str(error) or type(error).__name__
         except Exception as error:  # a night's work doesn't end by what nobody thought of
             fault = f"{type(error).__name__}: {error}. Please report this."
-    return Outcome(task, fault, tuple(texts), time.perf_counter() - start)
+    return fault, tuple(texts), time.perf_counter() - start
 
 
 @dataclass(frozen=True)
