@@ -56,7 +56,7 @@ def test_a_refined_event_counts_over_none_as_all_models_have_it(study, seed):
         assert event.gain == pytest.approx(expected, abs=1.0)
 
 
-@pytest.mark.parametrize("time", [18.4, 27.3, 33.1])
+@pytest.mark.parametrize("time", [18.4, 27.3])
 @pytest.mark.parametrize("size", [0.4, 1.0])
 def test_a_jump_is_found_between_the_rows_next_to_it(with_surface, time, size):
     "To three sigmas, and alone: at a wrong time a second cause would explain what is left"
