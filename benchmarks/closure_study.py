@@ -17,7 +17,7 @@ from gap_mechanisms import STUDIED, sized
 from gap_study import Bed
 
 from mlscorr.gap.close import cause_for_simulator, close_gap
-from mlscorr.gap.close.folds import make_folds
+from mlscorr.gap.close.folds import make_folds, predict_whole
 from mlscorr.gap.close.found_cause import FoundCause
 from mlscorr.gap.infer.causes import infer_causes
 from mlscorr.gap.infer.observations import Observations
@@ -47,7 +47,8 @@ def case(bed, rng, kind, name, m):
     found = FoundCause(rows, used, g.survey, bed.signs, evidence, cause)
     closure = close_gap(found, simulated, rng)
     observed = Observations.of(rows, background(rows, g.survey))
-    folds = make_folds(found, observed, evidence.likely_model(cause.effect), simulated, rng)
+    whole, model = predict_whole(found, simulated), evidence.likely_model(cause.effect)
+    folds = make_folds(found, whole, observed, model, simulated, rng)
     truth = [_gone(bed, shift, p.shift) for p in (folds.whole, *folds.predicted)]
     return {
         "name": name, "m": m, "label": label, "effect": closure.effect, "stated": closure.shrink,

@@ -7,7 +7,7 @@ import numpy as np
 from gap_mechanisms import ACTUAL
 
 from mlscorr.gap.close.closure import close_gap
-from mlscorr.gap.close.folds import make_folds
+from mlscorr.gap.close.folds import make_folds, predict_whole
 from mlscorr.gap.close.found_cause import FoundCause
 from mlscorr.gap.infer.causes import cause_of
 from mlscorr.gap.infer.labels import weigh_labels
@@ -72,4 +72,6 @@ class Bed:
     def folds(self, cause, simulated=None, progress=None):
         simulated, rng = simulated or self.simulated, np.random.default_rng(2)
         model = self.evidence.likely_model(cause.effect)
-        return make_folds(self.found(cause), self.observations, model, simulated, rng, progress)
+        case = self.found(cause)
+        whole = predict_whole(case, simulated)
+        return make_folds(case, whole, self.observations, model, simulated, rng, progress)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.close.folds import Simulated, make_folds
+from mlscorr.gap.close.folds import Simulated, make_folds, predict_whole
 from mlscorr.gap.close.found_cause import FoundCause
 from mlscorr.gap.close.over_sigma import OverSigma, errors_over_sigma
 from mlscorr.gap.close.settings import SETTINGS
@@ -110,8 +110,9 @@ def close_gap(
     rows, used, cause = case.rows, case.used, case.cause
     kind = gap_kind(cause.effect, case.evidence.noisy, rows)
     unit = UNITS[kind]
+    whole = predict_whole(case, simulated)  # the largest, before there is a table of all rows
     ruler = _Ruler.of(kind, case, cause.probability if callable(simulated) else 0.0)
-    folds = make_folds(case, ruler.observations, ruler.model, simulated, rng, progress)
+    folds = make_folds(case, whole, ruler.observations, ruler.model, simulated, rng, progress)
     held = ruler.compare(folds, rng)
     whole = replace(folds, fold=np.where(used, 0, -1), predicted=(folds.whole,))
     gap, in_sample = _gap(held, unit), _gap(ruler.compare(whole, rng, used), unit)
@@ -148,7 +149,7 @@ class _Ruler:
     rows: Rows
     used: np.ndarray
     observations: Observations
-    table: ColumnTable
+    table: ColumnTable | None  # of innovations, for a systematic gap
     model: ErrorModel
     probability: float
 
@@ -163,7 +164,12 @@ class _Ruler:
         model = case.evidence.likely_model(case.cause.effect)
         scale = model.scale if noise.scale == 1.0 else noise.scale
         model = replace(model, scale=scale, fixes=noise.fixes, windows=noise.windows)
-        return cls(kind, rows, case.used, observations, table, model, probability)
+        white = None
+        if kind == "systematic":
+            table = replace(table, columns=observations.columns(table.columns))  # each is large
+            innovations = observations.whitener(model).innovations(table.columns)[0]
+            white = replace(table, columns=innovations)
+        return cls(kind, rows, case.used, observations, white, model, probability)
 
     def compare(self, folds, rng, among=None):
         """What the size of each fold's others does to the gap of some rows (m,): Squares."""

@@ -65,8 +65,27 @@ class Folds:
         return each[self.of_rows, np.arange(len(self.fold))]
 
 
+def predict_whole(case: FoundCause, simulated: Simulated) -> Predicted:
+    """What the cause that all used rows tell makes of the rows, or the simulator's next run did.
+
+    Parameters
+    ----------
+    case : FoundCause
+    simulated
+        As in ``close_gap``.
+    """
+    rows = case.rows
+    if callable(simulated):
+        return _predict(rows, case.survey, case.cause, simulated)
+    rough = rows.channel == "roughness"
+    before = np.exp(rows.residual - simulated)
+    growth = np.where(rough, np.exp(rows.residual) - before, 0.0)
+    return Predicted(simulated, growth, np.zeros(len(rows)), case.cause.model)
+
+
 def make_folds(
     case: FoundCause,
+    whole: Predicted,
     observations: Observations,
     model: ErrorModel,
     simulated: Simulated,
@@ -78,6 +97,8 @@ def make_folds(
     Parameters
     ----------
     case : FoundCause
+    whole : Predicted
+        Of the cause as all used rows tell it.
     observations : Observations
         Of all rows.
     model : ErrorModel
@@ -86,10 +107,14 @@ def make_folds(
         As in ``close_gap``.
     """
     rows, used, cause = case.rows, case.used, case.cause
+    block, columns = _blocks(rows, cause), case.columns()
+    nothing = np.zeros(len(rows), dtype=int)
     if not callable(simulated):
-        return _of_next_run(case, simulated)
-    block, whole = _blocks(rows, cause), _predict(rows, case.survey, cause, simulated)
-    nothing, columns = np.zeros(len(rows), dtype=int), case.columns()
+        held_out = (
+            "The simulator's next run was compared with the same survey; the effect had been "
+            "looked for in it, what the simulator then changed had not been fitted to it."
+        )
+        return Folds(block, nothing, (whole,), held_out, whole, columns)
     if cause.effect == "none":
         held_out = "Nothing was added to the simulator."
         return Folds(block, nothing, (whole,), held_out, whole, columns)
@@ -119,20 +144,6 @@ def make_folds(
             "can't judge: no other row says on which side of it they were."
         )
     return Folds(block, fold, predicted, held_out, whole, columns)
-
-
-def _of_next_run(case, change):
-    """Folds that all rows judge, of what the simulator's next run changed (m,)."""
-    rows, residual = case.rows, case.rows.residual
-    rough = rows.channel == "roughness"
-    growth = np.where(rough, np.exp(residual) - np.exp(residual - change), 0.0)
-    whole = Predicted(change, growth, np.zeros(len(rows)), case.cause.model)
-    held_out = (
-        "The simulator's next run was compared with the same survey; the effect had been looked "
-        "for in it, what the simulator then changed had not been fitted to it."
-    )
-    nothing = np.zeros(len(rows), dtype=int)
-    return Folds(_blocks(rows, case.cause), nothing, (whole,), held_out, whole, case.columns())
 
 
 def _with_sizes(case, observations, model, fold, whole, columns):

@@ -64,9 +64,19 @@ def rerun(
     if len(rows) == 0:
         return residual
     run, dither, speckle, fit_rng = _drawn(rows, survey, beams, effects, rng)
+    patches = _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng)
+    on = np.flatnonzero((rows.channel == "surface") & (views[:, 0] >= 0))
+    if len(on) and beams.reference is not None:
+        spread = SETTINGS.trims[-1] * np.sqrt(patches.variance)
+        residual[on] = _surface(rows, survey, beams, on, views[on, 0], run, dither, spread)
+    return residual
 
-    # Targets where they were surveyed, and planes as they were seen.
-    boards = _boards(rows, beams, effects)
+
+def _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng):
+    """Fill the residuals of targets, where they were surveyed, and of planes, as they were seen;
+    the _Patches of these.
+    """
+    boards = _boards(rows, beams, run.effects)
     met = _meet(rows, beams, run.beams, boards, speckle)
     xyz, kept = run.measure(met)
     xyz += dither
@@ -74,16 +84,9 @@ def rerun(
     for channel, values in zip(ON_PATCHES, (_shared, _roughness, _return_rate), strict=True):
         on = np.flatnonzero(rows.channel == channel)
         residual[on] = values(patches, views[on], rows.believed[on])
-    refit_targets(
-        residual, rows, survey, beams, views, (xyz, kept, met, run.beams, boards), fit_rng
-    )
-
-    # The reference surface.
-    on = np.flatnonzero((rows.channel == "surface") & (views[:, 0] >= 0))
-    if len(on) and beams.reference is not None:
-        spread = SETTINGS.trims[-1] * np.sqrt(patches.variance)
-        residual[on] = _surface(rows, survey, beams, on, views[on, 0], run, dither, spread)
-    return residual
+    simulated = xyz, kept, met, run.beams, boards
+    refit_targets(residual, rows, run.survey, beams, views, simulated, fit_rng)
+    return patches
 
 
 @dataclass(frozen=True)
@@ -260,12 +263,14 @@ def _surface(rows, survey, beams, on, view, run, dither, spread):
     direction, largest = np.zeros((len(beams), 3)), np.zeros(len(beams))
     direction[view], largest[view] = rows.direction[on], gate(survey, rows.gps_time[on])
     towards = direction[beams.view]
+    cosine = np.einsum("ni,ni->n", normal[triangle], towards)
+    used = kept & (triangle >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
     cosine = np.einsum("ni,ni->n", normal[beams.facet], towards)
-    true_cosine = np.einsum("ni,ni->n", normal[triangle], towards)
-    away = np.einsum("ni,ni->n", normal[beams.facet], xyz + dither - beams.origin)
+    used &= (beams.facet >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
+    xyz += dither - beams.origin
+    away = np.einsum("ni,ni->n", normal[beams.facet], xyz)
     away = (away - offset[beams.facet]) * np.sign(cosine)
-    used = kept & (beams.facet >= 0) & (triangle >= 0) & (np.abs(away) <= largest[beams.view])
-    used &= np.minimum(np.abs(cosine), np.abs(true_cosine)) >= np.cos(SETTINGS.parallel)
+    used &= np.abs(away) <= largest[beams.view]
 
     middle = _median(np.where(used, away, np.nan), beams.view, len(beams))
     limit = np.fmax(spread, SETTINGS.roughest)

@@ -101,26 +101,27 @@ class SystematicGap:
         observations : Observations
         model : ErrorModel
         table : ColumnTable
+            Of innovations, of each observation.
         residual : (m,) array
         folds : Folds
         used, among : (m,) bool array
             Rows in which sizes were found; that are looked at.
         """
-        row = observations.row[among[observations.row]]
+        keep = among[observations.row]
+        row = observations.row[keep]
         shifts = np.array([predicted.shift for predicted in folds.predicted]).T
-        p, f = folds.columns.shape[1], shifts.shape[1]
+        f = shifts.shape[1]
         scale = np.abs(folds.columns).max(axis=0, initial=0.0)
         scale[scale == 0] = 1.0
-        both = np.column_stack([residual, shifts, folds.columns / scale, table.columns])
-        white = observations.whitener(model).innovations(observations.columns(both))[0]
-        white = white[among[observations.row]]
-        u, each, own, others = np.split(white, [1, 1 + f, 1 + f + p], axis=1)
+        parts = observations.columns(np.column_stack([residual, shifts, folds.columns / scale]))
+        white = observations.whitener(model).innovations(parts)[0][keep]
+        u, each, own = np.split(white, [1, 1 + f], axis=1)
         fold, learned = folds.of_rows[row], used[row]
         judged = each[np.arange(len(row)), fold]
         predicted = np.where(folds.fold[row] < 0, each.mean(axis=1), judged)
         cross = CrossFit(own[learned], fold[learned], f)
         unit = unit_square(observations, model)
-        explanations = Explanations.of(table, others)
+        explanations = Explanations.of(table, table.columns[keep])
         return cls(u[:, 0], predicted, own, explanations, cross, learned, fold, unit)
 
     def measure(self, rng: np.random.Generator, probability: float = 0.0) -> Squares:

@@ -20,7 +20,7 @@ from mlscorr.gap.infer.noise import NoiseEvidence, draw_channels, weigh_noise
 from mlscorr.gap.infer.observations import Observations, model_likelihood
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.tails import without_tails
-from mlscorr.gap.infer.unknown import UnknownBlock, unknown_blocks
+from mlscorr.gap.infer.unknown import unknown_blocks
 from mlscorr.gap.infer.windows import weigh_windows
 from mlscorr.gap.observe.rows import Background, Rows
 from mlscorr.gap.signatures.signatures import Signature
@@ -35,7 +35,8 @@ class LabelEvidence:
     ----------
     observations : Observations
     table : ColumnTable
-    unknown : tuple of UnknownBlock
+    leads : tuple of str
+        What each of the unknown blocks says in words.
     blocks : BlockEvidence
         Of the residuals (first column) and of replicas without any effect.
     noise : tuple of NoiseEvidence
@@ -51,7 +52,7 @@ class LabelEvidence:
 
     observations: Observations
     table: ColumnTable
-    unknown: tuple[UnknownBlock, ...]
+    leads: tuple[str, ...]
     blocks: BlockEvidence
     noise: tuple[NoiseEvidence, ...]
     refined: dict[str, RefinedEvent]
@@ -76,7 +77,7 @@ class LabelEvidence:
     def lead(self) -> tuple[str, np.ndarray]:
         """What the best of the unknown blocks says in words, and its column numbers."""
         block = self.table.blocks[self.best("unknown")]
-        return self.unknown[block.member].lead, block.columns
+        return self.leads[block.member], block.columns
 
     def likely_model(self, label: str) -> ErrorModel:
         """The ErrorModel that is most probable when a label, or the first of two, acts."""
@@ -116,6 +117,8 @@ def weigh_labels(
     observations = Observations.of(rows, background)
     unknown = unknown_blocks(rows, survey)
     table = column_table(rows, signatures, unknown, observations.sigma)
+    leads = tuple(block.lead for block in unknown)
+    del unknown  # their columns are in the table
     table = without_known(observations, table)
     observations, tail = without_tails(observations, rows, steady_columns(observations, table))
     residual = observations.columns(rows.residual[:, None])
@@ -131,7 +134,7 @@ def weigh_labels(
     for label, event in refined.items():
         prior = np.log(dict(SETTINGS.prior)["effect"] / len(table.effects))
         score[label][0] = np.logaddexp(score[label][0], prior + event.gain)
-    return LabelEvidence(observations, table, unknown, blocks, noise, refined, score, p, tail)
+    return LabelEvidence(observations, table, leads, blocks, noise, refined, score, p, tail)
 
 
 def _replicas(observations, models, residual, rng, number):
