@@ -172,15 +172,18 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
     -------
     sentences : list of str
     worse : bool
-        It became worse on an axis, or check points are missing where they should have been seen.
+        It became worse on an axis, by more than the targets themselves are off, or check points are
+        missing where they should have been seen.
     """
     before, after, kind = report.judgement
     if before is None or after is None:
         return ["No target was found that could tell how good the correction is."], True
-    rise = dict(zip(AXES, (after.rmse - before.rmse)[:3], strict=True))
-    worse = [f"{a} by {number(by)} m" for a, by in rise.items() if by > SETTINGS.difference]
+    sigma = report.target_sigma("check" if kind == "check" else "control")
+    rise = np.where(after.rmse[:3] > sigma, (after.rmse - before.rmse)[:3], 0.0)
+    axes = dict(zip(AXES, rise, strict=True))
+    worse = [f"{a} by {number(by)} m" for a, by in axes.items() if by > SETTINGS.difference]
     sentences = [
-        _plainly(before.rmse[4], after.rmse[4], kind, report.holds_everywhere),
+        _plainly(before.rmse[4], after.rmse[4], kind, report.holds_everywhere, bool(worse)),
         _result(report, before.rmse[:3], after.rmse[:3], kind),
     ]
     if worse:
@@ -190,7 +193,7 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
     return sentences, bool(worse or report.points("check").missing)
 
 
-def _plainly(before, after, kind, holds_everywhere):
+def _plainly(before, after, kind, holds_everywhere, is_worse):
     """What the correction did, in plain words; lengths are 3D RMSE in m.
 
     It boasts of no factor where a part of the cloud may be as far off as it was.
@@ -203,6 +206,8 @@ def _plainly(before, after, kind, holds_everywhere):
     pair = f"from {length_in_words(before)} to {length_in_words(after)} off the surveyed places"
     if kind != "fit" and abs(before - after) <= SETTINGS.difference:
         return f"The correction changed next to nothing, {by}: {pair}."
+    if after > before and not is_worse:
+        return f"The correction changed less than these targets tell, {by}: {pair}."
     if after > before:
         return f"The correction made the cloud worse, {by}: {pair}. Don't use it."
     closer = before / max(after, 1e-4)

@@ -50,6 +50,20 @@ def test_the_verdict_gives_centimetres_where_they_tell_enough():
     )
 
 
+@pytest.mark.parametrize(("sigma", "worse"), [(0.030, False), (0.005, True)])
+def test_a_rise_within_the_targets_own_errors_speaks_against_nothing(sigma, worse):
+    "From 8 to 16 mm on each axis: with targets known to 30 mm no verdict, to 5 mm a red one"
+    report = held(fabricate(drive())[2])
+    known = [replace(row, sigma=np.full(3, sigma)) for row in report.targets]
+    report = replace(report, targets=known)
+    for statistics, rmse in ((report.check.before, 0.008), (report.check.after, 0.016)):
+        statistics.rmse[:] = [rmse] * 3 + [rmse * 2**0.5, rmse * 3**0.5]
+    sentences, speaks_against = tables.verdict(report)
+    assert speaks_against == worse
+    assert ("changed less than these targets tell" in sentences[0]) != worse
+    assert ("made the cloud worse" in sentences[0]) == worse
+
+
 def test_multiple_passes_are_counted_as_observations_of_points():
     "Eight observations of four points are not eight points"
     report = fabricate(drive(), 8, checks=False, names=["A", "B", "C", "D"] * 2)[2]
