@@ -48,7 +48,7 @@ def read_pos_error_series(path: str | Path) -> PosErrorSeries:
     try:
         table = np.loadtxt(path, ndmin=2, comments="#")
     except (ValueError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} is not a table of numbers: {error}.") from None
+        raise ValueError(f"{path} is not a table of numbers: {str(error).rstrip('.')}.") from None
     if len(table) < 2 or table.shape[1] != len(COLUMNS):
         raise ValueError(
             f"{path} has {len(table)} rows of {table.shape[-1]} columns; at least 2 rows of "

@@ -224,9 +224,9 @@ def _nothing_fits(name, times, span, candidates, setting):
         constants = [constant for constant, cloud, _ in candidates if setting in ("auto", cloud)]
         if any(_inside(times, span, constant + later) == 1.0 for constant in constants):
             return (
-                f"{share} {spans}, but all would with {later:+d} s: one of both may be in UTC. "
-                f"Export both in GPS time, or add {-later} to trajectory.time_constant (s) in "
-                "survey.toml."
+                f"{share} {spans}, but all would with {later:+d} s: one of both may be in UTC, or "
+                "the trajectory covers a part of the cloud. Export both in GPS time and whole; if "
+                f"it is UTC, add {-later} to trajectory.time_constant (s) in survey.toml instead."
             )
     if largest > 0:
         return (

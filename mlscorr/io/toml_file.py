@@ -1,5 +1,6 @@
 """TOML files read into pydantic models, with one sentence on each thing that is wrong in them."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -121,8 +122,8 @@ def _sentence(item, model):
     if item["type"] in ("tuple_type", "list_type") and isinstance(item["input"], dict):
         return f"{key} is a list of sections; write [[{key}]], not [{key}]."
     message = item["msg"].replace("valid string", "valid string in quotation marks")
-    for kind in ("Input", "List", "Tuple"):
-        message = message.replace(f"{kind} should", "it should")
+    message = re.sub(r"valid dictionary or instance of \w+", "section, in brackets", message)
+    message = re.sub("(Input|List|Tuple) should", "it should", message)
     return f"{key} = {shown(repr(item['input']))} can't be used: {message[0].lower()}{message[1:]}."
 
 

@@ -53,7 +53,7 @@ def calibrate(
     ValueError
         Without a mounting, and as ``estimate_site``.
 
-    >>> import mlscorr, numpy as np, tempfile
+    >>> import mlscorr, numpy as np, tempfile, warnings
     >>> from mlscorr.simulate import Scenario, simulate
     >>> folder = tempfile.mkdtemp()
     >>> wrong = {"name": "lever_arm", "magnitude": [0.0, 0.0, 0.2]}

@@ -79,7 +79,7 @@ class DriveScenario(_Part):
 
 
 class ScannerScenario(_Part):
-    """A line scanner, or a spinning one with spans_of_key rings; mounting of its own."""
+    """A line scanner, or a spinning one with rings of beams; mounting of its own."""
 
     kind: Literal["line", "spinning"] = "line"
     lever_arm: Vector = (0.10, -0.60, 0.40)  # right, forward, up

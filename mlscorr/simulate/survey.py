@@ -10,6 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.effects import Reference, apply_effects, effect_streams
+from mlscorr.io.projection import check_crs
 from mlscorr.simulate import recording
 from mlscorr.simulate.drive import drive
 from mlscorr.simulate.scan import MeasuredPulses, Platform, Surfaces, pulses_of_a_pass, shoot
@@ -218,6 +219,7 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     (('pass-1.laz',), ('T01', 'T02', 'T03'))
     """
     check_rng(rng)
+    check_crs(scenario.crs)
     drive_rng, scene_rng, scan_rng, pos_rng, control_rng, *more = rng.spawn(STREAMS)
     effect_rng, static_rng = more
     effects, streams = scenario.imperfections, effect_streams(effect_rng)

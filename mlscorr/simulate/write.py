@@ -22,6 +22,7 @@ from mlscorr.survey import Pos
 
 REFERENCE = "reference.ply"
 CREATED = date(2015, 1, 1)  # in the LAS header, so that a seed gives the same bytes on any day
+NOTHING_MET = "No pulse of {} met anything: look at drive, scene, max_range and field_of_view."
 
 
 def write_survey(
@@ -51,11 +52,12 @@ def write_survey(
             for name, array in _truth_arrays(survey).items():
                 truth.put(name, array)
             truth.watch = progress("Writing their truth", truth.growing)
+        for file in set(survey.files) - set(points):  # no beam of it lies in its field of view
+            raise ValueError(NOTHING_MET.format(file))
         write_trajectory_csv(part / "trajectory.csv", survey.trajectory)
         (part / "control.csv").write_text(_control_csv(survey))
         if survey.static_scan is not None:
-            origin = np.array(survey.scenario.origin)
-            write_ply(part / REFERENCE, survey.static_scan.triangles + origin)
+            write_ply(part / REFERENCE, survey.static_scan.triangles + survey.scenario.origin)
         (part / "survey.toml").write_text(_survey_toml(survey), encoding="utf-8")
         (part / "truth.json").write_text(json.dumps(_truth(survey, points), indent=1) + "\n")
 
@@ -75,7 +77,6 @@ def _disk_errors(folder):
 def _write_cloud(path, survey, blocks, truth, done):
     """One cloud file and the truth of its points; returns their number."""
     origin, scenario = np.array(survey.scenario.origin), survey.scenario
-    fired = 0
     with cloud_writer(path, origin, scenario.crs, created=CREATED) as writer:
         for block in blocks:
             pulses = block.pulses
@@ -84,13 +85,9 @@ def _write_cloud(path, survey, blocks, truth, done):
             )
             truth.append("point_xyz", pulses.point)
             truth.append("point_target", survey.scene.target[pulses.triangle].astype(np.int16))
-            fired += block.fired
             done(block.fired)
         if writer.points == 0:
-            raise ValueError(
-                f"None of the {fired} pulses of {path.stem} met anything: the drive leaves the "
-                "scene, or max_range or field_of_view of the scanner leave nothing to see."
-            )
+            raise ValueError(NOTHING_MET.format(path.name))
     return writer.points
 
 

@@ -158,6 +158,7 @@ def test_degrees_become_radians_and_the_mounting_a_rotation(folder):
             r"trajectory\.file = 3 can't be used.*valid string",
         ),
         ('["pass-*.las"]', '"pass-1.las"', r"cloud\.files = 'pass-1.las' .*valid list"),
+        ("[cloud]", 'cloud = "a.las"\n[other]', r"cloud = 'a.las' .* be a section, in brackets\."),
         ('["pass-*.las"]', "[]", r"cloud\.files = \[\] .*at least 1 item"),
         ("[cloud]", '[cloud]\ngps_time = "utc"', r"cloud\.gps_time = 'utc' .*'auto', 'week'"),
         ("[control]", "[mounting]\nlever_arm = [0.0, 1.0]\n[control]", r"mounting\.boresight is m"),

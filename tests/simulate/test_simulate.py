@@ -455,10 +455,18 @@ def test_a_full_disk_leaves_nothing(tmp_path, limit):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_drive_that_meets_nothing_is_refused(short, tmp_path):
-    "A scanner that sees nothing is told in one sentence, and no folder is made"
-    blind = make(with_(SHORT, scanner=(with_(SCANNER, max_range=0.1),)))
-    with pytest.raises(ValueError, match=r"None of the \d+ pulses of pass-1 met anything"):
+def test_a_crs_that_no_survey_can_have_is_refused():
+    "In degrees or feet nothing is simulated: the folder could not be read again"
+    for crs, fault in (("EPSG:4326", "a projected CRS is needed"), ("EPSG:2263", "not in metres")):
+        with pytest.raises(ValueError, match=fault):
+            make(with_(SHORT, crs=crs))
+
+
+@pytest.mark.parametrize("sight", [{"max_range": 0.1}, {"field_of_view": (180.0, -180.0)}])
+def test_a_drive_that_meets_nothing_is_refused(tmp_path, sight):
+    "A scanner that sees nothing, or fires nothing, is told in one sentence, and no folder is made"
+    blind = make(with_(SHORT, scanner=(with_(SCANNER, **sight),)))
+    with pytest.raises(ValueError, match=r"No pulse of pass-1.laz met anything.*field_of_view"):
         blind.write(tmp_path / "out")
     assert not list(tmp_path.iterdir())
 
