@@ -209,7 +209,7 @@ def _trajectory_of(path, table):
 
 
 def _check_values(path, table):
-    """Refuse values that are not finite, or sigmas below zero."""
+    """Refuse values that are not finite, sigmas below zero, and sigmas of zero throughout."""
     for name, values in table.items():
         bad = ~np.isfinite(values)
         if bad.any():
@@ -217,8 +217,8 @@ def _check_values(path, table):
                 f"{bad.sum()} of {len(bad)} epochs of {path} have a {name} that is not a number "
                 f"(first: epoch {np.argmax(bad) + 1}). Remove these epochs."
             )
-        if name.startswith("sigma") and values.min() < 0:
+        if name.startswith("sigma") and (values.min() < 0 or not values.any()):
             raise ValueError(
-                f"{(values < 0).sum()} of {len(values)} epochs of {path} have a negative {name} "
-                f"(first: epoch {np.argmax(values < 0) + 1})."
+                f"{(values <= 0).sum()} of {len(values)} epochs of {path} have a {name} of 0 or "
+                f"less (first: epoch {np.argmax(values <= 0) + 1}). Without it [pos] counts."
             )

@@ -194,6 +194,16 @@ def test_unknown_kinds_and_needless_accuracy_are_refused(tmp_path):
         read_trajectory(tmp_path / "u.csv")
 
 
+def test_sigmas_of_zero_throughout_are_refused(tmp_path):
+    "A column that a program filled with zeros states nothing, and no drift could follow it"
+    write_trajectory_csv(tmp_path / "t.csv", drive(50))
+    table = np.loadtxt(tmp_path / "t.csv", delimiter=",", skiprows=1)
+    table[:, 7] = 0.0
+    header = (tmp_path / "t.csv").read_text().splitlines()[0]
+    with pytest.raises(ValueError, match=r"50 of 50 .* sigma_easting of 0 or less .*\[pos\]"):
+        read_trajectory(csv_of(tmp_path / "t.csv", table, header))
+
+
 # ---- SBET
 
 
