@@ -140,6 +140,7 @@ def make_effect(name: str, **parameters: Any) -> Effect:
 
     Examples
     --------
+    >>> from mlscorr.effects import make_effect
     >>> make_effect("time_offset", magnitude=0.002)
     TimeOffset(magnitude=0.002)
     >>> make_effect("boresight", magnitude=[200, 0, 0])

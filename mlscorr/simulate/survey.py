@@ -208,6 +208,8 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from mlscorr.simulate import Scenario, simulate
     >>> from mlscorr.simulate.scenario import DriveScenario, ScannerScenario, TargetScenario
     >>> short = Scenario(
     ...     drive=DriveScenario(duration=8.0),
