@@ -276,7 +276,7 @@ class _Work:
 
 def _path(task):
     """Path of the cloud that a task reads."""
-    return task.arguments[0].file.path
+    return task.arguments[0].path
 
 
 def _is_there(store, key):

@@ -108,45 +108,36 @@ def _kept(folder: Path, kind: str, key: str) -> Any:
     return TaskStore(folder).get(kind, key)
 
 
-@dataclass(frozen=True)
-class FindingInput:
-    """Of which file, where and how targets and ties are looked for.
+def find(
+    file: CloudFile,
+    folder: Path,
+    drive: str,
+    identity: FileIdentity,
+    surveyed: ControlPoints,
+    origin: np.ndarray,
+    with_ties: bool,
+) -> FileFinding:
+    """What a cloud file holds.
 
     Parameters
     ----------
+    file : CloudFile
     folder : Path
         Of the store.
     drive : str
         Key of the drive's Survey there, without surveyed points.
-    file : CloudFile
     identity : FileIdentity
+        Of the file when its task was planned.
     surveyed : ControlPoints
         Near the file.
     origin : (3,) array
         As of find_in_file. Units: m.
     with_ties : bool
     """
-
-    folder: Path
-    drive: str
-    file: CloudFile
-    identity: FileIdentity
-    surveyed: ControlPoints
-    origin: np.ndarray
-    with_ties: bool
-
-
-def find(inputs: FindingInput) -> FileFinding:
-    """What a cloud file holds.
-
-    Parameters
-    ----------
-    inputs : FindingInput
-    """
-    survey: Survey = _kept(inputs.folder, "drives", inputs.drive)
-    survey = replace(survey.of(inputs.file), clouds=(inputs.file,), control=inputs.surveyed)
-    contents = find_in_file(survey, inputs.origin, inputs.with_ties)
-    _check_same(inputs.file.path, inputs.identity)
+    survey: Survey = _kept(folder, "drives", drive)
+    survey = replace(survey.of(file), clouds=(file,), control=surveyed)
+    contents = find_in_file(survey, origin, with_ties)
+    _check_same(file.path, identity)
     return contents
 
 
@@ -159,9 +150,15 @@ def _check_same(path, identity):
         )
 
 
-@dataclass(frozen=True)
-class CloudInput:
-    """Which file is corrected, and how.
+def write(
+    folder: Path,
+    motions: tuple[str, ...],
+    path: Path,
+    identity: FileIdentity,
+    target: Path,
+    with_sigma: bool,
+) -> Written:
+    """Write the corrected copy of a file, whole or not at all.
 
     Parameters
     ----------
@@ -171,32 +168,17 @@ class CloudInput:
         Key there of the MovedClouds of each drive that has points in the file.
     path : Path
     identity : FileIdentity
+        Of the file when its task was planned.
     target : Path
         Folder of the results.
     with_sigma : bool
         Whether each point gets its sigmas.
     """
-
-    folder: Path
-    motions: tuple[str, ...]
-    path: Path
-    identity: FileIdentity
-    target: Path
-    with_sigma: bool
-
-
-def write(inputs: CloudInput) -> Written:
-    """Write the corrected copy of a file, whole or not at all.
-
-    Parameters
-    ----------
-    inputs : CloudInput
-    """
-    kept = [_kept(inputs.folder, "motions", key) for key in inputs.motions]
-    drives = [replace(each, survey=_of_file(each.survey, inputs.path)) for each in kept]
-    with _moved_into(inputs.folder, inputs.target) as (part, outputs):
-        written = write_counted(drives, part, silent("", 0), inputs.with_sigma)
-        _check_same(inputs.path, inputs.identity)
+    kept = [_kept(folder, "motions", key) for key in motions]
+    drives = [replace(each, survey=_of_file(each.survey, path)) for each in kept]
+    with _moved_into(folder, target) as (part, outputs):
+        written = write_counted(drives, part, silent("", 0), with_sigma)
+        _check_same(path, identity)
     return Written(written, tuple(outputs))
 
 

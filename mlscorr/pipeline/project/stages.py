@@ -17,8 +17,6 @@ from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey
 from mlscorr.pipeline.project.file_tasks import (
-    CloudInput,
-    FindingInput,
     ReportInput,
     Tile,
     TileOwner,
@@ -176,13 +174,13 @@ def finding_tasks(
         box = drive.boxes[file.path]
         near = near_boxes(survey, survey.surveyed, [box])
         near = near[np.argsort(np.array(near.name, dtype=str), kind="stable")]
-        inputs = FindingInput(store.folder, kept, file, identity, near, origin, with_ties)
+        inputs = file, store.folder, kept, identity, near, origin, with_ties
         where = near.name, near.position, near.kind, near.size, near.normal
         given = identity, file.time_constant, file.point_source_ids, own.mounting, own.scanner
         key = digest(core, *given, *where, origin, with_ties)
         near_points = file.points * _share_near(survey, near, box)
         named = key, survey.name, task_name(survey.name, file)
-        tasks.append(Task("findings", *named, file.points, find, (inputs,), near_points))
+        tasks.append(Task("findings", *named, file.points, find, inputs, near_points))
     return tasks
 
 
@@ -225,8 +223,8 @@ def cloud_tasks(
         parts = [[(file.time_constant, file.point_source_ids) for file in some] for some in files]
         key = digest(VERSION, used, parts, path.name, identity, with_sigma)
         points = sum(file.points for some in files for file in some)
-        inputs = CloudInput(store.folder, used, path, identity, out / folder, with_sigma)
-        task = Task("clouds", key, folder, task_name(folder, path), points, write, (inputs,))
+        inputs = store.folder, used, path, identity, out / folder, with_sigma
+        task = Task("clouds", key, folder, task_name(folder, path), points, write, inputs)
         tasks.append((task, [survey.name for survey in surveys]))
     return tasks
 
