@@ -131,7 +131,7 @@ def unheld_sentence(ties: Ties, axis: np.ndarray) -> str:
     )
 
 
-def weigh_by_time(ties: Ties, best: float = SETTINGS.best_second) -> Ties:
+def weigh_by_time(ties: Ties) -> Ties:
     """Ties with variances so large that those of a second are together no better than a sigma.
 
     What thousands of them share, roughness or angles of the scanner, is in no variance of a single
@@ -141,15 +141,13 @@ def weigh_by_time(ties: Ties, best: float = SETTINGS.best_second) -> Ties:
     Parameters
     ----------
     ties : Ties
-    best : float
-        One sigma of a shift along any axis, by the ties of one second and pair of passes. Units: m.
     """
     factor = np.ones(len(ties))
     for side in (0, 1):
         group = group_by_time(ties, side, SETTINGS.moment)
         held = information(ties, group)[group]
         held = np.einsum("ni,nij,nj->n", ties.direction, held, ties.direction)
-        factor = np.maximum(factor, held * best**2)
+        factor = np.maximum(factor, held * SETTINGS.best_second**2)
     return replace(ties, variance=ties.variance * factor)
 
 

@@ -16,9 +16,9 @@ def candidate_pairs(
     correction: np.ndarray,
     sigma: np.ndarray,
     radius: float,
-    angle: float = SETTINGS.parallel,
     shift: np.ndarray | None = None,
     pause: float = SETTINGS.pause,
+    angle: float = SETTINGS.parallel,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs (k, 2) of parallel features within their gates, and distances (k,) in such units.
 
@@ -26,10 +26,12 @@ def candidate_pairs(
 
     Parameters
     ----------
-    features, correction, sigma, radius, angle, pause
+    features, correction, sigma, radius, pause
         As of pair_features.
     shift : (n, 3) array, optional
         By which the later of two visits is displaced. Units: m.
+    angle : float
+        Largest between directions: twice a boresight error and more, at first. Units: rad.
     """
     place = features.centre + correction
     limit = np.hypot(min(radius, 2 * SETTINGS.gate_sigmas * sigma.max(initial=0.0)), SETTINGS.cell)

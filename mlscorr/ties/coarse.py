@@ -29,9 +29,7 @@ class Votes:
     misfit: np.ndarray
 
 
-def coarse_correction(
-    features: TieFeatures, radius: float, angle: float = SETTINGS.parallel
-) -> np.ndarray:
+def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
     """What puts each pass on those before it: a stiff motion of each stretch of time.
 
     In a stretch all parallel planes within the radius vote for a shift along their normal; the
@@ -44,8 +42,6 @@ def coarse_correction(
     features : TieFeatures
     radius : float
         Of the search. Units: m.
-    angle : float
-        Of normals that may be parallel. Units: rad.
 
     Returns
     -------
@@ -67,10 +63,10 @@ def coarse_correction(
         times, motions, middles = [], [], []
         for part in np.unique(stretch):
             inside = rows[(stretch == part) & is_plane[rows]]
-            votes = _votes(features, inside, before, tree, radius, angle)
+            votes = _votes(features, inside, before, tree, radius)
             if len(votes.misfit) >= SETTINGS.points:
                 times.append((part + 0.5) * SETTINGS.pause)
-                motions.append(_motion(votes, radius, angle))
+                motions.append(_motion(votes, radius))
                 middles.append(features.centre[inside].mean(axis=0))
         if times:
             motion, middle = (
@@ -90,7 +86,7 @@ def _edges(place, margin=0.0):
     return place.min(axis=0, initial=np.inf) - margin, place.max(axis=0, initial=-np.inf) + margin
 
 
-def _votes(features, inside, before, tree, radius, angle):
+def _votes(features, inside, before, tree, radius):
     """The Votes of planes (k,) with those before, whose places the tree holds."""
     limit = np.hypot(radius, SETTINGS.cell)
     count = min(4 * SETTINGS.neighbours, len(before))
@@ -100,7 +96,7 @@ def _votes(features, inside, before, tree, radius, angle):
     row, column = np.nonzero(near < len(before))
     near, row = near[row, column], inside[row]
     first, second = features.direction[row], features.direction[before[near]]
-    parallel = np.einsum("ni,ni->n", first, second) >= np.cos(angle)
+    parallel = np.einsum("ni,ni->n", first, second) >= np.cos(SETTINGS.parallel)
     near, row = near[parallel], row[parallel]
     normal = (first + second)[parallel]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -111,10 +107,10 @@ def _votes(features, inside, before, tree, radius, angle):
     return Votes(arm[beside], normal[beside], misfit[beside])
 
 
-def _motion(votes, radius, angle):
+def _motion(votes, radius):
     """Shift and rotation (6,), m and rad, that most votes agree with."""
     design = np.column_stack([votes.normal, np.cross(votes.arm, votes.normal)])
-    prior = np.repeat([radius, angle], 3) ** -2.0
+    prior = np.repeat([radius, SETTINGS.parallel], 3) ** -2.0
     motion, width = np.append(_most_votes(votes, radius), np.zeros(3)), radius / 2
     while width > SETTINGS.roughest:
         for _ in range(3):

@@ -56,7 +56,7 @@ def coarse_mounting(
             moved = remounted(planes, trajectory, mountings, at)
             shifts = state[6 * count :].reshape(-1, 3)[np.searchsorted(passes, planes.pass_number)]
             gates = np.full(len(planes), SETTINGS.gate_sigmas * width)
-            pairs, _ = candidate_pairs(moved, shifts, gates, 2 * width, angle)
+            pairs, _ = candidate_pairs(moved, shifts, gates, 2 * width, angle=angle)
             normal = moved.direction[pairs].sum(axis=1)
             normal /= np.linalg.norm(normal, axis=1, keepdims=True)
             place = (moved.centre + shifts)[pairs]

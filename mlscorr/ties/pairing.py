@@ -16,7 +16,6 @@ def pair_features(
     correction: np.ndarray,
     sigma: np.ndarray,
     radius: float,
-    angle: float = SETTINGS.parallel,
     turned: np.ndarray | None = None,
     pause: float = SETTINGS.pause,
 ) -> Ties:
@@ -27,7 +26,7 @@ def pair_features(
     the other's. Two passes have none in a direction in which more than half as many pair when they
     are displaced by two gates: those would be by chance; and paint has none where the next lane's
     is near enough to be taken for it.
-    Call it again with a better correction, smaller sigma, radius and angle.
+    Call it again with a better correction, smaller sigma and radius.
 
     Parameters
     ----------
@@ -39,9 +38,6 @@ def pair_features(
     radius : float
         Two features are no pair where they are farther apart than this, or than three sigmas of
         the difference, along a plane's normal or across a pole. Units: m.
-    angle : float
-        Largest angle between directions: twice a boresight error and more, at first. Units: rad.
-
     turned : (n, 3) array, optional
         The features' directions as the correction turns them; as recorded by default.
     pause : float
@@ -54,7 +50,7 @@ def pair_features(
         Misclosures are of the recorded places, whatever the correction.
     """
     present = features if turned is None else replace(features, direction=turned)
-    search = correction, sigma, radius, angle, None, pause
+    search = correction, sigma, radius, None, pause
     pairs = _mutual(present, *candidate_pairs(present, *search))
     pairs = pairs[_beyond_chance(present, search, pairs)]
     pairs = pairs[_is_unique(present, features.centre + correction, sigma)[pairs].all(axis=1)]
@@ -86,7 +82,7 @@ def _beyond_chance(features, search, pairs):
     one of them is known: nearer, a rough surface pairs with itself. The correction chose the place
     where most agree: so of the displaced the fullest counts.
     """
-    correction, sigma, radius, angle, _, pause = search
+    correction, sigma, radius, _, pause = search
     radius, sigma = max(radius, SETTINGS.least_gate), np.maximum(sigma, SETTINGS.roughest)
     widest = _largest_near(features.centre + correction, sigma, radius)
     variance = 2 * (widest**2 + features.variance + SETTINGS.surface_sigma**2)
@@ -96,7 +92,7 @@ def _beyond_chance(features, search, pairs):
     way[is_pole] = _across(way[is_pole])[0]
     way *= 2 * gate[:, None]
     here, *displaced = (
-        _mutual(features, *candidate_pairs(features, correction, sigma, radius, angle, s, pause))
+        _mutual(features, *candidate_pairs(features, correction, sigma, radius, s, pause))
         for s in (None, way, -way)
     )
     is_chance = np.zeros(len(pairs), bool)

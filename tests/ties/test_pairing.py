@@ -168,12 +168,12 @@ def test_walls_seen_from_both_sides_are_two():
 
 @pytest.mark.parametrize(("degrees", "count"), [(5.0, 1), (12.0, 0)])
 def test_directions_are_parallel_within_the_angle(degrees, count):
-    "Up to the angle that is asked for, two walls may be the same"
+    "Up to 8 degrees apart, two walls may be the same"
     features = walls([[0, 0, 0], [0.1, 0, 0]], [1, 2])
     turn = np.radians(degrees)
     direction = np.array([[1.0, 0, 0], [np.cos(turn), np.sin(turn), 0]])
     features = replace(features, direction=direction)
-    assert len(pair(features, 0.2, angle=np.radians(8.0))) == count
+    assert len(pair(features, 0.2)) == count
 
 
 def test_one_pass_has_no_ties():
