@@ -47,8 +47,6 @@ class BeamCheck:
     def _sample(self, some, mounting):
         """Time (s), horizontal vector (m) and angle off the scan plane (rad) of beams: (n, 4)."""
         trajectory = self.survey.trajectory
-        if not len(some):
-            return np.empty((0, 4))
         beam = (some.xyz - trajectory.at(some.gps_time).position)[:, :2]
         off = np.zeros(len(some))
         if mounting is not None:

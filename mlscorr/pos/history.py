@@ -113,10 +113,9 @@ def _falls(trajectory, held, restarts):
     is_large = size[:-1] > SETTINGS.steady_ratio * np.linalg.norm(held)
     rows = np.flatnonzero((size[1:] < SETTINGS.fall_ratio * size[:-1]) & is_large)
     falls = (time[rows] + time[rows + 1]) / 2
-    if len(restarts) == 0:
-        return falls
     # a sigma that falls while the path steps a little later or sooner tells of the same return
-    return falls[np.abs(falls[:, None] - restarts).min(axis=1) > SETTINGS.fix_time]
+    away = np.abs(falls[:, None] - restarts).min(axis=1, initial=np.inf)
+    return falls[away > SETTINGS.fix_time]
 
 
 def held_sigma(trajectory: Trajectory) -> np.ndarray:

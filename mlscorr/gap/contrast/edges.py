@@ -57,7 +57,7 @@ class EdgeCollector:
         self._survey, self._limit = survey, SETTINGS.kept if limit is None else limit
         self._origin = survey.trajectory.position.mean(axis=0)
         self._platform = recorded_platform(survey, self._origin)
-        self._parts, self.share = [_no_edges()], 1.0
+        self._parts, self.share = [Edges(np.empty(0), np.empty((0, 3)), *np.empty((2, 0)))], 1.0
 
     def add(self, chunk: PointCloud) -> None:
         """Take the edges of a chunk."""
@@ -79,10 +79,6 @@ class EdgeCollector:
     def edges(self) -> Edges:
         """Edges of all chunks so far."""
         return Edges.concatenate(self._parts)
-
-
-def _no_edges():
-    return Edges(np.empty(0), np.empty((0, 3)), np.empty(0), np.empty(0))
 
 
 def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
@@ -110,8 +106,6 @@ def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
     bend[1:-1] = np.abs(near[2:] - 2 * near[1:-1] + near[:-2])
     is_smooth = (bend <= rough) & follows & np.append(False, follows[:-1])
     begin, end = _between_plateaus(is_smooth, follows)
-    if len(begin) == 0:
-        return _no_edges()
     ahead, back = 2 * near[begin] - near[begin - 1], 2 * near[end] - near[end + 1]
     low, high = np.minimum(ahead, back), np.maximum(ahead, back)
     is_edge = (high - low >= SETTINGS.jump) & (end - begin - 1 >= 2)

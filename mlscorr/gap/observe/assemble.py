@@ -67,8 +67,6 @@ def assemble(
 
 def _partials(survey, position, gps_time, direction):
     """Partial derivatives (m, 6) along the directions by the pose."""
-    if len(position) == 0:
-        return np.zeros((0, 6))
     return np.einsum("mi,mij->mj", direction, pose_partials(survey.trajectory, position, gps_time))
 
 

@@ -167,8 +167,6 @@ def _axes(covariance):
 def _near(matched, candidates):
     """Rows of the candidates on each observed target, in order of time; a list of n arrays."""
     cloud = candidates.cloud
-    if len(cloud) == 0:
-        return [np.empty(0, int)] * len(matched)
     near = cKDTree(cloud.xyz).query_ball_point(matched.position, SETTINGS.on_target * matched.size)
     targets = []
     for i, on_target in enumerate(near):

@@ -41,9 +41,7 @@ def planned_rows(survey: Survey) -> Rows:
             "Give lever_arm and boresight as they are planned."
         )
     targets = survey.surveyed
-    parts = []
-    if len(targets):
-        parts.append(_targets(survey, targets))
+    parts = [_targets(survey, targets)]
     if survey.reference is not None:
         parts.append(_facets(survey, np.random.default_rng(0)))
     parts = [part for part in parts if len(part)]
