@@ -16,6 +16,7 @@ from mlscorr.gap.observe.plane_fit import block_chance, chance, place_key
 from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.survey.columns import Columns
+from mlscorr.targets import NO_POINTS
 
 PRODUCTS = tuple(zip(*np.triu_indices(3), strict=True))  # of two axes, in a symmetric matrix
 
@@ -97,15 +98,13 @@ class CellCollector:
     Parameters
     ----------
     survey : Survey
-    limit, points : int, optional
+    limit, points : int
         Cells, and points, at most.
     """
 
-    def __init__(self, survey: Survey, limit: int | None = None, points: int | None = None):
-        self._survey = survey
-        self._limit = SETTINGS.kept if limit is None else limit
-        self._most_points = SETTINGS.points if points is None else points
-        self._cells, self._points = cells_of(no_points(), 1.0), [no_points()]
+    def __init__(self, survey: Survey, limit: int = SETTINGS.kept, points: int = SETTINGS.points):
+        self._survey, self._limit, self._most_points = survey, limit, points
+        self._cells, self._points = cells_of(NO_POINTS, 1.0), [NO_POINTS]
         self.share = self.point_share = 1.0
 
     def add(self, chunk: PointCloud) -> None:
@@ -127,11 +126,6 @@ class CellCollector:
     def points(self) -> PointCloud:
         """All points of the cells whose points are kept."""
         return PointCloud.concatenate(self._points)
-
-
-def no_points() -> PointCloud:
-    """A PointCloud of nothing."""
-    return PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0))
 
 
 def sampled(cloud: PointCloud, share: float) -> PointCloud:

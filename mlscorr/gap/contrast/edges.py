@@ -50,11 +50,11 @@ class EdgeCollector:
     Parameters
     ----------
     survey : Survey
-    limit : int, optional
+    limit : int
     """
 
-    def __init__(self, survey: Survey, limit: int | None = None):
-        self._survey, self._limit = survey, SETTINGS.kept if limit is None else limit
+    def __init__(self, survey: Survey, limit: int = SETTINGS.kept):
+        self._survey, self._limit = survey, limit
         self._origin = survey.trajectory.position.mean(axis=0)
         self._platform = recorded_platform(survey, self._origin)
         self._parts, self.share = [Edges(np.empty(0), np.empty((0, 3)), *np.empty((2, 0)))], 1.0

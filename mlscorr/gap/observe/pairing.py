@@ -49,8 +49,7 @@ def build_rows(
     matched: TargetObservations,
     candidates: Candidates,
     patches: Patches | None,
-    rng: np.random.Generator | None = None,
-    limit: int | None = None,
+    limit: int = SETTINGS.patches,
 ) -> Pairing:
     """Compare a survey with what its simulator believes: targets, surfaces, channels.
 
@@ -66,10 +65,8 @@ def build_rows(
         The points near targets, as find_targets returns them.
     patches : Patches or None
         Of its clouds, as find_patches gives them.
-    rng : numpy.random.Generator, optional
-        Chooses among the patches; the same seed each time by default.
-    limit : int, optional
-        Of the patches on surfaces, and as many in shared planes.
+    limit : int
+        Of the patches on surfaces, and as many in shared planes: the same choice each time.
 
     Raises
     ------
@@ -95,13 +92,11 @@ def build_rows(
     >>> sorted(set(pairing.rows.channel.tolist()))
     ['return_rate', 'roughness', 'target']
     """
-    rng = np.random.default_rng(0) if rng is None else rng
-    limit = SETTINGS.patches if limit is None else limit
     is_check = np.array([name in survey.check.name for name in matched.name], dtype=bool)
     parts = [target_rows(survey, matched[~is_check], candidates)]
     check, notes = target_rows(survey, matched[is_check], candidates), [NO_INTENSITY]
     if patches is not None:
-        parts += _patch_rows(survey, patches, limit, rng, notes)
+        parts += _patch_rows(survey, patches, limit, notes)
     else:
         notes.append("The cloud holds no flat patch: surfaces and channels say nothing.")
     rows = Rows.concatenate(parts)
@@ -198,9 +193,9 @@ def _no_pulses():
     return SamplePulses(none.astype(int), none, none, place, place, none, place, none)
 
 
-def _patch_rows(survey, patches, limit, rng, notes):
+def _patch_rows(survey, patches, limit, notes):
     """Parts of the Rows that patches give; appends to the notes what they don't."""
-    parts = []
+    parts, rng = [], np.random.default_rng(0)
     shared = shared_rows(survey, patches, rng, limit)
     if shared is None:
         notes.append("No plane was seen twice: passes are not compared with each other.")

@@ -26,11 +26,11 @@ class PatchCollector:
     Parameters
     ----------
     survey : Survey
-    pool : int, optional
+    pool : int
     """
 
-    def __init__(self, survey: Survey, pool: int | None = None):
-        self._survey, self._pool = survey, SETTINGS.pool if pool is None else pool
+    def __init__(self, survey: Survey, pool: int = SETTINGS.pool):
+        self._survey, self._pool = survey, pool
         self._parts, self._starts, self._share, self._read = [], {}, 1.0, 0
         self._file: CloudFile | None = None
         self._held, self._number = NO_POINTS, np.empty(0, int)
@@ -83,7 +83,7 @@ class PatchCollector:
 
 def find_patches(
     survey: Survey,
-    pool: int | None = None,
+    pool: int = SETTINGS.pool,
     chunks: Callable[[CloudFile], Iterable[PointCloud]] = read_chunks,
 ) -> Patches | None:
     """Stream all clouds of a survey and keep at most `pool` flat patches: see PatchCollector.
@@ -91,7 +91,7 @@ def find_patches(
     Parameters
     ----------
     survey : Survey
-    pool : int, optional
+    pool : int
     chunks : function of a CloudFile
         Gives an iterator of PointCloud.
 

@@ -12,7 +12,7 @@ from mlscorr.survey import Survey
 
 
 def shared_rows(
-    survey: Survey, patches: Patches, rng: np.random.Generator, limit: int | None = None
+    survey: Survey, patches: Patches, rng: np.random.Generator, limit: int
 ) -> Rows | None:
     """Rows of the planes that were seen twice, or None where there are none.
 
@@ -24,10 +24,8 @@ def shared_rows(
     patches : Patches
     rng : numpy.random.Generator
         Chooses where there are more pairs than the limit.
-    limit : int, optional
-        Half of SETTINGS.patches by default.
+    limit : int
     """
-    limit = SETTINGS.patches // 2 if limit is None else limit
     first, second = (patches[rows] for rows in _pairs(patches))
     normal, between, residual = compare_planes(first, second)
     apart = np.linalg.norm(between, axis=1)

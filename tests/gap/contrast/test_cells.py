@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.contrast.cells import CellCollector, cells_of, no_points, sampled
+from mlscorr.gap.contrast.cells import CellCollector, cells_of, sampled
 from mlscorr.survey import PointCloud
+from mlscorr.targets import NO_POINTS
 
 ORIGIN = np.array([532000.0, 3374000.0, 20.0])
 
@@ -46,5 +47,5 @@ def test_memory_is_bounded_and_the_same_cells_are_kept(pair):
 
 def test_nothing_gives_nothing():
     "No points have no cell, and a share of them is none"
-    assert len(cells_of(no_points(), 1.0)) == 0
-    assert len(sampled(no_points(), 0.5)) == 0
+    assert len(cells_of(NO_POINTS, 1.0)) == 0
+    assert len(sampled(NO_POINTS, 0.5)) == 0

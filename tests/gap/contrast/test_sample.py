@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.contrast.cells import no_points
+from mlscorr.targets import NO_POINTS
 
 
 def test_a_sample_is_whole_cells(pair):
@@ -17,4 +17,4 @@ def test_a_sample_is_whole_cells(pair):
 
 def test_without_points_there_is_no_intensity(pair):
     "Nothing is no intensity"
-    assert not replace(pair[1], points=no_points()).has_intensity
+    assert not replace(pair[1], points=NO_POINTS).has_intensity

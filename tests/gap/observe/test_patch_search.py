@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.observe.patch_search import find_patches
+from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.io.las import read_chunks
 
 
@@ -40,7 +41,7 @@ def assert_equal(first, second):
 
 
 @pytest.mark.parametrize("size", [3_001, 20_000, 123_457])
-@pytest.mark.parametrize("pool", [None, 200])
+@pytest.mark.parametrize("pool", [SETTINGS.pool, 200])
 def test_patches_do_not_depend_on_where_a_cloud_is_cut_into_chunks(survey, size, pool):
     "Chunks of any size give the patches of the whole, bit for bit, also where few of them are kept"
     whole = find_patches(survey, pool, partial(read_chunks, chunk_size=10**9))
