@@ -93,8 +93,8 @@ def corrected_drives(
         survey = replace(drive.survey, notes=(*drive.survey.notes, *joint.survey.notes))
         corrected = CorrectedDrive(
             **drive_fields(replace(drive, survey=survey), own),
-            places=tuple(place for place in near if first <= place.gps_time <= last),
-            section=ties,
+            next_control=tuple(place for place in near if first <= place.gps_time <= last),
+            tie_section=ties,
         )
         results.append(corrected)
     pairs = zip(results, states, strict=True)

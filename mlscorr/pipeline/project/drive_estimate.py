@@ -48,24 +48,14 @@ class CorrectedDrive(CorrectedSurvey):
 
     Parameters
     ----------
-    places : tuple of NextControl
+    next_control : tuple of NextControl
         Where more control would help all of them most, those on this drive.
-    section : dict
+    tie_section : dict
         What ties did, as report.json has it.
     """
 
-    places: tuple[NextControl, ...] = ()
-    section: dict | None = None
-
-    @property
-    def next_control(self) -> tuple[NextControl, ...]:
-        """Where one more control point each would help most, the best first."""
-        return self.places
-
-    @property
-    def tie_section(self) -> dict | None:
-        """What ties did, as report.json has it."""
-        return self.section
+    next_control: tuple[NextControl, ...] = ()
+    tie_section: dict | None = None
 
 
 def drive_estimates(

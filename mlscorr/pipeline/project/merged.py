@@ -81,8 +81,8 @@ def merged_drive(
     notes = _distinct([part.corrected.survey.notes for part in parts])
     misfits = misfit_section(estimate.ties) or {"n": 0, "used": 0, "reason": estimate.untied}
     whole = replace(drive, survey=replace(drive.survey, notes=notes))
-    places = _places(drive, parts, home)
-    return CorrectedDrive(**drive_fields(whole, estimate), places=places, section=misfits), state
+    fields = drive_fields(whole, estimate) | {"next_control": _places(drive, parts, home)}
+    return CorrectedDrive(**fields, tie_section=misfits), state
 
 
 def _estimate(drive, parts, home, main):
@@ -193,10 +193,10 @@ def _places(drive, parts, home):
     places = [
         place
         for part, is_home in zip(parts, home, strict=True)
-        for place in part.corrected.places
+        for place in part.corrected.next_control
         if is_home[_epochs(drive, place.gps_time)]
     ]
-    number = max(len(part.corrected.places) for part in parts)
+    number = max(len(part.corrected.next_control) for part in parts)
     return tuple(sorted(places, key=lambda place: place.sigma_after - place.sigma_before)[:number])
 
 
