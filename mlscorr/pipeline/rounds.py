@@ -1,12 +1,11 @@
 """``diagnose --until-none``: effect after effect into the simulator, until nothing is left."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from mlscorr.effects import Effect
 from mlscorr.effects.labels import lowered, title
 from mlscorr.gap.close import LoneEffect, lone_effects
 from mlscorr.gap.infer import Costs
@@ -93,7 +92,6 @@ class DiagnosedRounds:
 def diagnose_until_none(
     survey: Survey,
     simulator: Simulator | None = None,
-    library: Iterable[type[Effect]] | None = None,
     progress: Callable | None = None,
     costs: Costs | None = None,
 ) -> DiagnosedRounds:
@@ -101,7 +99,7 @@ def diagnose_until_none(
 
     Parameters
     ----------
-    survey, simulator, library, progress, costs
+    survey, simulator, progress, costs
         As of ``diagnose``.
 
     Raises
@@ -109,8 +107,7 @@ def diagnose_until_none(
     ValueError
         As ``diagnose`` does.
     """
-    library = library if library is None else tuple(library)
-    rounds = [diagnose(survey, simulator, library, progress=progress, costs=costs)]
+    rounds = [diagnose(survey, simulator, progress=progress, costs=costs)]
     while len(rounds) < SETTINGS.rounds:
         last = rounds[-1]
         if last.inference.verdict.label in ("none", "unknown"):
@@ -119,7 +116,7 @@ def diagnose_until_none(
             improved = last.improved
         except ValueError:  # larger than any survey can have
             break
-        rounds.append(diagnose(survey, improved, library, progress=progress, costs=costs))
+        rounds.append(diagnose(survey, improved, progress=progress, costs=costs))
     first = rounds[0]
     rng = np.random.default_rng(SETTINGS.seed)
     lone = lone_effects(first.rows, first.signatures, first.inference, rng)
