@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.correction import Correction
 from mlscorr.estimate.assembly import mounting_equations, position_equations
 from mlscorr.estimate.calibration import Calibration
@@ -25,7 +24,6 @@ from mlscorr.estimate.mounting_estimate import (
     combined_correction,
     corrected_mountings,
 )
-from mlscorr.estimate.posterior import Objective, Posterior
 from mlscorr.estimate.prediction import predict_pose_error
 from mlscorr.estimate.prior import mounting_prior
 from mlscorr.estimate.screening import Screening, screen
@@ -94,9 +92,7 @@ def believed_mounting(
     filled, notes = filled_sigmas(trajectory)
     equations = position_equations(filled, matched, pos, 0, mounting_prior)
     kept, start, ls = _least_squares(equations, matched, mountings)
-    objective = Objective.of(kept)
-    mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
-    screening = Screening(Posterior(mode, mode), (), (), (), ())
+    screening = Screening.believed(kept)
     used = np.ones(len(matched), dtype=bool)
     return calibration_by(trajectory, mountings, kept, screening, (start, ls), used, notes)
 

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.correction import Correction
 from mlscorr.estimate.assembly import position_equations, with_fallbacks, with_mountings
 from mlscorr.estimate.equations import NO_TREND, Equations
@@ -18,7 +17,6 @@ from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.orders import Alternative, affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.outages import with_drift_history
-from mlscorr.estimate.posterior import Objective, Posterior
 from mlscorr.estimate.prediction import GridPredictions, pose_rows, predict_pose_error
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.runs import find_windows, with_windows
@@ -175,9 +173,7 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
     filled, notes = filled_sigmas(trajectory)
     equations = position_equations(filled, Matched.none(), pos, NO_TREND, position_prior)
     equations = with_fallbacks(equations, equations.stated.history.steps)
-    objective = Objective.of(equations)
-    mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
-    screening = Screening(Posterior(mode, mode), (), (), (), ())
+    screening = Screening.believed(equations)
     return _estimate(trajectory, (), GridPredictions(equations), screening, notes)
 
 

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters, most_probable
 from mlscorr.estimate.settings import SETTINGS
@@ -55,6 +56,13 @@ class Screening:
     tests: tuple[TargetTest, ...]
     rejected: tuple[TargetTest, ...]
     warnings: tuple[str, ...]
+
+    @classmethod
+    def believed(cls, equations: Equations) -> Screening:
+        """Nothing screened: the parameters are those that are believed before any target."""
+        objective = Objective.of(equations)
+        mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
+        return cls(Posterior(mode, mode), (), (), (), ())
 
 
 def screen(equations: Equations) -> Screening:
