@@ -23,15 +23,6 @@ from mlscorr.survey import ControlPoints, Survey, Trajectory
 
 
 @dataclass(frozen=True)
-class Addition:
-    """One addition: what to do, and rows and survey with it, whose residuals say nothing."""
-
-    name: str
-    rows: Rows
-    survey: Survey
-
-
-@dataclass(frozen=True)
 class NextData:
     """What to measure next, and why.
 
@@ -48,8 +39,10 @@ class NextData:
     after: float | None = None
 
 
-def additions(rows: Rows, survey: Survey) -> tuple[Addition, ...]:
-    """The cheap additions that a survey allows.
+def additions(rows: Rows, survey: Survey) -> dict[str, tuple[Rows, Survey]]:
+    """The cheap additions that a survey allows: what to do, and rows and survey with it.
+
+    The residuals of these rows say nothing.
 
     Parameters
     ----------
@@ -57,24 +50,24 @@ def additions(rows: Rows, survey: Survey) -> tuple[Addition, ...]:
     survey : Survey
     """
     targets = np.flatnonzero(rows.channel == "target")
-    made = [
-        _another_pass("the same road in the opposite direction", rows, survey, backwards=True),
-        _another_pass("the same road at twice the speed", rows, survey, faster=SETTINGS.factor),
-    ]
+    made = {
+        "the same road in the opposite direction": _another_pass(rows, survey, backwards=True),
+        "the same road at twice the speed": _another_pass(rows, survey, faster=SETTINGS.factor),
+    }
     if len(targets):
         items = np.unique(rows.item[targets])
         count = min(SETTINGS.stop_targets, len(items))
         near = items[np.linspace(0, len(items) - 1, count).astype(int)]
-        made += [
-            _more_targets("as many targets again, between the others", rows, survey, items),
-            _more_targets(
-                "as many targets again, at twice the distance", rows, survey, items, SETTINGS.factor
+        made |= {
+            "as many targets again, between the others": _more_targets(rows, survey, items),
+            "as many targets again, at twice the distance": _more_targets(
+                rows, survey, items, SETTINGS.factor
             ),
-            _stop(
-                f"a stop of {SETTINGS.pause:.0f} s beside {len(near)} targets", rows, survey, near
+            f"a stop of {SETTINGS.pause:.0f} s beside {len(near)} targets": _stop(
+                rows, survey, near
             ),
-        ]
-    return tuple(made)
+        }
+    return made
 
 
 def next_data(
@@ -102,16 +95,16 @@ def next_data(
         return ()
     kinds = [kind for kind in kinds if kind.name in names]
     before, data = _largest(compared, names), []
-    for addition in additions(rows, survey):
-        signs, _ = signatures(addition.rows, addition.survey, kinds)
-        observed = Observations.of(addition.rows, background(addition.rows, addition.survey))
+    for name, added in additions(rows, survey).items():
+        signs, _ = signatures(*added, kinds)
+        observed = Observations.of(added[0], background(*added))
         after = _largest(compare_signatures(observed, signs), names)
         if before - after >= SETTINGS.smallest_fall:
             why = (
                 f"{lowered(titles(names))}: squared correlation falls from {before:.2f} to "
                 f"{after:.2f}" + ("." if after <= INFERENCE.same else ", which is still one class.")
             )
-            data.append(NextData(addition.name, why, before, after))
+            data.append(NextData(name, why, before, after))
     return tuple(sorted(data, key=lambda planned: planned.after or 0.0))
 
 
@@ -123,7 +116,7 @@ def _largest(compared, names):
     return float((compared.correlation[apart] ** 2).max(initial=0.0))
 
 
-def _another_pass(name, rows, survey, backwards=False, faster=1.0):
+def _another_pass(rows, survey, backwards=False, faster=1.0):
     """All targets and surfaces once more, from the same places at other times."""
     once = rows.select(rows.metric & ~rows.two_times)
     trajectory = survey.trajectory
@@ -139,7 +132,7 @@ def _another_pass(name, rows, survey, backwards=False, faster=1.0):
     longer = _followed(trajectory, order, time, attitude=attitude)
     wider = replace(survey, trajectory=longer)
     more = _placed(once, wider, anew, lambda pulses: pulses.xyz, once.survey_item)
-    return Addition(name, _both(rows, more), wider)
+    return _both(rows, more), wider
 
 
 def _followed(trajectory, rows, time, **changed):
@@ -150,7 +143,7 @@ def _followed(trajectory, rows, time, **changed):
     return Trajectory.concatenate([trajectory, more])
 
 
-def _more_targets(name, rows, survey, items, farther=1.0):
+def _more_targets(rows, survey, items, farther=1.0):
     """Targets like the items, half an interval later, seen under the same angles."""
     once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
     trajectory = survey.trajectory
@@ -163,10 +156,10 @@ def _more_targets(name, rows, survey, items, farther=1.0):
         back = np.maximum(time - later, trajectory.gps_time[0])
         return np.where(same & (trajectory.segment(moved) >= 0), moved, back)
 
-    return _new_targets(name, rows, survey, once, anew, farther)
+    return _new_targets(rows, survey, once, anew, farther)
 
 
-def _stop(name, rows, survey, items):
+def _stop(rows, survey, items):
     """The items' targets set up around one place, where the vehicle stands."""
     trajectory = survey.trajectory
     once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
@@ -184,10 +177,10 @@ def _stop(name, rows, survey, items):
         share = (recorded - low) / max(high - low, 1.0)  # pulses come before and after their target
         return start + np.clip(share, 0.0, 1.0) * (time[-1] - start)
 
-    return _new_targets(name, rows, replace(survey, trajectory=longer), once, anew, 1.0)
+    return _new_targets(rows, replace(survey, trajectory=longer), once, anew, 1.0)
 
 
-def _new_targets(name, rows, survey, once, anew, farther):
+def _new_targets(rows, survey, once, anew, farther):
     """Rows of new targets, which stand to the vehicle as those of `once` did."""
     trajectory, arm = survey.trajectory, np.zeros(3)
     if survey.mounting is not None:
@@ -208,7 +201,7 @@ def _new_targets(name, rows, survey, once, anew, farther):
     )  # fmt: skip
     wider = replace(survey, check=survey.check + added)
     more = _placed(once, wider, anew, place, len(known) + number)
-    return Addition(name, _both(replace(rows, targets=wider.surveyed), more), wider)
+    return _both(replace(rows, targets=wider.surveyed), more), wider
 
 
 def _placed(once, survey, anew, place, survey_item):

@@ -14,4 +14,4 @@ def test_every_addition_can_be_made_where_pulses_spread_about_their_targets():
     early = replace(g.rows.pulses, gps_time=time - 0.2 * (time == time.min()))
     made = additions(replace(g.rows, pulses=early), g.survey)
     assert len(made) == 5
-    assert all(len(one.rows) > len(g.rows) for one in made)
+    assert all(len(rows) > len(g.rows) for rows, _ in made.values())
