@@ -30,7 +30,7 @@ def gap_document(
     effects: Iterable[Effect],
     left_out: Mapping[str, str],
     warnings: Iterable[str],
-    absence: Absence | None = None,
+    absence: Absence,
 ) -> dict:
     """Content of gap.json.
 
@@ -46,11 +46,10 @@ def gap_document(
     left_out : mapping of str to str
         Why effects were not considered.
     warnings : iterable of str
-    absence : Absence, optional
+    absence : Absence
         Of surveyed targets that have no row.
     """
     verdict, where = inference.verdict, inference.where
-    absence = Absence() if absence is None else absence
     return {
         "name": survey.name,
         "verdict": {
