@@ -38,11 +38,11 @@ def check_project(path: str | Path) -> CheckedSurvey:
     """
     faults = Faults()
     with glance():
-        if faults.of("survey.toml", read_project_file, path) is None:
-            return _stopped(faults)
-        project = faults.of("data", read_project, path)
+        settings = faults.of("survey.toml", read_project_file, path)
+        project = settings and faults.of("data", read_project, path)
         if project is None:
-            return _stopped(faults)
+            reason = "Clouds and targets: the faults come first."
+            return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
         checked = [_checked(survey) for survey in _surveys(project, faults)]
     _check_control(project, checked, faults)
     return CheckedSurvey(
@@ -54,12 +54,6 @@ def check_project(path: str | Path) -> CheckedSurvey:
         written=_sums([each.written for _, each in checked]),
         needed=_sums([each.needed for _, each in checked]),
     )
-
-
-def _stopped(faults):
-    """What can be said of a project that can't be read."""
-    reason = "Clouds and targets: the faults come first."
-    return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
 
 
 def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
