@@ -116,7 +116,7 @@ def correct_project(
         with engine(options.workers, options.scheduler) as chosen:
             work = _Work(project, out, options, Run(store, chosen, progress.ended), progress)
             result = work.result()
-        progress.note(result.sentence)
+        progress.note(result.document["statements"][0]["sentence"])
     return result
 
 

@@ -76,11 +76,6 @@ class ProjectResult:
     reports: dict[str, dict]
 
     @property
-    def sentence(self) -> str:
-        """What stands first."""
-        return self.document["statements"][0]["sentence"]
-
-    @property
     def is_whole(self) -> bool:
         """Whether nothing failed, and no point was left as it was."""
         return not self.document["faults"] and not any(
