@@ -107,10 +107,13 @@ class Estimate(Summary):
         """Sentences that a user should read."""
         return (
             *self.notes,
-            *guard_warnings(self.guards, self.equations, self.parameters),
+            *self._guard_warnings(),
             *self.screening.warnings,
             *(() if self.ties is None else self.ties.warnings),
         )
+
+    def _guard_warnings(self):
+        return guard_warnings(self.guards, self.equations, self.parameters)
 
     @cached_property
     def alternatives(self) -> tuple[Alternative, ...]:

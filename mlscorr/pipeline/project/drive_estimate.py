@@ -8,15 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mlscorr.correction import Correction
-from mlscorr.estimate import (
-    Alternative,
-    Estimate,
-    NextControl,
-    Support,
-    TieResiduals,
-    guard_warnings,
-    guards_of,
-)
+from mlscorr.estimate import Alternative, Estimate, NextControl, Support, TieResiduals, guards_of
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.joint import JointDrives
 
@@ -30,16 +22,8 @@ class DriveEstimate(Estimate):
         """Of the shift that drives have in common there are no other orders."""
         return ()
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences that a user should read."""
-        has_control = len(self.equations.names) > 0
-        return (
-            *self.notes,
-            *(guard_warnings(self.guards, self.equations, self.parameters) if has_control else ()),
-            *self.screening.warnings,
-            *(() if self.ties is None else self.ties.warnings),
-        )
+    def _guard_warnings(self):
+        return super()._guard_warnings() if len(self.equations.names) else ()
 
 
 @dataclass(frozen=True, repr=False)
