@@ -10,11 +10,10 @@
 """
 
 from mlscorr.collocation.dense import collocate_rows_dense, covariance_given
-from mlscorr.collocation.information import InformationSolver
-from mlscorr.collocation.linked import LeftOut, collocate_rows, leave_each_out, reweight
-from mlscorr.collocation.literal import LiteralCollocation, LiteralSignal, collocate_literal
+from mlscorr.collocation.linked import collocate_rows, leave_each_out, reweight
+from mlscorr.collocation.literal import LiteralSignal, collocate_literal
 from mlscorr.collocation.markov import collocate
 from mlscorr.collocation.model import Collocation, Noise, Signal
 from mlscorr.collocation.slopes import likelihood_changes
 from mlscorr.collocation.sparse_rows import SparseRows
-from mlscorr.collocation.whitening import Whitened, Whitener, factor
+from mlscorr.collocation.whitening import Whitener, factor

@@ -14,10 +14,10 @@ what they leave open of them is a part of the stated sigmas.
 """
 
 from mlscorr.estimate.calibration import Calibration, mounted_corrections
-from mlscorr.estimate.guards import COMPONENTS, few_targets, guard_warnings, guards_of
+from mlscorr.estimate.guards import COMPONENTS, few_targets, guards_of
 from mlscorr.estimate.mounting import believed_mounting, control_fault, estimate_mounting
 from mlscorr.estimate.mounting_check import find_mounting_error, mounting_warnings, scanner_warnings
-from mlscorr.estimate.mounting_estimate import MountingEstimate, corrected_mounting
+from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.estimate.orders import Alternative
 from mlscorr.estimate.placement import NextControl, PlannedAccuracy, place_control, predict_accuracy
 from mlscorr.estimate.pos_error import (
@@ -30,8 +30,7 @@ from mlscorr.estimate.pos_error import (
 from mlscorr.estimate.scanner_errors import with_scanner_errors
 from mlscorr.estimate.screening import Outlier
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import Support, WeakStretch
-from mlscorr.estimate.tie_value import TieValue, tie_value
+from mlscorr.estimate.tie_value import tie_value
 from mlscorr.estimate.tied import TieResiduals
 from mlscorr.estimate.tied_mounting import calibration_with_ties, previewed_mounting

@@ -7,5 +7,5 @@ from mlscorr.gap.contrast.distances import (
     innovation_distances,
 )
 from mlscorr.gap.contrast.replicas import replica_innovations
-from mlscorr.gap.contrast.sample import ChannelSample, SampleCollector
+from mlscorr.gap.contrast.sample import SampleCollector
 from mlscorr.gap.contrast.tables import Contrast
