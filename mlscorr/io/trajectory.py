@@ -209,7 +209,7 @@ def _trajectory_of(path, table):
 
 
 def _check_values(path, table):
-    """Refuse values that are not finite, sigmas below zero, and sigmas of zero throughout."""
+    """Refuse values that are not finite, sigmas below zero, and positions without any error."""
     for name, values in table.items():
         bad = ~np.isfinite(values)
         if bad.any():
@@ -217,7 +217,8 @@ def _check_values(path, table):
                 f"{bad.sum()} of {len(bad)} epochs of {path} have a {name} that is not a number "
                 f"(first: epoch {np.argmax(bad) + 1}). Remove these epochs."
             )
-        if name.startswith("sigma") and (values.min() < 0 or not values.any()):
+        is_nothing = name in POSITION_SIGMAS and not values.any()
+        if is_nothing or (name.startswith("sigma") and values.min() < 0):
             raise ValueError(
                 f"{(values <= 0).sum()} of {len(values)} epochs of {path} have a {name} of 0 or "
                 f"less (first: epoch {np.argmax(values <= 0) + 1}). Without it [pos] counts."
