@@ -12,7 +12,7 @@ from mlscorr.survey import Survey
 
 
 def shared_rows(
-    survey: Survey, patches: Patches, rng: np.random.Generator, limit: int
+    survey: Survey, patches: Patches, rng: np.random.Generator, limit: int = SETTINGS.patches // 2
 ) -> Rows | None:
     """Rows of the planes that were seen twice, or None where there are none.
 
