@@ -210,7 +210,7 @@ class CorrectionReport:
         return None, None, "nothing"
 
     def target_sigma(self, role: str) -> np.ndarray:
-        """RMS (3,) of one sigma of the misclosures of a role: of targets and their survey. m.
+        """RMS (3,) of one sigma of a role's misclosures: of targets and their survey. Units: m.
 
         Parameters
         ----------

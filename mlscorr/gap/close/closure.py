@@ -110,12 +110,12 @@ def close_gap(
     rows, used, cause = case.rows, case.used, case.cause
     kind = gap_kind(cause.effect, case.evidence.noisy, rows)
     unit = UNITS[kind]
-    whole = predict_whole(case, simulated)  # the largest, before there is a table of all rows
+    whole = predict_whole(case, simulated)  # takes most memory: before there is a table of all rows
     ruler = _Ruler.of(kind, case, cause.probability if callable(simulated) else 0.0)
     folds = make_folds(case, whole, ruler.observations, ruler.model, simulated, rng, progress)
     held = ruler.compare(folds, rng)
-    whole = replace(folds, fold=np.where(used, 0, -1), predicted=(folds.whole,))
-    gap, in_sample = _gap(held, unit), _gap(ruler.compare(whole, rng, used), unit)
+    fitted = replace(folds, fold=np.where(used, 0, -1), predicted=(whole,))
+    gap, in_sample = _gap(held, unit), _gap(ruler.compare(fitted, rng, used), unit)
     nothing = cause.effect == "none"
     return Closure(
         cause.effect,
