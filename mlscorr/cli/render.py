@@ -69,7 +69,11 @@ def render(
 
 def _read_size(text):
     """Width and height of a text such as 1920x1080."""
+    from mlscorr.report.render import PictureOptions, check_pictures, panel_size
+
     width, times, height = text.lower().partition("x")
     if not (times and width.strip().isdecimal() and height.strip().isdecimal()):
         raise ValueError(f"The size '{text}' is not width x height in pixels, as 1920x1080.")
-    return int(width), int(height)
+    page = int(width), int(height)
+    check_pictures(PictureOptions(panel_size(page)))  # before the survey is read
+    return page

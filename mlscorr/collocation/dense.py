@@ -16,12 +16,7 @@ from numba import njit
 from scipy.linalg import LinAlgError, block_diag, cholesky, solve_triangular
 
 from mlscorr.collocation.covariance import correlation
-from mlscorr.collocation.model import (
-    LARGEST_ERROR,
-    NOT_POSITIVE,
-    Collocation,
-    solve_trend,
-)
+from mlscorr.collocation.model import LARGEST_ERROR, NOT_POSITIVE, Collocation, solve_trend
 from mlscorr.collocation.sparse_rows import SparseRows
 from mlscorr.collocation.states import Layout
 

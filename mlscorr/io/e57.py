@@ -198,8 +198,7 @@ def _blocks(path, size):
             names += [INTENSITY] * (INTENSITY in scan.fields)
             start = scan.start if scan.starts else 0.0  # by its first times: one reader at a time
             with closing(scan.read(names, size)) as blocks:  # before the file is
-                for block in blocks:
-                    yield _source_block(scan, block, marks, start)
+                yield from (_source_block(scan, block, marks, start) for block in blocks)
 
 
 def _source_block(scan, block, marks, start):

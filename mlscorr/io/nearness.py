@@ -45,19 +45,25 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
             f"The control nearest to the trajectory lies {distance / 1e3:.1f} km from it "
             f"(limit {SETTINGS.far / 1e3:.0f} km): {path} and the trajectory may be in different "
             "CRS or zones. Bring both into the crs of survey.toml."
-            f"{_feet(points.position[:, :2], trajectory)}"
+            f"{_likely_change(points.position[:, :2], trajectory)}"
         )
 
 
-def _feet(position, trajectory):
-    """A sentence where points (n, 2) lie near the trajectory once feet are made metres."""
-    for factor, what in ((FOOT, "these points"), (1 / FOOT, "the trajectory")):
-        distance = distance_of(position * factor, trajectory) * min(1.0, 1.0 / factor)
+def _likely_change(position, trajectory):
+    """A sentence on what brings points (n, 2) near the trajectory; empty where nothing does."""
+    # Numbers of zones stand in front of six digits
+    zone = round(float(np.median(position[:, 0] - trajectory.position[0, 0])) / 1e6)
+    owners = ("these points", "the trajectory")
+    number = f"the number {abs(zone)} of a map zone taken off the eastings of {owners[zone < 0]}"
+    feet = f"multiply the coordinates by {FOOT} (by 1200/3937 where they are US survey feet)"
+    for what, factor, offset, remedy in (
+        (number, 1.0, zone * 1e6, f"they are {abs(zone)} 000 000 m too large"),
+        (f"{owners[0]} taken as feet", FOOT, 0.0, feet),
+        (f"{owners[1]} taken as feet", 1 / FOOT, 0.0, feet),
+    ):
+        distance = distance_of(position * factor - [offset, 0], trajectory) * min(1.0, 1.0 / factor)
         if distance < SETTINGS.near:
-            return (
-                f" With {what} taken as feet it is {distance:.0f} m: multiply the coordinates by "
-                f"{FOOT} (by 1200/3937 where they are US survey feet)."
-            )
+            return f" With {what} it is {distance:.0f} m: {remedy}."
     return ""
 
 

@@ -51,8 +51,7 @@ class _Vertices:
         """Records block by block."""
         if not self.is_text:
             whole = np.memmap(self.path, self.kind, "r", self.start, self.points)
-            for start in range(0, self.points, size):
-                yield whole[start : start + size]
+            yield from (whole[start : start + size] for start in range(0, self.points, size))
             return
         with self.path.open("rb") as file:
             file.seek(self.start)
@@ -139,8 +138,7 @@ def _header(path) -> _Vertices:
 def _intensities(vertices, intensity, size) -> Iterator[np.ndarray]:
     """Intensities block by block."""
     if intensity is not None:
-        for rows in vertices.read(size):
-            yield rows[intensity].astype(float)
+        yield from (rows[intensity].astype(float) for rows in vertices.read(size))
 
 
 def _blocks(vertices, time, intensity, size) -> Iterator[SourceBlock]:

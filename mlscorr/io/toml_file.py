@@ -14,6 +14,10 @@ from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
 Model = TypeVar("Model", bound=BaseModel)
 
 
+# The same known keys as those that the next sentence names
+REPEATED = re.compile(r"; known are ([^.]+)\.(?= \S+ is an unknown key; known are \1\.)")
+
+
 class TomlSection(BaseModel):
     """A part of a TOML file: no unknown keys, no numbers as text."""
 
@@ -86,7 +90,7 @@ def validate(source: str, document: dict[str, Any], model: type[Model]) -> Model
         return model.model_validate(document)
     except ValidationError as error:
         sentences = " ".join(_sentence(item, model) for item in _causes(error.errors()))
-        raise ValueError(f"{source}: {sentences}") from None
+        raise ValueError(f"{source}: {REPEATED.sub('.', sentences)}") from None
 
 
 def _causes(items):
@@ -124,6 +128,7 @@ def _sentence(item, model):
     message = item["msg"].replace("valid string", "valid string in quotation marks")
     message = re.sub(r"valid dictionary or instance of \w+", "section, in brackets", message)
     message = re.sub("(Input|List|Tuple) should", "it should", message)
+    message = message.replace(" after validation", "")
     return f"{key} = {shown(repr(item['input']))} can't be used: {message[0].lower()}{message[1:]}."
 
 

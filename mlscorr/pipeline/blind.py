@@ -224,8 +224,7 @@ def _in_processes(jobs, workers):
     with ProcessPoolExecutor(workers, context, threadpool_limits, (1,)) as pool:
         futures = {pool.submit(*job): job[1] for job in jobs}
         try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
+            yield from ((futures[future], future.result()) for future in as_completed(futures))
         finally:
             pool.shutdown(cancel_futures=True)
 

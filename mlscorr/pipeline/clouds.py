@@ -128,8 +128,7 @@ class MovedClouds:
         for part in self.survey.by_scanner.values():
             of_part = self.correction, part.scanner, part.mounting
             sigma = PointSigma.of(*of_part) if with_sigma else None
-            for file in part.clouds:
-                yield CorrectedPart(file, self.correction, sigma, watch)
+            yield from (CorrectedPart(file, self.correction, sigma, watch) for file in part.clouds)
 
 
 def write_counted(

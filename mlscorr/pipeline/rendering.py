@@ -59,12 +59,13 @@ def render(
     OSError
         When reading or writing fails.
     """
-    from mlscorr.report.render import PictureOptions, draw, panel_size
+    from mlscorr.report.render import PictureOptions, check_pictures, draw, panel_size
 
     check_survey(survey)
     check_output(out, [file.path for file in survey.inputs], overwrite)
     drawn = {name: options.pop(name) for name in ("views", "engine") if name in options}
     asked = PictureOptions(panel_size(size), panel_size(size, stacked=True), **options)
+    check_pictures(asked, **drawn)
     if corrected is None:
         result = correct(survey, progress=progress)
         correction, targets = result.estimate.correction, result.targets

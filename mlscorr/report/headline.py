@@ -98,8 +98,7 @@ def headline(report: CorrectionReport) -> str:
 def _result(report):
     """How far off the cloud was and is."""
     sentences, is_worse = verdict(report)
-    is_tested = report.judgement[2] == "check"
-    rating = "red" if is_worse else "green" if is_tested else "amber"
+    rating = "red" if is_worse else "green" if report.judgement[2] == "check" else "amber"
     return Statement("Result", rating, sentences[0], tuple(("", text) for text in sentences[1:]))
 
 
@@ -201,7 +200,8 @@ def _uncontrolled(report):
 def _weakest(report):
     """The parts of the drive that no control point holds.
 
-    They are no matter where their sigma is below the largest residual that the verdict rests on.
+    They are no matter where control holds other parts, and their sigma is below the largest
+    residual that the verdict rests on.
     """
     weak = report.support.weak
     if not weak and report.is_held_by_others:
@@ -217,7 +217,9 @@ def _weakest(report):
         "the correction is extrapolated there, and an error of up to "
         f"{length_in_words(largest)} is to be expected (one sigma)."
     )
-    rating = "green" if after is not None and largest <= after.maximum[4] else "amber"
+    is_partly_held = report.coverage.share_extrapolated < 1
+    is_small = is_partly_held and after is not None and largest <= after.maximum[4]
+    rating = "green" if is_small else "amber"
     return Statement("Weakest", rating, sentence, capped(_stretches(weak)))
 
 

@@ -9,7 +9,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter
 
-from mlscorr.report.map_frame import frame
+from mlscorr.report.map_frame import corners, frame
 from mlscorr.report.pages import Page, data_uri
 from mlscorr.report.style import new_figure, nice, styled, svg
 from mlscorr.report.target_map import write_names
@@ -55,9 +55,7 @@ def project_map(tracks: dict[str, np.ndarray]) -> Figure:
         As of write_project.
     """
     places = np.vstack([track[np.isfinite(track[:, 0])] for track in tracks.values()])
-    low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
-    margin = 0.06 * max(float((high - low).max()), 1.0)
-    low, high = low - margin, high + margin
+    low, high = corners(places[:, :2], 0.4)  # so wide that labels below it don't touch
     width, height = high - low
     figure = new_figure(1.0 + 6.0 * float(np.clip(height / width, 0.3, 1.3)))
     axes = figure.add_subplot()
@@ -68,6 +66,7 @@ def project_map(tracks: dict[str, np.ndarray]) -> Figure:
         ends = ends[np.isfinite(ends).all(axis=(1, 2))]
         size = 1000 * ends[:, :, 2].mean(axis=1)
         lines = LineCollection(ends[:, :, :2], array=size, norm=colours, cmap="viridis", lw=2.2)
+        lines.set_capstyle("round")  # a short drive is a dot
         axes.add_collection(lines)
     known = {name: track[np.isfinite(track[:, 0]), :2] for name, track in tracks.items()}
     write_names(axes, {name: (way[len(way) // 2], 1) for name, way in known.items()}, 1.2 * width)

@@ -118,8 +118,7 @@ class Trajectory(Summary):
     def scanned_passes(self) -> np.ndarray:
         """Start and end (k, 2) of what was scanned in the parts without a gap. Units: s."""
         time = self.gps_time[self.scanned_rows]
-        segment = self.segment(time)
-        first = np.flatnonzero(np.diff(segment, prepend=-1))
+        first = np.flatnonzero(np.diff(self.segment(time), prepend=-1))
         return np.column_stack([time[first], time[np.append(first[1:], len(time)) - 1]])
 
     def scanned_at(self, seconds: np.ndarray) -> Trajectory:

@@ -64,8 +64,7 @@ def _fit_piece(cloud, path, region, shapes, scanner, rng):
 def _end_of(chunk):
     """The end of a chunk, at most a quarter of it: a scanner passes a target within a second."""
     first = int((1.0 - SETTINGS.largest_carry) * len(chunk))
-    late = chunk.gps_time[first:] > chunk.gps_time.max() - MATCHING.pause / 2
-    return chunk[first:][late]
+    return chunk[first:][chunk.gps_time[first:] > chunk.gps_time.max() - MATCHING.pause / 2]
 
 
 def _pieces(cloud, survey):

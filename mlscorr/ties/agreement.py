@@ -162,6 +162,5 @@ def group_by_time(ties: Ties, side: int, duration: float) -> np.ndarray:
     duration : float
         Of a stretch. Units: s.
     """
-    stretch = np.floor(ties.gps_time[:, side] / duration)
-    keys = np.column_stack([ties.pass_number, stretch])
+    keys = np.column_stack([ties.pass_number, np.floor(ties.gps_time[:, side] / duration)])
     return np.unique(keys, axis=0, return_inverse=True)[1].ravel()

@@ -207,6 +207,20 @@ def test_all_wrong_keys_come_in_one_error(folder):
     assert str(e.value).count("unknown key") >= 3
 
 
+def test_the_known_keys_beside_unknown_ones_come_once(folder):
+    "Three keys that are like none are named, then what is known there; numbers are counted plainly"
+    toml(folder, "[cloud]", "qq = 1\nzzz = 2\nxxx = 3\n[cloud]")
+    toml(
+        folder,
+        "[control]",
+        "[mounting]\nlever_arm = [1, 1, 1, 1]\nboresight = [1, 1, 1]\n[control]",
+    )
+    with pytest.raises(ValueError, match="should have at most 3 items, not 4") as error:
+        read_survey_file(folder)
+    assert str(error.value).count("unknown key") == 3
+    assert str(error.value).count("known are name, crs") == 1
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -342,6 +356,12 @@ def test_control_of_another_zone_is_refused(folder):
     "The same points in the next zone lie hundreds of km off: distance and cause are named"
     with pytest.raises(ValueError, match=r"lies 57\d\.\d km from it .limit 5 km.*CRS or zones"):
         read_survey(exchange(folder, lambda e, n: (e - 573_000.0, n + 12_000.0)))
+
+
+def test_the_number_of_a_zone_in_front_of_eastings_is_named(folder):
+    "50 532 010 for 532 010 m, as offices write it: 50 000 km off, and metres without the 50"
+    with pytest.raises(ValueError, match=r"the number 50 of a map zone .* it is \d+ m: .* 50 000"):
+        read_survey(exchange(folder, lambda e, n: (e + 50e6, n)))
 
 
 def test_far_control_points_beside_near_ones_are_normal(folder):

@@ -189,6 +189,11 @@ def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
     assert any(text.startswith("Only 2 control") for text in check_project(folder).warnings)
     (folder / "control.csv").write_text("\n".join([header, points[-1], ""]))
     assert any("(first: far)" in fault.sentence for fault in check_project(folder).faults)
+    (folder / "control.csv").write_text(header + "\n")
+    (fault,) = check_project(folder).faults
+    assert fault.sentence.startswith("None of the 0 control points")
+    with pytest.raises(ValueError, match=r"None of the 0 control .* by the headers.* --ties-only"):
+        correct_project(folder, tmp_path / "out", QUICK)
 
 
 def test_a_project_of_one_drive_is_its_survey(project, tmp_path):

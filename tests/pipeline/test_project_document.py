@@ -34,3 +34,12 @@ def test_a_doubt_is_told_by_its_reason(lack):
     content = first_screen(report)
     assert content["rating"] != "green"
     assert CHANGES[lack] in _reason({"rating": content["rating"], "meaning": ""}, content)
+
+
+def test_the_first_warning_of_a_drive_is_told_beside_its_doubt():
+    "A cloud of another survey is a warning, and the cause of all else that is wrong with the drive"
+    report = replace(fabricate(drive(), checks=False)[2], support=Support())
+    report.model["warnings"] = ["The points lie 400 km beside the trajectory."]
+    content = first_screen(report)
+    told = _reason({"rating": content["rating"], "meaning": ""}, content)
+    assert told.startswith("No check point was surveyed") and told.endswith("the trajectory.")

@@ -53,6 +53,18 @@ def test_the_command_writes_pictures_of_the_asked_size(survey, commanded, tmp_pa
         render(survey, out, commanded[1], (640, 360))
 
 
+@pytest.mark.parametrize(
+    "size, options, words",
+    [((10, 10), {}, "5 x 8 pixels"), ((640, 360), {"views": ["side"]}, "no view 'side'")],
+)
+def test_what_cannot_be_drawn_is_refused_before_anything_is_read(
+    survey, tmp_path, size, options, words
+):
+    "A page of 10 x 10 pixels and an unknown view come before results that are not there"
+    with pytest.raises(ValueError, match=words):
+        render(survey, tmp_path / "pictures", tmp_path, size, **options)
+
+
 def test_results_of_another_survey_are_refused(survey, commanded, tmp_path):
     "A folder without results, and a trajectory of other epochs, are told apart"
     with pytest.raises(ValueError, match=r"no trajectory.csv and no report.json"):

@@ -143,6 +143,16 @@ def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_w
         assert row.items[0][0] == "50.0 to 61.5 s, 300 to 360 m of the way"
 
 
+def test_a_correction_that_is_extrapolated_everywhere_is_never_green():
+    "Where ties alone make it, a sigma below the misclosures says nothing of where the cloud lies"
+    report = fabricate(drive())[2]
+    everywhere = replace(report.coverage, points_extrapolated=report.coverage.points_corrected)
+    weak = Support((WeakStretch(0.0, 60.0, 300.0, 0.0001, "a"),))
+    rows = statements(replace(report, coverage=everywhere, support=weak))
+    (row,) = (row for row in rows if row.what == "Weakest")
+    assert row.rating == "amber" and "100 % of the points" in row.sentence
+
+
 def test_a_sigma_beyond_what_the_pos_states_is_amber():
     "Metres along half of the way where centimetres are stated: the correction is hardly one"
     report = replace(fabricate(drive())[2], support=Support())

@@ -21,3 +21,15 @@ def test_names_of_drives_from_one_yard_do_not_cover_one_another():
     boxes = [text.get_window_extent() for text in names]
     assert 6 < len(names) <= 12
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def test_labels_of_a_project_that_runs_north_do_not_touch():
+    "Six kilometres of one avenue: the map is widened until its eastings can be read"
+    way = np.linspace(0.0, 6000.0, 50)  # m
+    track = np.column_stack([532_000.0 + 0.01 * way, 3_374_000.0 + way, 0.01 + 1e-6 * way])
+    figure = project_map({"monday": track})
+    figure.draw_without_rendering()
+    labels = [label for label in figure.axes[0].get_xticklabels() if label.get_text()]
+    boxes = [label.get_window_extent() for label in labels]
+    assert len(boxes) >= 2
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])

@@ -112,8 +112,7 @@ def collect_beams(
 
 def _patches_behind(rows, patches):
     """The patches behind rows, told by their sample pulses; in order of their cells."""
-    on_target = np.isin(rows.pulses.item, rows.item[rows.channel == "target"])
-    pulses = rows.pulses[~on_target]
+    pulses = rows.pulses[~np.isin(rows.pulses.item, rows.item[rows.channel == "target"])]
     if len(pulses) == 0 or patches is None:
         return []
     known = {(time, *xyz): i for i, (time, xyz) in enumerate(_first(patches.time, patches.xyz))}

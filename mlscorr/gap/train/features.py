@@ -59,8 +59,7 @@ def drive(rng: Generator, passes: int = 2, duration: float = 75.0) -> Trajectory
         time = START + number * (duration + 60.0) + t
         parts.append((time, xyz + ORIGIN, np.unwrap(heading), pitch, roll))
     time, position, heading, pitch, roll = (np.concatenate(p) for p in zip(*parts, strict=True))
-    attitude = attitude_from_angles(roll, pitch, heading)
-    return Trajectory(time, position, attitude)
+    return Trajectory(time, position, attitude_from_angles(roll, pitch, heading))
 
 
 def _sightings(survey, place):

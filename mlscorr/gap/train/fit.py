@@ -98,8 +98,7 @@ def _fit_of(of_kind, factor, floor):
 
 def _out_of_fold(records, penalty):
     x, names, y = _table(records)
-    worlds = np.array([r.world for r in records])
-    fold = np.unique(worlds, return_inverse=True)[1] % FOLDS
+    fold = np.unique(np.array([r.world for r in records]), return_inverse=True)[1] % FOLDS
     probabilities: list = [None] * len(records)
     for number in np.unique(fold):
         train = np.flatnonzero(fold != number)

@@ -14,7 +14,7 @@ from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
 from mlscorr.pipeline.faults import Faults
 from mlscorr.pipeline.needs import Amount
 from mlscorr.pipeline.project.file_tasks import read_tile
-from mlscorr.pipeline.project.stages import planned_drive, tile_tasks
+from mlscorr.pipeline.project.stages import check_control_near, planned_drive, tile_tasks
 from mlscorr.survey import Survey
 
 NO_CONTROL = (
@@ -92,15 +92,12 @@ def _check_control(project, checked, faults):
     names = [*project.control.name, *project.check.name]
     held = near.intersection(project.control.name)
     faults.warn(*few_targets(len(held)))
-    if far := [name for name in names if name not in near]:
-        sentence = (
+    faults.of("data", check_control_near, project, [survey for survey, _ in checked])
+    if held and (far := [name for name in names if name not in near]):
+        faults.warn(
             f"{len(far)} of the {len(names)} surveyed points of {project.path} lie near no cloud "
             f"by the headers (first: {far[0]})."
         )
-        if held:
-            faults.warn(sentence)
-        else:
-            faults.add("data", sentence)
 
 
 def _all(what: str, checked: Sequence[tuple[Survey, CheckedSurvey]]) -> Iterable[str]:

@@ -133,5 +133,4 @@ def drives_by_areas(
     for of_area in work(inputs):
         for result in of_area:
             results[result.state.name].append(result)
-    for drive in drives:
-        yield merged_drive(drive, results.pop(drive.survey.name))
+    yield from (merged_drive(drive, results.pop(drive.survey.name)) for drive in drives)

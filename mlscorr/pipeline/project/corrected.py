@@ -76,8 +76,7 @@ def corrected_drives(
     joint, estimate = part.joint, part.estimate
     states = [_state(part, number, area) for number in range(len(joint.drives))]
     if joint.is_single and area is None:
-        whole = CorrectedSurvey(**drive_fields(joint.drives[0], estimate))
-        return [(whole, states[0])]
+        return [(CorrectedSurvey(**drive_fields(joint.drives[0], estimate)), states[0])]
     estimates = drive_estimates(joint, estimate, [tied_sentence(state) for state in states])
     places = place_control(estimate)
     section = {} if area is not None else tie_section(estimate) or {}  # an area is no drive

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -32,6 +32,7 @@ from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.stages import (
     PlannedDrive,
     area_tasks,
+    check_control_near,
     cloud_tasks,
     finding_tasks,
     planned_drive,
@@ -188,7 +189,9 @@ class _Work:
                 f"None of the {len(tasks)} cloud files of {self.project.path} can be read. The "
                 f"first: {self.run.faults[0].fault}"
             )
-        if self.ties == "only":
+        if self.ties != "only":
+            check_control_near(self.project, [drive.survey for drive in planned])
+        else:
             planned = [replace(d, survey=without_control(d.survey)) for d in planned]
         return planned
 
@@ -219,7 +222,12 @@ class _Work:
             own = [findings[task.name] for task in tasks if task.drive == drive.survey.name]
             drives.append(found_drive(drive.survey, own))
         if self.ties != "only" and not any(len(drive.control) for drive in drives):
-            raise ValueError(_nothing_found(self.project, drives))
+            near = sum(len(drive.survey.control) for drive in drives)
+            raise ValueError(
+                f"None of the {len(self.project.control)} control points of {self.project.path} "
+                f"was found in the clouds of {len(drives)} drives; {near} times one lies within a "
+                "cloud's bounds. Are CRS, kind and size of the targets right? Or use --ties-only."
+            )
         key = digest(sorted(keys.values()))
         results = project_drives(
             drives, self.options.order, origin, self.ties != "off", partial(self._areas, key)
@@ -287,14 +295,3 @@ def _is_there(store, key):
     except KeyError:
         return False
     return True
-
-
-def _nothing_found(project, drives: Sequence) -> str:
-    """The sentence for drives without any control point."""
-    near = sum(len(drive.survey.control) for drive in drives)
-    return (
-        f"None of the {len(project.control)} control points of {project.path} was found in the "
-        f"clouds of {len(drives)} drives; {near} times one lies within a cloud's bounds. Are "
-        "control and clouds in the same CRS, and kind and size of the targets right? Ties alone "
-        "bring drives together with --ties-only."
-    )

@@ -210,23 +210,27 @@ def _minded(rows, reports):
     ]
     if doubts:
         doubts.sort(key=lambda doubt: -headline.RATINGS.index(doubt[0]))
-        sentence = f"{len(doubts)} of {len(rows)} drives have something to mind."
+        have = "has" if len(doubts) == 1 else "have"
+        sentence = f"{len(doubts)} of {len(rows)} drives {have} something to mind."
         items = headline.capped(doubt[1:] for doubt in doubts)
         yield headline.Statement("Doubts", doubts[0][0], sentence, items)
 
 
 def _reason(row, report):
-    """Why a drive is rated as it is: a result says first what the correction brought."""
+    """Why a drive is rated as it is, and the first warning of it, which may be the cause.
+
+    A result says first what the correction brought.
+    """
     facts = [fact for fact in report["statements"] if fact["rating"] == row["rating"]]
     if not facts:
         return row["meaning"]
     first, texts = facts[0], [item["text"] for item in facts[0]["items"]]
-    if first["what"] == "Warnings":  # whose sentence counts them alone
-        return texts[0]
+    reason = "" if first["what"] == "Warnings" else first["sentence"]  # that counts them alone
     if first["what"] == "Result" and texts:
         _, *worse = texts  # after the figures
-        return worse[0] if worse else facts[1]["sentence"]  # check points: none, or some missing
-    return first["sentence"]
+        reason = worse[0] if worse else facts[1]["sentence"]  # check points: none, or some missing
+    warned = [fact["items"][0] for fact in report["statements"] if fact["what"] == "Warnings"]
+    return " ".join([reason, *(item["text"] for item in warned)]).strip()
 
 
 def _lost(number):

@@ -181,8 +181,7 @@ def _support(parts, home, corrected):
             codes[inside] = REASONS.index(stretch.why)
     outages: list[tuple[float, float]] = []
     for each in sorted(span for part in parts for span in part.estimate.support.outages):
-        joins = bool(outages) and each[0] <= outages[-1][1]
-        first, last = outages.pop() if joins else each
+        first, last = outages.pop() if outages and each[0] <= outages[-1][1] else each
         outages.append((first, max(last, each[1])))
     steps = {step for part in parts for step in part.estimate.support.steps}
     return Support(tuple(weak_stretches(codes, corrected)), tuple(outages), tuple(sorted(steps)))

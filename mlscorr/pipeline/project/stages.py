@@ -128,6 +128,28 @@ def planned_drive(project: ProjectParts, drive: DriveParts, tiles: Sequence[Tile
     return PlannedDrive(survey, boxes, {path: FileIdentity.of(path) for path in boxes})
 
 
+def check_control_near(project: ProjectParts, surveys: Sequence[Survey]) -> None:
+    """Refuse drives of which none has a control point near its clouds, before these are read.
+
+    Parameters
+    ----------
+    project : ProjectParts
+    surveys : sequence of Survey
+        Of planned drives.
+
+    Raises
+    ------
+    ValueError
+    """
+    if surveys and not any(len(survey.control) for survey in surveys):
+        first = f" (first: {project.control.name[0]})" if len(project.control) else ""
+        raise ValueError(
+            f"None of the {len(project.control)} control points of {project.path}{first} lies near "
+            f"a cloud of its {len(surveys)} drives by the headers. Is the list under [control] "
+            "whole, and in the CRS of the clouds? --ties-only does without any."
+        )
+
+
 def near_boxes(survey: Survey, points: ControlPoints, boxes: Iterable[np.ndarray]) -> ControlPoints:
     """The surveyed points whose images may lie in boxes that headers state.
 

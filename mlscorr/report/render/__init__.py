@@ -1,5 +1,5 @@
 """Pictures of a cloud before and after its correction, drawn without a display or a GPU."""
 
-from mlscorr.report.render.drawing import draw
+from mlscorr.report.render.drawing import check_pictures, draw
 from mlscorr.report.render.picture import Picture, panel_size
 from mlscorr.report.render.view import PictureOptions

@@ -69,7 +69,7 @@ def draw(
     ValueError
         For a view, colour, engine or size that there is not, and for a cloud without points.
     """
-    _check(options, views, engine)
+    check_pictures(options, views, engine)
     stream = _stream(survey, chunks, progress)
     rows = recomputed([row for row in targets if row.is_observed], correction)
     to_draw = _views(survey, correction, rows, views, options, stream("Looking at the cloud"), ties)
@@ -92,7 +92,21 @@ def draw(
             yield sheet.finished()
 
 
-def _check(options, views, engine):
+def check_pictures(
+    options: PictureOptions, views: Sequence[str] = VIEWS, engine: str = "zbuffer"
+) -> None:
+    """Refuse what can't be drawn.
+
+    Parameters
+    ----------
+    options, views, engine
+        As in draw.
+
+    Raises
+    ------
+    ValueError
+        For a view, colour, engine or size that there is not.
+    """
     choices = (
         ("view", views, VIEWS),
         ("engine", [engine], ENGINES),

@@ -81,8 +81,7 @@ def _symbols(rows, state, times) -> Iterator[Mark]:
     for row in rows:
         arrow = [row.surveyed, row.surveyed + times * getattr(row, state)]
         yield Mark("residual", np.stack(arrow), f"{times:,.0f}")
-    for row in rows:
-        yield Mark(row.group, row.surveyed[None], row.name)
+    yield from (Mark(row.group, row.surveyed[None], row.name) for row in rows)
 
 
 def section(

@@ -47,8 +47,7 @@ def in_slices(n: int, kernel: Callable, rows: tuple, constants: tuple) -> list:
         Its other arguments.
     """
     parts = min(WORKERS, 1 + n // 4_000)  # rows that are worth a thread
-    bounds = np.linspace(0, n, parts + 1).astype(int)
-    slices = [slice(*pair) for pair in pairwise(bounds)]
+    slices = [slice(*pair) for pair in pairwise(np.linspace(0, n, parts + 1).astype(int))]
 
     def work(part):
         return part.start, kernel(*(row[part] for row in rows), *constants)
