@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
+from string import Formatter
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def register(kind: type[Effect]) -> type[Effect]:
                 velocity = np.gradient(value.position, value.gps_time, axis=0)
                 return self.magnitude * (velocity**2).sum(axis=1)[:, None] * [0.0, 0.0, 1.0]
     """
-    required = ("name", "stage", "title", "meaning", "sentence", "remedy")
+    required = ("name", "stage", "title", "meaning", "sentence", "remedy", "sides")
     missing = [key for key in required if not getattr(kind, key, "")]
     if missing:
         raise ValueError(f"{kind.__name__} doesn't say its {', '.join(missing)}; see Effect.")
@@ -88,8 +89,13 @@ def register(kind: type[Effect]) -> type[Effect]:
         raise ValueError(f"{kind.name} is an effect of mlscorr already; take another name.")
     _known_stage(kind.stage)
     count = 2 if kind.is_wave() else size.count
-    if len(kind.parts) != count or (count == size.count > 1 and len(kind.sides) != count):
+    if len(kind.parts) != count or (count == size.count and len(kind.sides) != max(count, 2)):
         raise ValueError(f"{kind.name} names {len(kind.parts)} parts and sides of {count}.")
+    words = ("size", "where", *["side"] * (count == 1))
+    if strange := {word for _, word, *_ in Formatter().parse(kind.sentence)} - {None, *words}:
+        raise ValueError(
+            f"{kind.name} knows {', '.join(words)} in its sentence, not {min(strange)}."
+        )
     _registered[kind.name] = kind
     return kind
 

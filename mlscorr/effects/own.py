@@ -35,11 +35,8 @@ def register_file(path: Path | str) -> tuple[type[Effect], ...]:
         raise ValueError(f"{path} is no Python file: its name must end in .py.")
     try:
         spec.loader.exec_module(module_from_spec(spec))
-    except (
-        Exception,
-        SystemExit,
-    ) as error:  # whatever a user's code raises is said, not shown as ours
-        line = f" (line {error.lineno})" if isinstance(error, SyntaxError) else ""
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
+        line = f" (line {error.lineno})" if isinstance(error, SyntaxError) and error.lineno else ""
         raise ValueError(f"{path} can't be run{line}: {type(error).__name__}: {error}") from error
     effects = tuple(kind for kind in known_effects() if kind not in before)
     if not effects:

@@ -167,6 +167,9 @@ def test_streams_of_the_library_stay_what_they_are(monkeypatch):
         ({"name": "boresight"}, "boresight is an effect of mlscorr already"),
         ({"stage": "clocks"}, "'clocks' is an unknown stage; known are beam, clock"),
         ({"parts": ("up", "down")}, "squat names 2 parts and sides of 1"),
+        ({"sides": ()}, "Squat doesn't say its sides"),
+        ({"sides": ("high",)}, "squat names 1 parts and sides of 1"),
+        ({"sentence": "It is {size} too {sides}."}, "squat knows size, where, side .* not sides"),
         ({"quantities": classmethod(lambda cls: {})}, "squat has no magnitude with unit, typical"),
     ],
 )
