@@ -52,6 +52,15 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
         coordinates).
     FileNotFoundError
         For files that aren't there.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(drive={"duration": 4.0}, targets={"control": 3, "check": 1})
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> survey = mlscorr.read_survey(folder)
+    >>> len(survey.control), len(survey.trajectory)
+    (3, 401)
     """
     path = survey_toml(path)
     parts = read_parts(path, read_survey_file(path, planned))

@@ -63,6 +63,19 @@ def check(path: str | Path) -> CheckedSurvey:
     Returns
     -------
     CheckedSurvey
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 4.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> checked = mlscorr.check(folder)
+    >>> checked.faults, len(checked.warnings)
+    ((), 0)
     """
     first = Faults()
     with glance():

@@ -58,6 +58,20 @@ def render(
         For bad input.
     OSError
         When reading or writing fails.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> survey, out = mlscorr.read_survey(folder), tempfile.mkdtemp()
+    >>> drawn = mlscorr.render(survey, out, size=(640, 360), views=["overview"])
+    >>> [picture["file"] for picture in drawn["pictures"]]
+    ['overview.png']
     """
     from mlscorr.report.render import PictureOptions, check_pictures, draw, panel_size
 

@@ -92,6 +92,14 @@ def init(
     ValueError
         Where survey.toml is there, where files are missing, ambiguous or do not fit, with what is
         to be added.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(drive={"duration": 4.0}, targets={"control": 3, "check": 1})
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> mlscorr.init(folder, f"{folder}/started.toml").write().name
+    'started.toml'
     """
     folder, given = Path(folder), given or {}
     if not folder.is_dir():
