@@ -49,8 +49,8 @@ def size(value: float | None, sigma: float | None = None, unit: str = "m") -> st
 
     >>> size(0.0045256, 0.000527, "s"), size(0.0932, 0.0041), size(1.7e-5, None, "s per s")
     ('4.5 ms ± 0.5 ms', '93 mm ± 4 mm', '17 ppm')
-    >>> size(0.2134, 0.0123, "deg"), size(None, None)
-    ('0.213° ± 0.012°', '–')
+    >>> size(0.2134, 0.0123, "deg"), size(-2.3e-5, 0.0011), size(None, None)
+    ('0.213° ± 0.012°', '0.0 mm ± 1.1 mm', '–')
     """
     if not known(value):
         return DASH
@@ -61,6 +61,7 @@ def size(value: float | None, sigma: float | None = None, unit: str = "m") -> st
         return figures(value, 2) + word
     sigma = factor * sigma
     places = _decimals(sigma)
+    value = round(value, places) + 0.0  # no -0.0
     return f"{value:.{places}f}{word} ± {sigma:.{places}f}{word}"
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from mlscorr.effects import Effect, effect_class
 from mlscorr.effects.labels import lowered, title
+from mlscorr.effects.wording import size
 from mlscorr.gap.close.closure import Closure
 from mlscorr.gap.infer.causes import Inference
 from mlscorr.gap.infer.separability import Separability
@@ -101,11 +102,7 @@ def _sentence(inference):
         )
     if verdict.label == "unknown":
         return f"No known effect explains it ({chance}): it looks like a {verdict.lead}."
-    sizes = [
-        f"{parameter.name} {parameter.estimate:.4g} {parameter.unit}"
-        + (f" ± {parameter.sigma:.2g}" if np.isfinite(parameter.sigma) else "")
-        for parameter in cause.parameters
-    ]
+    sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in cause.parameters]
     do = "explain" if "+" in verdict.label else "explains"
     return f"{title(verdict.label)} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
 
@@ -171,8 +168,8 @@ def separability_document(compared: Separability) -> dict:
     """
     detectable, names = defaultdict(list), compared.names
     columns = zip(names, compared.effects, compared.units, compared.detectable, strict=True)
-    for name, effect, unit, size in columns:
-        detectable[effect].append({"name": name, "unit": unit, "detectable": float(size)})
+    for name, effect, unit, limit in columns:
+        detectable[effect].append({"name": name, "unit": unit, "detectable": float(limit)})
     return {
         "classes": [list(members) for members in compared.classes],
         "correlation": {"names": list(names), "matrix": compared.correlation.tolist()},
@@ -219,9 +216,10 @@ def _innovations(rows, where):
 
 
 def _windows(cause, survey):
-    """When the events of a cause act."""
+    """When the events of a cause act, as far as the drive reaches."""
+    first, last = survey.trajectory.gps_time[[0, -1]].tolist()
     return [
-        {"effect": name, "start": start, "end": end}
+        {"effect": name, "start": max(start, first), "end": min(end, last)}
         for name, start, end in cause.stretches(survey.trajectory)
     ]
 

@@ -129,14 +129,13 @@ def read_effects(source: str | Path) -> tuple[Effect, ...]:
         return (make_effect(name, magnitude=values if len(values) > 1 else values[0]),)
     if not Path(source).is_file():
         raise ValueError(
-            f"{source} is neither a gap.json or calibration.json nor NAME=SIZE with one of "
-            f"{joined(TAKEN_OUT, 'or')}, as time_offset=0.005 (s)."
+            f"There is no file {source}: neither a gap.json or calibration.json nor NAME=SIZE with "
+            f"one of {joined(TAKEN_OUT, 'or')}, as time_offset=0.005 (s)."
         )
     try:
         content = json.loads(Path(source).read_text(encoding="utf-8"))
-        return {"mlscorr.gap/1": _of_gap, "mlscorr.calibration/1": _of_calibration}[
-            content["schema"]
-        ](content)
+        readers = {"mlscorr.gap/1": _of_gap, "mlscorr.calibration/1": _of_calibration}
+        return readers[content["schema"]](content)
     except (KeyError, TypeError, json.JSONDecodeError):
         raise ValueError(
             f"{source} is no gap.json or calibration.json of mlscorr, or not one of a single "

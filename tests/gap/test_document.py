@@ -1,12 +1,15 @@
 """What gap.json says of a survey, its effects and their separability."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.document import map_document, separability_document
+from mlscorr.gap.document import _windows, map_document, separability_document
+from mlscorr.gap.infer.causes import Cause
+from mlscorr.gap.infer.error_models import STATED
 from mlscorr.gap.infer.separability import Separability
 from mlscorr.gap.train import features
 
@@ -32,6 +35,16 @@ def test_the_map_holds_the_way_and_all_targets():
     assert [(t["name"], t["role"]) for t in content["targets"]] == [
         (name, "control") for name in survey.control.name
     ]
+
+
+def test_an_event_is_told_no_farther_than_the_drive_reaches():
+    "An error of an hour about a drive of minutes says nothing of the time before and after it"
+    survey = features.geometry(3, targets=6, patches=0, rough=False).survey
+    first, last = survey.trajectory.gps_time[[0, -1]]
+    model = replace(STATED, windows=((first - 1800.0, 3600.0 + last - first, 2.0, "rise"),))
+    cause = Cause("position_noise", 1.0, (), (), np.zeros(6), model=model)
+    (window,) = _windows(cause, survey)
+    assert (window["start"], window["end"]) == (first, last)
 
 
 def test_an_effect_is_told_as_a_scenario_names_it():

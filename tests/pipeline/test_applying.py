@@ -110,7 +110,10 @@ def test_a_document_that_names_nothing_to_take_out_is_refused(content, sentence,
     ("found", "sentence"),
     [
         ("time_offset=late", "'late' is no number"),
-        ("nosuch.json", "neither a gap.json or calibration.json nor NAME=SIZE"),
+        (
+            "nosuch.json",
+            "no file nosuch.json: neither a gap.json or calibration.json nor NAME=SIZE",
+        ),
         ("range_bias=0.1", "neither a gap.json"),
         ("boresight=40,0,0", "exceeds 10 deg"),
     ],

@@ -133,10 +133,12 @@ def rows_against(
         f" No pulse of the same time has its point within {SETTINGS.cell:g} m of the real one: "
         "another clock, other beams or another place was simulated."
     )
+    is_whole = targets == len(matched) and by_beams + by_place == number
     return rows, (
         f"Of {simulated.name}, {targets} of {len(matched)} observed targets were paired, and "
         f"{by_beams + by_place} of {number} patches ({by_beams} by pulses of the same times, "
-        f"{by_place} by place); the rest is not compared.{elsewhere * (by_beams == 0 < number)}"
+        f"{by_place} by place){'.' if is_whole else '; the rest is not compared.'}"
+        f"{elsewhere * (by_beams == 0 < number)}"
     )
 
 
