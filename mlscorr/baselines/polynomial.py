@@ -66,7 +66,9 @@ def fit_literal(
     """
     gps_time = matched.gps_time
     _require_epochs(gps_time, order)
-    c0 = _stated_variance(stated_sigma(trajectory, pos, gps_time))
+    stated = stated_sigma(trajectory, pos, gps_time)
+    turns = np.einsum("nij,nij->ni", stated.attitude, stated.attitude)  # about the map's axes
+    c0 = np.append(np.mean(stated.position**2, axis=0), turns.mean(axis=0))
     partials = pose_partials(trajectory, matched.observations.position, gps_time)  # B
     correlation_time = SETTINGS.interval_ratio * trajectory.control_interval(gps_time)
     solved = _solve(matched, order, [LiteralSignal(partials, c0, c0, correlation_time)])
@@ -111,9 +113,3 @@ def _require_epochs(gps_time, order):
             f"(section 2.4.2 of the paper); here are {count}, {SAME_EPOCH:.0f} s or more "
             "apart."
         )
-
-
-def _stated_variance(stated):
-    """Mean variance (6,) that the POS states: position, and small rotations about the map axes."""
-    about_map = np.einsum("nij,nij->ni", stated.attitude, stated.attitude)
-    return np.append(np.mean(stated.position**2, axis=0), about_map.mean(axis=0))

@@ -142,8 +142,8 @@ class Correction(Summary):
 
     def apply(self, cloud: PointCloud) -> PointCloud:
         """Corrected PointCloud; points outside the trajectory are left as they were."""
-        increments, _ = self.increments(cloud.xyz, cloud.gps_time)
-        return PointCloud(cloud.xyz + increments, cloud.gps_time, cloud.intensity)
+        moved, _ = self.increments(cloud.xyz, cloud.gps_time)
+        return PointCloud(np.add(cloud.xyz, moved, out=moved), cloud.gps_time, cloud.intensity)
 
     def shift_integers(
         self,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.settings import SETTINGS
@@ -65,7 +65,7 @@ class AddedUnknowns:
         covariance = np.linalg.inv(columns.T @ weights + np.diag(prior_sigma**-2.0))
         right = weights.T @ misclosures_of(equations)
         correction = covariance @ right
-        critical = float(chi2.isf(SETTINGS.significance, len(correction)))
+        critical = float(chdtri(len(correction), SETTINGS.significance))
         return cls(correction, covariance, response, float(right @ correction), critical)
 
     @property

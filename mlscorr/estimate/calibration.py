@@ -153,13 +153,9 @@ class Calibration(Summary):
     @property
     def shared_warnings(self) -> tuple[str, ...]:
         """Those of the sentences that concern all scanners."""
-        return (
-            *self.notes,
-            *_few_control(self.equations),
-            *global_test_warnings(self.guards),
-            *self.screening.warnings,
-            *(() if self.ties is None else self.ties.warnings),
-        )
+        of_control = *_few_control(self.equations), *global_test_warnings(self.guards)
+        of_ties = () if self.ties is None else self.ties.warnings
+        return *self.notes, *of_control, *self.screening.warnings, *of_ties
 
     @property
     def parameters(self) -> tuple[tuple[SignalParameters, float], ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.estimate.equations import Equations
@@ -162,7 +162,7 @@ def _global_test(equations, parameters):
     if expected < SETTINGS.smallest_redundancy:
         return None
     redundancy = 2 * expected**2 / variance
-    upper = chi2.isf(SETTINGS.significance, redundancy)
+    upper = chdtri(redundancy, SETTINGS.significance)
     return GlobalTest(float(statistic * redundancy / expected), float(redundancy), float(upper))
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 from threadpoolctl import threadpool_limits
 
 from mlscorr.estimate.added_unknowns import AddedUnknowns
@@ -107,7 +107,7 @@ def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
         sigma = np.sqrt(np.diag(covariance))
         statistic = lacks @ np.linalg.solve(covariance, lacks)
         is_large = np.abs(lacks) > np.maximum(SETTINGS.setup_sigmas * sigma, least)
-        if statistic > chi2.isf(SETTINGS.significance, len(lacks)) and is_large.any():
+        if statistic > chdtri(len(lacks), SETTINGS.significance) and is_large.any():
             both = list(zip(scale * lacks, scale * sigma, strict=True))
             arm = ", ".join(f"{a:.0f} ± {s:.0f}" for a, s in both[:3])
             turn = ", ".join(f"{a:.2f} ± {s:.2f}" for a, s in both[3:])

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.estimate.assembly import with_fallbacks
@@ -109,7 +109,7 @@ def _contradicted(equations, parameters):
     if number == 0:
         return None
     solved, first = equations.solve(parameters), 3 * (len(equations.gps_time) - number)
-    critical = chi2.isf(SETTINGS.significance / number, 3)
+    critical = chdtri(3, SETTINGS.significance / number)
     statistics = []
     for step in range(number):
         residual, covariance = solved.leave_out(np.arange(3) + first + 3 * step)

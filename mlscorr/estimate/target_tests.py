@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtri
 
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Objective, Posterior
@@ -43,7 +43,7 @@ class TargetTest:
     @property
     def detectable(self) -> np.ndarray:
         """Least error (k, 3) that w finds in 4 of 5 cases. Units: m."""
-        factor = norm.isf(SETTINGS.significance / 2) + norm.isf(SETTINGS.undetected)
+        factor = -ndtri(SETTINGS.significance / 2) - ndtri(SETTINGS.undetected)
         return factor * self.sigma  # Baarda's usual 4.13
 
     @property
@@ -112,7 +112,7 @@ def _test(equations, name, left_out, targets):
     sure of itself decides nor one that the target itself has raised.
     """
     rows = equations.target_rows[name]
-    critical = float(chi2.isf(SETTINGS.significance / targets, len(rows)))
+    critical = float(chdtri(len(rows), SETTINGS.significance / targets))
     if not left_out:
         nothing = np.full((len(rows) // 3, 3), np.nan)
         return TargetTest(name, float("nan"), critical, nothing, nothing, nothing)

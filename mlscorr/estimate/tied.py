@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from mlscorr.correction import Correction, increments_by_scanner
 from mlscorr.estimate.equations import Equations
@@ -28,7 +28,7 @@ from mlscorr.estimate.tie_weights import robust_ties, solved_ties, student
 from mlscorr.survey import Ties
 
 WRONG_BUT_USED = "It is used, as too few are left to tell which point is wrong"
-MEDIAN = float(norm.ppf(0.75))  # of the absolute value of a standard normal variable
+MEDIAN = float(ndtri(0.75))  # of the absolute value of a standard normal variable
 
 
 @dataclass(frozen=True)

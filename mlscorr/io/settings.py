@@ -11,7 +11,7 @@ class Settings:
     """
 
     # ---- clouds
-    chunk_points: int = 1_000_000  # at a time: 100 MB with decoding, and 20 LAZ chunks for threads
+    chunk_points: int = 500_000  # at a time: 50 MB with decoding, and 10 LAZ chunks for threads
     sampled_points: int = 65  # times per file, first and last among them, for its time system
     close_places: int = 50_000  # points, LASzip's chunk: one is decoded to find a point in it
     largest_chunk: int = 10_000_000  # points; lazrs allocates whole LAZ chunks, aborts if it can't

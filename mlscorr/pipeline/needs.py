@@ -55,7 +55,7 @@ class DecodedSample:
 
 
 def sample_clouds(survey: Survey) -> DecodedSample:
-    """Decode a run of each file, of a million points together.
+    """Decode a run of each file, of as many points together as are read at a time.
 
     Parameters
     ----------

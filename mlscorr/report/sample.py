@@ -30,7 +30,7 @@ class EvenSample:
         self.count += len(cloud)
         while sum(map(len, self.parts)) > 2 * self.limit:
             self.step *= 2
-            self.parts = [PointCloud.concatenate(self.parts)[::2]]
+            self.parts = [PointCloud.concatenate([PointCloud.concatenate(self.parts)[::2]])]
 
 
 @dataclass(frozen=True)

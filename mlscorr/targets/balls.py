@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from mlscorr.targets.settings import SETTINGS
+from mlscorr.io.settings import SETTINGS as IO
 
 
 class Neighbourhoods:
@@ -23,7 +23,7 @@ class Neighbourhoods:
         ends = [self.position[:, :2] + sign * margin for sign in (-1, 1)]
         low = ends[0].min(axis=0, initial=np.inf)
         extent = ends[1].max(axis=0, initial=-np.inf) - low
-        edge = max(1.0, float(np.sqrt(max(extent.prod(), 0.0) / SETTINGS.held_points)))
+        edge = max(1.0, float(np.sqrt(max(extent.prod(), 0.0) / IO.chunk_points)))
         first, last = (np.floor((end - low) / edge).astype(int) for end in ends)
         shape = last.max(axis=0, initial=-1) + 1
         self._raster = low, edge, shape, *_reaching(first, last, shape)

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mlscorr.io.settings import SETTINGS as IO
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import ControlPoints, PointCloud, Survey
 from mlscorr.targets.balls import Neighbourhoods
-from mlscorr.targets.settings import SETTINGS
 
 NO_POINTS = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0, np.uint16))
 
@@ -157,7 +157,7 @@ def collect(
         settled(min(held.since(), latest))
 
     for number, file in enumerate(survey.clouds):
-        held, limit = PointsInBalls(near), SETTINGS.held_points
+        held, limit = PointsInBalls(near), IO.chunk_points
         for chunk in read(file):
             segment = trajectory.segment(chunk.gps_time)
             for part in np.unique(segment[segment >= 0]).tolist():
@@ -173,7 +173,7 @@ def collect(
             if len(held) > limit:
                 latest = chunk.gps_time.max()
                 hand_on(number, held, latest - MATCHING.pause, latest)
-                limit = max(SETTINGS.held_points, 2 * len(held))
+                limit = max(IO.chunk_points, 2 * len(held))
             progress(len(chunk))
             del chunk, segment, rows, has_pose, placed  # large, and needed no more
         hand_on(number, held, np.inf, np.inf)

@@ -13,7 +13,6 @@ class Settings:
 
     # Candidates and visits
     near_radius: float = 2.0  # m; looked at first: what is bright farther off can't hide a target
-    held_points: int = 1_000_000  # points; bounds memory, before those that were passed are fitted
     piece_points: int = 20_000  # points; bounds the time for one piece
     turn_step: float = 0.5  # m; a vehicle that moved less may stand and shake, not turn back
 

@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mlscorr.io.task_store import TaskStore
@@ -46,6 +47,18 @@ def end_at_first(path, number):
 def end(number):
     "Ends its process each time"
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def kept_memory(count, large):
+    "MB that a process keeps of as many arrays of MB once they are let go of, small ones between"
+    page = os.sysconf("SC_PAGE_SIZE")
+    resident = lambda: int(Path("/proc/self/statm").read_text().split()[1]) * page / 1e6  # noqa: E731
+    before = resident()
+    arrays = [[np.ones(int(size * 1e6) // 8) for size in (large, 0.05)] for _ in range(count)]
+    assert resident() - before > 0.9 * count * large
+    small = [pair[1] for pair in arrays]
+    del arrays
+    return resident() - before - sum(part.nbytes for part in small) / 1e6
 
 
 def task(number, function=square, *arguments):
@@ -153,3 +166,11 @@ def test_what_can_not_work_is_said(tmp_path):
     "Workers of two kinds, and a scheduler that is not there"
     with pytest.raises(ValueError, match="give one"):
         check_engine(2, "tcp://127.0.0.1:1")
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no /proc tells memory here")
+def test_a_worker_gives_memory_back():
+    "Of 30 arrays of 8 MB none stays in a worker after they are gone"
+    with engine(2, None) as chosen:
+        chosen.submit(kept_memory, 3, 12.0).result()  # the threshold of C grows with what is freed
+        assert chosen.submit(kept_memory, 30, 8.0).result() < 8.0

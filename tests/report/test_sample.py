@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.report.sample import gather
+from mlscorr.report.sample import EvenSample, gather
 from tests.beds.street_of_points import ORIGIN, pieces, street, target
 
 NO_WALLS = np.empty((0, 3))
@@ -43,3 +43,12 @@ def test_all_points_near_walls_are_kept():
     kept = {tuple(place) for place in sample.cloud.xyz}
     assert near.sum() > 5
     assert all(tuple(place) in kept for place in cloud.xyz[near])
+
+
+def test_a_sample_holds_no_memory_of_the_points_that_it_leaves_out():
+    "After the step has doubled each part is a copy, no view of all"
+    sample = EvenSample(limit=1000)
+    for part in pieces(street(10_000, np.random.default_rng(4)), 700):
+        sample.add(part)
+    assert sample.step == 8
+    assert all(part.xyz.base is None for part in sample.parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -9,7 +10,9 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+
+from mlscorr.pipeline.project.settings import SETTINGS
 
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -75,8 +78,13 @@ def _in_single_threads(function, *arguments):
 
 
 def _start_worker():
-    """Leave interruptions to the process that waits for this one, and end with it."""
+    """Leave interruptions to the process that waits for this one, and end with it.
+
+    Large arrays' memory returns to the system at once, as dask has it, too.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(AttributeError, OSError, TypeError):  # a C library that isn't GNU's
+        ctypes.CDLL(None).mallopt(-3, SETTINGS.large_array)  # M_MMAP_THRESHOLD of malloc.h
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
