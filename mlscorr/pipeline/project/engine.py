@@ -12,9 +12,8 @@ from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExec
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 
-from mlscorr.pipeline.project.settings import SETTINGS
-
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
+LARGE_ARRAY = 1 << 22  # B; C keeps freed ones of up to 32 MB: 0.15 GB after some tasks
 
 
 class Loop:
@@ -84,7 +83,7 @@ def _start_worker():
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(AttributeError, OSError, TypeError):  # a C library that isn't GNU's
-        ctypes.CDLL(None).mallopt(-3, SETTINGS.large_array)  # M_MMAP_THRESHOLD of malloc.h
+        ctypes.CDLL(None).mallopt(-3, LARGE_ARRAY)  # M_MMAP_THRESHOLD of malloc.h
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -11,7 +11,6 @@ class Settings:
     waiting: int = 2  # tasks for each worker that are handed out: the next is there when it ends
     area_seconds: int = 6_500  # that drives spend in an area with its margin: 2 GB, some minutes
     interval: float = 10.0  # s between two lines on how far it has come
-    large_array: int = 1 << 22  # B; C keeps freed ones of up to 32 MB: 0.15 GB after some tasks
     cached: int = 2  # drives that a worker holds: that of this task, and of the one before
 
 
