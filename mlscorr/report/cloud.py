@@ -116,7 +116,8 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
     worst = sorted(names, key=lambda name: -left[name])[: limit // 3]
     others = [name for name in names if name not in worst]
     spread = np.linspace(0, len(others) - 1, limit - len(worst)).round().astype(int)
-    return [name for name in names if name in {*worst, *(others[k] for k in spread)}]
+    chosen = {*worst, *(others[k] for k in spread)}
+    return [name for name in names if name in chosen]
 
 
 def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:

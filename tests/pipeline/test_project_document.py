@@ -41,5 +41,6 @@ def test_the_first_warning_of_a_drive_is_told_beside_its_doubt():
     report = replace(fabricate(drive(), checks=False)[2], support=Support())
     report.model["warnings"] = ["The points lie 400 km beside the trajectory."]
     content = first_screen(report)
-    told = _reason({"rating": content["rating"], "meaning": ""}, content)
-    assert told.startswith("No check point was surveyed") and told.endswith("the trajectory.")
+    reason = _reason({"rating": content["rating"], "meaning": ""}, content)
+    assert reason.startswith("No check point was surveyed")
+    assert reason.endswith("the trajectory.")

@@ -210,8 +210,7 @@ def _minded(rows, reports):
     ]
     if doubts:
         doubts.sort(key=lambda doubt: -headline.RATINGS.index(doubt[0]))
-        have = "has" if len(doubts) == 1 else "have"
-        sentence = f"{len(doubts)} of {len(rows)} drives {have} something to mind."
+        sentence = f"There is something to mind in {len(doubts)} of {len(rows)} drives."
         items = headline.capped(doubt[1:] for doubt in doubts)
         yield headline.Statement("Doubts", doubts[0][0], sentence, items)
 

@@ -13,7 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
-LARGE_ARRAY = 1 << 22  # B; C keeps freed ones of up to 32 MB: 0.15 GB after some tasks
+LARGE_ARRAY = 1 << 22  # B; glibc keeps freed ones of up to 32 MB: 0.15 GB after some tasks
 
 
 class Loop:
