@@ -122,7 +122,7 @@ def _stationary(trajectory, matched):
 
     def parameters(x):
         scale, time = np.exp(x)
-        return SignalParameters("exponential", scale, time, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, time)
+        return SignalParameters("exponential", scale, time, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, time, 1.0)
 
     def negative(x):
         return -equations.solve(parameters(x)).log_likelihood

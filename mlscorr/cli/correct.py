@@ -22,7 +22,7 @@ def correct(
     out: terminal.Out,
     order: Annotated[
         int, typer.Option(min=0, max=9, help="Order of the polynomial trend of the position.")
-    ] = 1,
+    ] = 0,
     sigma: Annotated[
         bool, typer.Option("--sigma", help="Add to each point one sigma of its E, N and H.")
     ] = False,

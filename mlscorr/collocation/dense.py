@@ -25,12 +25,16 @@ CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds
 UNCORRELATED_LAG = float(-np.log(np.square(np.finfo(float).eps)))
 
 
-def collocate_rows_dense(rows: Sequence[SparseRows]) -> Collocation:
+def collocate_rows_dense(
+    rows: Sequence[SparseRows], believed: np.ndarray | None = None
+) -> Collocation:
     """Collocation of rows that see an epoch or more by the dense formula: as of collocate_rows.
 
     Parameters
     ----------
     rows : sequence of SparseRows
+    believed : (k, p) array, optional
+        Of the trend, as of a Collocation.
 
     Raises
     ------
@@ -62,13 +66,14 @@ def collocate_rows_dense(rows: Sequence[SparseRows]) -> Collocation:
         )
     covariances = tuple(signal.covariance for signal in rows[0].signals)
     solver = DenseSolver(sides.clocks, sides.mixings, covariances, sides.first, factor)
-    return solve_trend(
-        solver, np.concatenate([np.ravel(p.misclosure) for p in rows]), _design(rows)
-    )
+    misclosure = np.concatenate([np.ravel(part.misclosure) for part in rows])
+    return solve_trend(solver, misclosure, _design(rows), believed)
 
 
 def covariance_given(
-    observations: Sequence[SparseRows], sought: Sequence[SparseRows]
+    observations: Sequence[SparseRows],
+    sought: Sequence[SparseRows],
+    believed: np.ndarray | None = None,
 ) -> np.ndarray:
     r"""Covariance (q, q) of the error of what rows hold without their noise, given others (Eq. 15).
 
@@ -79,6 +84,8 @@ def covariance_given(
     ----------
     observations, sought : sequences of SparseRows
         Of the same signals and trend.
+    believed : (k, p) array, optional
+        Of the trend, as of a Collocation.
 
     Raises
     ------
@@ -98,7 +105,7 @@ def covariance_given(
     >>> np.sqrt(covariance_given([at_0], [at_15])).round(3)
     array([[0.795]])
     """
-    solved = collocate_rows_dense(observations)
+    solved = collocate_rows_dense(observations, believed)
     m = len(solved.misclosure)
     total = signal_covariance([*observations, *sought])
     half = solved.solver.whiten(total[m:, :m].T)

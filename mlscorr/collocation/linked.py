@@ -16,7 +16,10 @@ from mlscorr.collocation.sparse_rows import SparseRows
 
 
 def collocate_rows(
-    rows: Sequence[SparseRows], like: InformationSolver | None = None, tolerance: float = 0.0
+    rows: Sequence[SparseRows],
+    like: InformationSolver | None = None,
+    tolerance: float = 0.0,
+    believed: np.ndarray | None = None,
 ) -> Collocation:
     r"""Separate the misclosures of sparse rows into trend, signal and noise.
 
@@ -37,6 +40,8 @@ def collocate_rows(
     tolerance : float
         What knots may leave over what the observations of an interval between two of them leave
         open together: fewer knots, where those for all digits would only cost time.
+    believed : (k, p) array, optional
+        Of the trend, as of a Collocation.
 
     Returns
     -------
@@ -63,7 +68,7 @@ def collocate_rows(
     >>> mean.round(4), np.sqrt(covariance).round(4)
     (array([[0.3]]), array([[[0.0014]]]))
     """
-    return _solve(InformationSolver.of(rows, like, tolerance))
+    return _solve(InformationSolver.of(rows, like, tolerance), believed)
 
 
 def reweight(solved: Collocation, weights: Sequence[np.ndarray]) -> Collocation:
@@ -84,11 +89,11 @@ def reweight(solved: Collocation, weights: Sequence[np.ndarray]) -> Collocation:
     ValueError
         Where a weight isn't positive.
     """
-    return _solve(solved.solver.reweighted(weights))
+    return _solve(solved.solver.reweighted(weights), solved.believed)
 
 
-def _solve(solver):
-    return solve_trend(solver, solver.columns[:, -1], solver.columns[:, :-1])
+def _solve(solver, believed):
+    return solve_trend(solver, solver.columns[:, -1], solver.columns[:, :-1], believed)
 
 
 @dataclass(frozen=True)

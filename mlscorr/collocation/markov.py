@@ -9,14 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from mlscorr.collocation.interpolation import interpolate, predictor_by
-from mlscorr.collocation.model import (
-    NOT_POSITIVE,
-    Collocation,
-    Noise,
-    Signal,
-    signal_clocks,
-    solve_trend,
-)
+from mlscorr.collocation.model import NOT_POSITIVE, Collocation, Signal, signal_clocks, solve_trend
+from mlscorr.collocation.noise import Noise
 from mlscorr.collocation.recursion import (
     Recursion,
     filter_columns,
@@ -34,6 +28,7 @@ def collocate(
     noise: Noise,
     design: np.ndarray,
     signals: Sequence[Signal],
+    believed: np.ndarray | None = None,
 ) -> Collocation:
     r"""Separate misclosures into trend, signal and noise.
 
@@ -57,6 +52,8 @@ def collocate(
     design : (n, r, p) array
         A. May have no column.
     signals : sequence of Signal
+    believed : (k, p) array, optional
+        Of the trend, as of a Collocation.
 
     Raises
     ------
@@ -91,7 +88,8 @@ def collocate(
     if np.isnan(filtered[2]).any():
         raise ValueError(NOT_POSITIVE.format(n * r))
     solver = MarkovSolver(order, gps_time, clocks, layout, mixing, *filtered, noise.common)
-    return solve_trend(solver, np.reshape(misclosure, -1), design.reshape(n * r, design.shape[2]))
+    design = design.reshape(n * r, design.shape[2])
+    return solve_trend(solver, np.reshape(misclosure, -1), design, believed)
 
 
 def check_finite(gps_time: np.ndarray, *arrays: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""What a collocation is about: signals, noise, and the generalised least squares they share."""
+"""What a collocation is about: signals, and the generalised least squares of the trend."""
 
 from __future__ import annotations
 
@@ -54,69 +54,6 @@ def signal_clocks(signals: Sequence[Signal], gps_time: np.ndarray) -> np.ndarray
 
 
 @dataclass(frozen=True)
-class Noise:
-    """Noise of n epochs with r observations each (Mao et al. 2015, Eq. 19).
-
-    Parameters
-    ----------
-    own : (n, r, r) array
-        Covariance of what each epoch has alone: the extraction. Units: m^2.
-    group : (n,) int array, optional
-        Which target each epoch has seen, as a row of ``shared``.
-    shared : (g, r) array, optional
-        Sigmas of the error that all epochs of a target have in common: its survey. Units: m.
-    """
-
-    own: np.ndarray
-    group: np.ndarray | None = None
-    shared: np.ndarray | None = None
-
-    @cached_property
-    def separate(self) -> np.ndarray:
-        """Covariance (n, r, r) of each epoch's noise, without what it shares with others."""
-        if self.group is None:
-            return self.own
-        is_single = ~np.isin(self.group, self.repeated)
-        variance = np.where(is_single[:, None], self.shared[self.group] ** 2, 0.0)
-        return self.own + variance[:, :, None] * np.eye(variance.shape[1])
-
-    @cached_property
-    def common(self) -> np.ndarray:
-        """Columns (n r, c) of the errors shared by several epochs, each of unit variance."""
-        n, r = self.own.shape[:2]
-        if self.group is None:
-            return np.zeros((n * r, 0))
-        members = self.group[:, None] == self.repeated
-        sigma = np.where(members[:, :, None], self.shared[self.repeated], 0.0)
-        return np.einsum("ngk,jk->njgk", sigma, np.eye(r)).reshape(n * r, members.shape[1] * r)
-
-    @property
-    def repeated(self) -> np.ndarray:
-        """Groups that have several epochs and an error to share."""
-        if self.group is None:
-            return np.zeros(0, dtype=np.int64)
-        groups, count = np.unique(self.group, return_counts=True)
-        return groups[(count > 1) & np.any(self.shared[groups] > 0, axis=1)]
-
-    @property
-    def matrix(self) -> np.ndarray:
-        """All of it as one covariance matrix (n r, n r)."""
-        return self.block(np.arange(self.own.shape[0] * self.own.shape[1]))
-
-    def block(self, rows: np.ndarray) -> np.ndarray:
-        """Covariance of some rows, numbered as in a Collocation."""
-        epoch, row = np.divmod(np.asarray(rows, dtype=int), self.own.shape[1])
-        separate = self.separate[epoch[:, None], row[:, None], row]
-        common = self.common[rows]
-        return np.where(epoch[:, None] == epoch, separate, 0.0) + common @ common.T
-
-    def select(self, epochs: np.ndarray) -> Noise:
-        """The noise of some epochs: their numbers, or an (n,) mask."""
-        group = None if self.group is None else self.group[epochs]
-        return Noise(self.own[epochs], group, self.shared)
-
-
-@dataclass(frozen=True)
 class Collocation:
     """A solved collocation: trend, and what is needed to predict the signal at any epoch.
 
@@ -133,8 +70,11 @@ class Collocation:
     log_likelihood : float
         Restricted log-likelihood of the misclosures.
     sigma0 : float
-        Square root of the weighted residual sum of squares over the redundancy m - p; one if the
-        model is right.
+        Square root of the weighted residual sum of squares over the redundancy, m - p and what is
+        believed of the trend; one if the model is right.
+    believed : (k, p) array
+        What is believed of the trend, as further rows of A, a coefficient each: its misclosure is
+        zero, with a sigma of one.
     """
 
     solver: Any
@@ -144,6 +84,7 @@ class Collocation:
     trend_root: np.ndarray
     log_likelihood: float
     sigma0: float
+    believed: np.ndarray
 
     @property
     def trend_covariance(self) -> np.ndarray:
@@ -204,8 +145,8 @@ class Collocation:
 
     @cached_property
     def _leverage(self):
-        """Orthonormal basis (m, p) of the columns of A."""
-        return np.linalg.qr(self.design)[0]
+        """Orthonormal basis (m + k, p) of the columns of A and of what is believed of the trend."""
+        return np.linalg.qr(np.vstack([self.design, self.believed]))[0]
 
     @cached_property
     def projected(self) -> np.ndarray:
@@ -253,11 +194,14 @@ class Collocation:
         return self.solver.precision(rows) - projected @ projected.T
 
 
-def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Collocation:
+def solve_trend(
+    solver: Any, misclosure: np.ndarray, design: np.ndarray, believed: np.ndarray | None = None
+) -> Collocation:
     """Generalised least squares, x = (A^T V^-1 A)^-1 A^T V^-1 l  (Eq. 13).
 
-    The likelihood is the restricted one, of what the trend leaves (Rasmussen and Williams 2006,
-    Eq. 2.45 with the trend's prior infinitely wide).
+    What is believed of the trend stands below the whitened misclosures. The likelihood is the
+    restricted one, of what the trend leaves (Rasmussen and Williams 2006, Eq. 2.43; 2.45 with the
+    trend's prior infinitely wide where nothing is believed).
 
     Parameters
     ----------
@@ -266,6 +210,8 @@ def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Coll
         ``solve(columns)``, V^-1 c; ``precision(rows)``, a block of V^-1; ``predictor(columns,
         trend, root)``, of means alone where the root is None.
     misclosure, design : (m,), (m, p) array
+    believed : (k, p) array, optional
+        As of a Collocation.
 
     Raises
     ------
@@ -273,11 +219,14 @@ def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Coll
         Where the rank of A is less than its columns.
     """
     p = design.shape[1]
+    believed = np.zeros((0, p)) if believed is None else believed
     whitened = solver.whiten(np.column_stack([design, misclosure]))
+    whitened = np.vstack([whitened, np.pad(believed, ((0, 0), (0, 1)))])
     basis, triangle = np.linalg.qr(whitened[:, :p])
     values = np.linalg.svd(triangle, compute_uv=False)
     smallest = len(whitened) * np.finfo(float).eps  # of a rank, as numpy's matrix_rank has it
-    if len(misclosure) < p or (p and values[-1] <= smallest * values[0]):
+    redundancy = len(misclosure) + len(believed) - p
+    if redundancy < 0 or (p and values[-1] <= smallest * values[0]):
         raise ValueError(
             f"{p} trend parameters are not determined by {len(misclosure)} "
             "misclosures. Lower the order or observe more control points."
@@ -286,8 +235,8 @@ def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Coll
     trend = root @ (basis.T @ whitened[:, p])
     residual = whitened[:, p] - whitened[:, :p] @ trend
     squares = float(residual @ residual)
-    redundancy = len(misclosure) - p
     determinants = solver.log_determinant + 2 * np.log(np.abs(np.diag(triangle))).sum()
+    determinants -= 2 * np.log(believed.sum(axis=1)).sum()
     log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
     return Collocation(
         solver=solver,
@@ -297,4 +246,5 @@ def solve_trend(solver: Any, misclosure: np.ndarray, design: np.ndarray) -> Coll
         trend_root=root,
         log_likelihood=float(log_likelihood),
         sigma0=float(np.sqrt(squares / redundancy)) if redundancy else float("nan"),
+        believed=believed,
     )

@@ -1,4 +1,4 @@
-"""How a likelihood changes with the signals, for the search of their parameters."""
+"""How a likelihood changes with signals and trend, for the search of their parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from mlscorr.collocation.sparse_rows import SparseRows
 
 
 def likelihood_changes(
-    solved: Collocation, rows: Sequence[SparseRows], changed: Sequence[Sequence[SparseRows]]
+    solved: Collocation,
+    rows: Sequence[SparseRows],
+    changed: Sequence[Sequence[SparseRows]],
+    believed: Sequence[np.ndarray] | None = None,
 ) -> np.ndarray:
     r"""How the restricted log-likelihood (k,) changes with the signals, of first order in dV.
 
@@ -28,6 +31,8 @@ def likelihood_changes(
         That it solved.
     changed : sequence of k sequences of SparseRows
         The same with signals that are a little different.
+    believed : sequence of k arrays, optional
+        Of the trend beside each of these; as solved by default.
 
     Examples
     --------
@@ -48,15 +53,23 @@ def likelihood_changes(
     slope = np.outer(solved.weights, solved.weights)
     slope -= solved.precision_of(np.arange(len(slope)))
     slope = np.tril(slope) - np.diag(np.diag(slope) / 2)  # each of a pair counts a half
+    by_variance = np.einsum("mi,mi->i", solved.design, slope @ solved.design)  # dV = A dS A^T
     before: dict[tuple, np.ndarray] = {}
     changes = []
-    for other in changed:
+    for other, trend in zip(changed, believed or [solved.believed] * len(changed), strict=True):
         numbers = _differing(rows, other)
         if numbers not in before:
             before[numbers] = signal_covariance(_with_signals(rows, numbers))
         after = signal_covariance(_with_signals(other, numbers))
-        changes.append(np.vdot(slope, after - before[numbers]))
+        change = np.vdot(slope, after - before[numbers])
+        changes.append(change + by_variance @ (_variance(trend) - _variance(solved.believed)))
     return np.array(changes)
+
+
+def _variance(believed):
+    """Of each coefficient (p,); zero where nothing is believed, so that it is always the same."""
+    precision = np.sum(believed**2, axis=0)
+    return np.divide(1.0, precision, out=np.zeros_like(precision), where=precision > 0)
 
 
 def _differing(rows, others):

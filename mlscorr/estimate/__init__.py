@@ -28,9 +28,9 @@ from mlscorr.estimate.pos_error import (
     with_ties,
 )
 from mlscorr.estimate.scanner_errors import with_scanner_errors
-from mlscorr.estimate.screening import Outlier
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.support import Support, WeakStretch
+from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tie_value import tie_value
 from mlscorr.estimate.tied import TieResiduals
 from mlscorr.estimate.tied_mounting import calibration_with_ties, previewed_mounting

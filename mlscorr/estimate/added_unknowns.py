@@ -60,10 +60,10 @@ class AddedUnknowns:
         solved = equations.solve(parameters)
         white = solved.solver.whiten(np.column_stack([solved.design, columns]))
         trend, added = np.split(white, [solved.design.shape[1]], axis=1)
-        response = np.linalg.lstsq(trend, added, rcond=None)[0]  # Eq. 13 of each column
+        response = solved.trend_covariance @ trend.T @ added  # Eq. 13 of each column
         weights = solved.solver.solve(columns - solved.design @ response)  # P M
         covariance = np.linalg.inv(columns.T @ weights + np.diag(prior_sigma**-2.0))
-        right = weights.T @ misclosures_of(equations)
+        right = weights.T @ solved.misclosure
         correction = covariance @ right
         critical = float(chdtri(len(correction), SETTINGS.significance))
         return cls(correction, covariance, response, float(right @ correction), critical)
@@ -86,29 +86,19 @@ class AddedUnknowns:
         return is_large & (self.statistic > self.critical)
 
 
-def misclosures_of(equations: Equations) -> np.ndarray:
-    """All misclosures (3 (n + h) + m,) of equations: of epochs, then of ties. Units: m.
+def with_added(equations: Equations, added: np.ndarray) -> Equations:
+    """The same equations with something added to their misclosures.
 
     Parameters
     ----------
     equations : Equations
+    added : (3 (n + h) + m,) array
+        To those of epochs, then of ties. Units: m.
     """
-    of_ties = [] if equations.ties is None else equations.ties.misclosure
-    return np.append(equations.misclosure.ravel(), of_ties)
-
-
-def with_misclosures(equations: Equations, misclosure: np.ndarray) -> Equations:
-    """The same equations with other misclosures.
-
-    Parameters
-    ----------
-    equations : Equations
-    misclosure : (3 (n + h) + m,) array
-        Units: m.
-    """
-    number, ties = equations.misclosure.size, equations.ties
+    epochs, of_ties = np.split(added, [equations.misclosure.size])
+    ties = equations.ties
     return replace(
         equations,
-        misclosure=misclosure[:number].reshape(-1, 3),
-        ties=None if ties is None else replace(ties, misclosure=misclosure[number:]),
+        misclosure=equations.misclosure + epochs.reshape(-1, 3),
+        ties=None if ties is None else replace(ties, misclosure=ties.misclosure + of_ties),
     )

@@ -64,20 +64,17 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
     steps = steps[np.linalg.norm(steps.size, axis=1) < SEARCH_RADIUS]
     if len(steps) == 0:
         return equations
-    number, groups = len(steps), len(equations.noise.shared)
+    number = len(steps)
     times = np.append(equations.gps_time, steps.before)
     stated = stated_sigma(equations.trajectory, equations.pos, times, equations.stated.starts)
     stated = replace(stated, history=equations.stated.history)
     variance = steps.sigma[:, None] ** 2 + 2 * stated.gnss[-number:] ** 2
-    own = [equations.noise.own, variance[:, :, None] * np.eye(3)]
-    shared = [equations.noise.shared, np.zeros((number, 3))]
-    group = np.append(equations.noise.group, groups + np.arange(number))
     position = np.tile(np.eye(3, 6), (number, 1, 1))
     return replace(
         equations,
         gps_time=times,
         misclosure=np.vstack([equations.misclosure, steps.size]),
-        noise=Noise(np.vstack(own), group, np.vstack(shared)),
+        noise=equations.noise.insert(len(equations.gps_time), variance[:, :, None] * np.eye(3)),
         partials=np.vstack([equations.partials, position]),
         stated=stated,
         fallbacks=number,
@@ -142,9 +139,8 @@ def with_mountings(
         What is believed to be missing in each lever arm and boresight, and how well. Units: m, rad.
     """
     n, number = len(equations.names), len(sigma) // 3
-    times, noise, groups = equations.gps_time, equations.noise, len(equations.noise.shared)
-    held = times[0] if n else equations.trajectory.gps_time[0]
-    times = np.insert(times, n, np.full(number, held))
+    held = equations.gps_time[0] if n else equations.trajectory.gps_time[0]
+    times = np.insert(equations.gps_time, n, np.full(number, held))
     stated = stated_sigma(equations.trajectory, equations.pos, times, equations.stated.starts)
     mounting = np.zeros((len(times), 3, len(sigma)))
     mounting[:n] = columns
@@ -154,11 +150,7 @@ def with_mountings(
         equations,
         gps_time=times,
         misclosure=np.insert(equations.misclosure, n, lacking.reshape(-1, 3), axis=0),
-        noise=Noise(
-            np.insert(noise.own, n, variance, axis=0),
-            np.insert(noise.group, n, groups + np.arange(number)),
-            np.vstack([noise.shared, np.zeros((number, 3))]),
-        ),
+        noise=equations.noise.insert(n, variance),
         partials=np.insert(equations.partials, n, np.zeros((number, 3, 6)), axis=0),
         stated=replace(stated, history=equations.stated.history),
         mounting=mounting,

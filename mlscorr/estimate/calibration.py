@@ -14,8 +14,9 @@ from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.guards import Guards, few_targets, global_test_warnings
 from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS, MountingEstimate
 from mlscorr.estimate.posterior import Posterior
-from mlscorr.estimate.screening import Outlier, Screening
+from mlscorr.estimate.screening import Screening
 from mlscorr.estimate.signals import SignalParameters
+from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tied import TieResiduals
 from mlscorr.survey import Mounting, Trajectory
 from mlscorr.survey.summary import Summary
@@ -127,7 +128,7 @@ class Calibration(Summary):
         return self.screening.posterior
 
     @property
-    def outliers(self) -> tuple[Outlier, ...]:
+    def outliers(self) -> tuple[TargetTest, ...]:
         """Targets that the others contradict."""
         return self.screening.outliers
 

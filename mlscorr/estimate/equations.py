@@ -25,7 +25,7 @@ from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.pos import StatedSigma, stated_sigma
-from mlscorr.survey import Pos, Trajectory, control_epochs
+from mlscorr.survey import Pos, Trajectory
 from mlscorr.survey.summary import Summary
 
 NO_TREND = -1  # the order of a polynomial without any coefficient
@@ -155,10 +155,6 @@ class Equations(Summary):
         """The same misclosures with a polynomial trend of another order."""
         return replace(self, order=order)
 
-    def affordable(self) -> Equations:
-        """The same with a trend of at most the order that the control epochs can carry."""
-        return self.with_order(max(min(self.order, self.epochs - 1), NO_TREND))
-
     @property
     def span(self) -> tuple[float, float]:
         """First and last control epoch; those of the trajectory without any. Units: s."""
@@ -167,11 +163,6 @@ class Equations(Summary):
         if len(self.observed) == 0:
             return tuple(self.trajectory.gps_time[[0, -1]].tolist())
         return float(self.observed.min()), float(self.observed.max())
-
-    @property
-    def epochs(self) -> int:
-        """Number of control epochs; targets within a second share one."""
-        return len(control_epochs(self.observed))
 
     @property
     def interval(self) -> float:
@@ -205,11 +196,14 @@ class Equations(Summary):
         like : Collocation, optional
             Of the same equations under parameters near by; with ties its knots are used again.
         """
-        if self.ties is None or parameters is None:
-            signals = () if parameters is None else self._signals(parameters)
-            return collocate(self.gps_time, self.misclosure, self.noise, self.design, signals)
-        rows = self.rows(parameters)
-        return collocate_rows(rows, None if like is None else like.solver, self.tolerance)
+        control = self.gps_time, self.misclosure, self.noise, self.design
+        if parameters is None:
+            return collocate(*control, ())
+        rows, believed = self.rows(parameters), self.believed(parameters)
+        if self.ties is None:
+            return collocate(*control, rows[0].signals, believed)
+        like = None if like is None else like.solver
+        return collocate_rows(rows, like, self.tolerance, believed)
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
         """As solve, for the likelihood alone: few rows with ties by their covariance matrix.
@@ -222,7 +216,7 @@ class Equations(Summary):
             is smooth, and costs half as much.
         """
         if self._is_dense:
-            return collocate_rows_dense(self.rows(parameters))
+            return collocate_rows_dense(self.rows(parameters), self.believed(parameters))
         return self.solve(parameters, like)
 
     def likelihoods(
@@ -240,7 +234,8 @@ class Equations(Summary):
         if not self._is_dense:
             return np.array([self.weigh(each, solved).log_likelihood for each in near])
         rows, changed = self.rows(parameters), [self.rows(each) for each in near]
-        return solved.log_likelihood + likelihood_changes(solved, rows, changed)
+        believed = [self.believed(each) for each in near]
+        return solved.log_likelihood + likelihood_changes(solved, rows, changed, believed)
 
     @property
     def _is_dense(self):
@@ -249,10 +244,6 @@ class Equations(Summary):
             return False
         return self.misclosure.size + len(self.ties) <= SETTINGS.dense_rows
 
-    def _signals(self, parameters):
-        signals = pose_signals(self.stated, parameters, self.partials)
-        return drift_alone(signals, self.fallbacks)
-
     def rows(self, parameters: SignalParameters) -> list[SparseRows]:
         """Rows of control, and of ties where there are any.
 
@@ -260,13 +251,23 @@ class Equations(Summary):
         ----------
         parameters : SignalParameters
         """
-        times, signals = self.gps_time[:, None], self._signals(parameters)
+        signals = pose_signals(self.stated, parameters, self.partials)
+        signals = drift_alone(signals, self.fallbacks)
+        times = self.gps_time[:, None]
         control = SparseRows(times, self.misclosure, self.noise, self.design, signals)
-        return (
-            [control]
-            if self.ties is None
-            else [control, self.ties.rows(parameters, self.pose_design)]
-        )
+        if self.ties is None:
+            return [control]
+        return [control, self.ties.rows(parameters, self.pose_design)]
+
+    def believed(self, parameters: SignalParameters) -> np.ndarray:
+        """What is believed of the trend, (3 (order + 1), p), as of a Collocation.
+
+        Parameters
+        ----------
+        parameters : SignalParameters
+        """
+        columns = self.design.shape[2]
+        return np.eye(columns)[columns - 3 * (self.order + 1) :] / parameters.trend_sigma
 
     @cached_property
     def design(self) -> np.ndarray:

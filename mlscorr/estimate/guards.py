@@ -15,7 +15,7 @@ from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.frames import angle_sigma
 from mlscorr.pos import stated_sigma
-from mlscorr.survey import Trajectory
+from mlscorr.survey import Trajectory, control_epochs
 from mlscorr.survey.summary import counted
 
 COMPONENTS = ("easting", "northing", "height", "roll", "pitch", "heading")
@@ -137,9 +137,9 @@ def _variance_ratio(equations, parameters, corrected):
     rows = np.clip(np.searchsorted(corrected.gps_time, equations.observed), 0, last)
     stated = stated_sigma(trajectory, equations.pos, trajectory.gps_time[rows])
     partials = np.broadcast_to(np.eye(6), (len(rows), 6, 6))
-    prior = sum(
-        s.mixing @ s.mixing.swapaxes(1, 2) for s in pose_signals(stated, parameters, partials)
-    )
+    trend = parameters.trend_sigma * equations.pose_design(trajectory.gps_time[rows])
+    parts = trend, *(signal.mixing for signal in pose_signals(stated, parameters, partials))
+    prior = sum(part @ part.swapaxes(1, 2) for part in parts)
     turned = angle_sigma(stated.rotation, prior[:, 3:, 3:])
     before = np.hstack([np.einsum("qii->qi", prior[:, :3, :3]), turned**2])
     after = np.hstack([corrected.position_sigma[rows], corrected.attitude_sigma[rows]]) ** 2
@@ -166,28 +166,28 @@ def _global_test(equations, parameters):
     return GlobalTest(float(statistic * redundancy / expected), float(redundancy), float(upper))
 
 
-def sparse_warnings(equations: Equations, order: int, fitted_order: int) -> Iterator[str]:
+def sparse_warnings(equations: Equations, order: int) -> Iterator[str]:
     """Sentences about control points that are few, all at one epoch, or a lowered order.
 
     Parameters
     ----------
     equations : Equations
-    order, fitted_order : int
-        As asked for, and as used.
+    order : int
+        Of the trend, as asked for.
     """
-    targets, epochs = len(equations.target_rows), equations.epochs
-    if fitted_order < order:
+    targets, epochs = len(equations.target_rows), len(control_epochs(equations.observed))
+    if equations.order < order:
         yield (
             f"{counted(targets, 'control point')} at {counted(epochs, 'epoch')} "
             f"{'is' if targets == 1 else 'are'} too few for a trend of order {order}, which needs "
-            f"{order + 2}: order {fitted_order} is used."
+            f"{order + 2}: order {equations.order} is used."
         )
     yield from few_targets(targets)
     if epochs == 1 and targets > 1:
         yield (
             f"All {targets} control points were seen within {np.ptp(equations.observed):.1f} s at "
-            f"{equations.observed.min():.1f} s: the correction is known there, and elsewhere it is "
-            "the same shift with growing sigmas."
+            f"{equations.observed.min():.1f} s: the correction is known there. Nothing tells "
+            "whether it is the same elsewhere, so that a part of it is kept, with growing sigmas."
         )
 
 

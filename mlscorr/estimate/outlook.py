@@ -64,9 +64,10 @@ class Outlook:
         moved = np.concatenate([still, _target_partials(equations, at_target)])
         at = np.concatenate([rows, at_target])
         weights = np.array([weight for _, weight in families])
+        shown = [_shown(equations, chosen, at, moved) for chosen, _ in families]
         covariances = np.stack([
-            covariance_given(thinned.rows(chosen), [_shown(equations, chosen, at, moved)])
-            for chosen, _ in families
+            covariance_given(thinned.rows(chosen), [part], thinned.believed(chosen))
+            for (chosen, _), part in zip(families, shown, strict=True)
         ])  # fmt: skip
         ends = 3 * (len(rows) + np.cumsum([len(sight) for sight in sights]))
         targets = [np.arange(end - 3 * len(s), end) for end, s in zip(ends, sights, strict=True)]

@@ -15,7 +15,6 @@ from threadpoolctl import threadpool_limits
 from mlscorr.collocation.covariance import FAMILIES
 from mlscorr.estimate.assembly import position_equations
 from mlscorr.estimate.inputs import checked_inputs
-from mlscorr.estimate.orders import affordable_order
 from mlscorr.estimate.outlook import Outlook
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.posterior import Objective
@@ -120,7 +119,6 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
     """
     filled, _ = checked_inputs(trajectory, matched, pos, SETTINGS.order)
     equations = position_equations(filled, matched, pos, SETTINGS.order, position_prior)
-    equations = equations.with_order(affordable_order(SETTINGS.order, equations))
     objective = Objective.of(equations)
     families = [
         (objective.parameters(family, objective.initial), 1 / len(FAMILIES)) for family in FAMILIES

@@ -20,7 +20,7 @@ from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.prediction import GridPredictions, pose_rows, predict_pose_error
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.runs import find_windows, with_windows
-from mlscorr.estimate.screening import Outlier, Screening, screen
+from mlscorr.estimate.screening import Screening, screen
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import Support, find_support
@@ -88,7 +88,7 @@ class Estimate(Summary):
         return self.screening.posterior.modes
 
     @property
-    def outliers(self) -> tuple[Outlier, ...]:
+    def outliers(self) -> tuple[TargetTest, ...]:
         """Targets that the others contradict."""
         return self.screening.outliers
 
@@ -151,7 +151,7 @@ def estimate_correction(
     filled, notes = checked_inputs(trajectory, matched, pos, order)
     equations, screening, windows = _screened(filled, matched, pos, order)
     kept = equations.without({outlier.name for outlier in screening.outliers})
-    notes = (*notes, *map(str, windows), *sparse_warnings(kept, order, equations.order))
+    notes = (*notes, *map(str, windows), *sparse_warnings(kept, order))
     return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes)
 
 

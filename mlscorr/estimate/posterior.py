@@ -209,7 +209,7 @@ def choose_parameters(
 
     A family's probability is its share of the posterior at the maximum. Points drawn from the
     log-normal about a mode (Laplace) in antithetic pairs, always the same, are weighted by the
-    true posterior over it.
+    true posterior over it. As few rows as A has columns choose none: what is stated stands.
 
     Parameters
     ----------
@@ -220,14 +220,18 @@ def choose_parameters(
         Number of parameters over which a prediction will be averaged.
     """
     objective = Objective.of(equations)
+    ties = 0 if equations.ties is None else len(equations.ties)  # a row each, targets have three
+    if ties + 3 * len(equations.names) <= equations.design.shape[-1]:
+        families = (*FAMILIES, INTEGRATED)
+        stated = [objective.parameters(family, objective.initial) for family in families]
+        believed = tuple((parameters, 1 / len(families)) for parameters in stated)
+        return Posterior(believed, believed)
     probable = most_probable(equations, start)
     share = np.exp([value - probable[0][1] for _, value in probable])
     chosen = zip([row[0] for row in probable], (share / share.sum()).tolist(), strict=True)
     by_share = tuple(chosen)
-    ties = 0 if equations.ties is None else len(equations.ties)  # a row each, targets have three
-    is_known = max(len(equations.names), ties / 3) > SETTINGS.block
-    if is_known or not ties + 3 * len(equations.names) > equations.design.shape[-1]:
-        return Posterior(by_share, by_share)  # so many know them well; none: what is stated stands
+    if max(len(equations.names), ties / 3) > SETTINGS.block:
+        return Posterior(by_share, by_share)  # so many know them well
     drawn = []
     for (parameters, probability), (_, value) in zip(by_share, probable, strict=True):
         if probability > SETTINGS.smallest_share:
@@ -256,18 +260,18 @@ def _points(objective, family, mode, covariance, value, probability, pairs):
 
 
 def _blocks(equations):
-    """The equations in blocks of targets, each with the trend that its epochs can carry.
+    """The equations in blocks of targets, each with a trend of its own.
 
     A target is in one block with all its passes, which judge each other; they follow each other as
     they were first seen, so that a block is a stretch of the street.
     """
     number = -(-len(equations.names) // SETTINGS.block)
     if number <= 1 or equations.ties is not None:  # which may link any two blocks
-        return (equations.affordable(),)
+        return (equations,)
     order = np.argsort(equations.observed, kind="stable")
     _, first, target, counts = np.unique(equations.names[order], True, True, True)
     before, rank = np.empty(len(first), int), np.argsort(first)
     before[rank] = np.cumsum(counts[rank]) - counts[rank]
     block = (before * number // len(order))[target]
     parts = (equations.select(order[block == k]) for k in np.unique(block))
-    return tuple(part.without_outer_fallbacks().affordable() for part in parts)
+    return tuple(part.without_outer_fallbacks() for part in parts)

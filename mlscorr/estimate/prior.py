@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.equations import NO_TREND, Equations
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 
@@ -15,7 +15,7 @@ SPREAD = {
     name: float(np.log(factor))
     for factor, names in (
         (SETTINGS.precise_factor, ("drift_time", "attitude_scale")),
-        (SETTINGS.time_factor, ("jitter_time", "bias_time", "attitude_time")),
+        (SETTINGS.time_factor, ("jitter_time", "bias_time", "attitude_time", "trend_sigma")),
         (SETTINGS.scale_factor, ("drift_scale", "walk_scale", "jitter_scale", "bias_scale")),
     )
     for name in names
@@ -82,9 +82,11 @@ def _prior(equations, time, attitude_follows):
         "bias_time": time,
         "attitude_time": SETTINGS.attitude_time,
         "walk_scale": SETTINGS.walk_scale,
+        "trend_sigma": SETTINGS.trend_sigma,
     }
     is_split = bool(np.any(equations.stated.gnss))
     fixed = (() if is_split else SPLIT) + (("attitude_time",) if attitude_follows else ())
+    fixed += ("trend_sigma",) if equations.order == NO_TREND else ()
     free = [name for name in NAMES if name not in fixed]
     return Prior(
         np.log([start.get(name, 1.0) for name in NAMES]),

@@ -72,7 +72,7 @@ def find_windows(equations: Equations, screening: Screening) -> tuple[DriftWindo
     screening : Screening
         Of these equations.
     """
-    rejected = {test.name: test for test in screening.rejected}
+    rejected = {test.name: test for test in screening.outliers}
     order = np.argsort(equations.observed, kind="stable")
     names, times = equations.names[order], equations.observed[order]
     is_out = np.isin(names, list(rejected))
@@ -89,7 +89,7 @@ def find_windows(equations: Equations, screening: Screening) -> tuple[DriftWindo
 def _deviate_together(tests: list[TargetTest]):
     """Whether a run is drift: two that differ, or three and more, of about one direction."""
     ways = np.array([test.left_out.mean(axis=0) for test in tests])
-    if len(ways) < 2 or not np.isfinite(ways).all():
+    if len(ways) < 2:
         return False
     if len(ways) == 2:
         sigma = np.linalg.norm(np.vstack([test.sigma for test in tests]))

@@ -13,7 +13,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
-from mlscorr.estimate.added_unknowns import AddedUnknowns, misclosures_of, with_misclosures
+from mlscorr.estimate.added_unknowns import AddedUnknowns, with_added
 from mlscorr.estimate.calibration import SCANNER_COMPONENTS, Calibration, ScannerErrors
 from mlscorr.estimate.mounting_estimate import MountingEstimate, combined_correction
 from mlscorr.estimate.prediction import predict_pose_error
@@ -45,8 +45,7 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
         return replace(calibration, scanner=errors)
     columns = columns[:, is_wrong]
     lacks = AddedUnknowns.of(equations, parameters, columns, prior[is_wrong])
-    left = misclosures_of(equations) - columns @ lacks.correction
-    equations = with_misclosures(equations, left)
+    equations = with_added(equations, -columns @ lacks.correction)
     pose_error = predict_pose_error(equations, calibration.posterior)
     return replace(
         calibration,

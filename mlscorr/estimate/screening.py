@@ -22,22 +22,6 @@ from mlscorr.estimate.target_tests import TargetTest, all_tests, single_test
 
 
 @dataclass(frozen=True)
-class Outlier:
-    """A target that the others contradict.
-
-    Parameters
-    ----------
-    name : str
-    statistic, critical : float
-        Chi-squared, and its critical value.
-    """
-
-    name: str
-    statistic: float
-    critical: float
-
-
-@dataclass(frozen=True)
 class Screening:
     """Targets that are left and those that are not.
 
@@ -45,16 +29,16 @@ class Screening:
     ----------
     posterior : Posterior
         Of the parameters, by the targets that are left.
-    outliers : tuple of Outlier
+    outliers : tuple of TargetTest
+        Of targets that the others contradict.
     tests : tuple of TargetTest
         Of the targets that are left.
     warnings : tuple of str
     """
 
     posterior: Posterior
-    outliers: tuple[Outlier, ...]
+    outliers: tuple[TargetTest, ...]
     tests: tuple[TargetTest, ...]
-    rejected: tuple[TargetTest, ...]
     warnings: tuple[str, ...]
 
     @classmethod
@@ -62,7 +46,7 @@ class Screening:
         """Nothing screened: the parameters are those that are believed before any target."""
         objective = Objective.of(equations)
         mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
-        return cls(Posterior(mode, mode), (), (), (), ())
+        return cls(Posterior(mode, mode), (), (), ())
 
 
 def screen(equations: Equations) -> Screening:
@@ -88,12 +72,10 @@ def screen(equations: Equations) -> Screening:
         if changed in tried:
             break
         out = changed
-    rejected.sort(key=lambda test: -test.excess)
     return Screening(
         posterior,
-        tuple(Outlier(test.name, test.statistic, test.critical) for test in rejected),
+        tuple(sorted(rejected, key=lambda test: -test.excess)),
         tuple(tests),
-        tuple(rejected),
         (*_rejected_groups(equations, rejected), *_doubtful_pairs(kept, posterior)),
     )
 
@@ -156,8 +138,8 @@ def _eliminate(equations, parameters, objective):
     while may_go(equations, names | {""}):
         kept = equations.without(names)
         gains = _gains(kept.solve(parameters), kept.target_rows)
-        worst = max(gains, key=gains.get, default=None)
-        if worst is None or gains[worst] < -np.log(SETTINGS.strong_evidence):
+        worst = max(gains, key=gains.get)
+        if gains[worst] < -np.log(SETTINGS.strong_evidence):
             return
         names, score = names | {worst}, score + gains[worst]
         yield names, score
@@ -166,13 +148,10 @@ def _eliminate(equations, parameters, objective):
 def _gains(solved, rows_of):
     """Log posterior odds of a gross error, the same in all its rows' epochs, against none.
 
-    By name, of those without whose rows the trend is determined. With b = E^T V^-1 (l - A x) and
-    M = E^T V^-1 E of what the rows see of three axes, E, an error of sigma s has the log odds
-    (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along the eigenvectors of M.
+    By name. With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of what the rows see of three axes, E,
+    an error of sigma s has the log odds (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along
+    the eigenvectors of M.
     """
-    rows_of = {name: rows for name, rows in rows_of.items() if solved.determined_without(rows)}
-    if not rows_of:
-        return {}
     score = [solved.weights[rows].reshape(-1, 3).sum(axis=0) for rows in rows_of.values()]
     blocks = [
         solved.precision_of(rows).reshape(-1, 3, len(rows) // 3, 3) for rows in rows_of.values()

@@ -9,8 +9,7 @@ import numpy as np
 class Settings:
     """Limits, beliefs and the work spent, each with its unit and source."""
 
-    order: int = 1  # of the trend: a datum difference and its slow change; signals carry the rest
-    highest_order: int = 3  # compared; the control intervals of higher ones are the signal's part
+    order: int = 0  # of the trend: a datum difference; signals carry what changes
     # With less control points neither the parameters nor a fault can be told; and two don't hold
     # the rotation of a mounting about the line between them
     smallest_targets: int = 3
@@ -56,9 +55,11 @@ class Settings:
     # or in another unit; the paper's rule for correlation times within two.
     start_ratio: float = 4.0  # correlation time over control interval: 3 to 5, paper 3.1.4
     attitude_time: float = 120.0  # s, paper's Table 7: gyro biases change over minutes
+    # m, of a coefficient: 1 cm of a base station to 1 m of a reference frame, as two sigmas
+    trend_sigma: float = 0.1
     walk_scale: float = 0.1  # of the random walk in an integrated drift
     precise_factor: float = 2.0  # of drift_time and attitude_scale
-    time_factor: float = 3.0  # of the other times
+    time_factor: float = 3.0  # of the other times, and of trend_sigma
     scale_factor: float = 10.0  # of the scales of position
 
     # The parameters' posterior, by Laplace and importance sampling

@@ -13,7 +13,7 @@ from mlscorr.pos import StatedSigma
 
 @dataclass(frozen=True)
 class SignalParameters:
-    """What is chosen by likelihood: factors on the stated sigmas, and correlation times in s.
+    """What is chosen by likelihood: factors on stated sigmas, correlation times in s, and a sigma.
 
     Parameters
     ----------
@@ -25,6 +25,8 @@ class SignalParameters:
     jitter_scale, jitter_time : float
     bias_scale, bias_time : float
     attitude_scale, attitude_time : float
+    trend_sigma : float
+        Of each coefficient of the trend. Units: m.
     """
 
     family: str
@@ -37,6 +39,7 @@ class SignalParameters:
     bias_time: float
     attitude_scale: float
     attitude_time: float
+    trend_sigma: float
 
 
 def pose_signals(

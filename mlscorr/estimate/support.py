@@ -175,12 +175,14 @@ def _is_drift_open(equations, solved, parameters, corrected):
     time, stated = equations.trajectory.gps_time, equations.stated_epochs
     signals = pose_signals(stated, parameters, np.broadcast_to(np.eye(6), (len(time), 6, 6)))
     mixings = [signal.mixing for signal in signals]
-    whole = sum((mixing[:, :3] ** 2).sum(axis=(1, 2)) for mixing in mixings)
+    trend = equations.pose_design(time)
+    parts = parameters.trend_sigma * trend, *mixings
+    whole = sum((part[:, :3] ** 2).sum(axis=(1, 2)) for part in parts)
     is_open = (corrected.position_sigma**2).sum(axis=1) > SETTINGS.determined_ratio * whole
     for number in range(len(mixings) - ERROR_SIGNALS, len(mixings)):
         mixings[number] = np.zeros_like(mixings[number])
-    design = np.zeros_like(equations.pose_design(time))
-    covariance = solved.predict(time, design, mixings, [signal.clock for signal in signals])[1]
+    clocks = [signal.clock for signal in signals]
+    covariance = solved.predict(time, np.zeros_like(trend), mixings, clocks)[1]
     after = np.einsum("qii->q", covariance[:, :3, :3])
     before = sum((mixing[:, :3] ** 2).sum(axis=(1, 2)) for mixing in mixings)
     is_open &= after > SETTINGS.determined_ratio * before

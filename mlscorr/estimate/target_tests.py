@@ -15,7 +15,7 @@ from mlscorr.estimate.settings import SETTINGS
 
 @dataclass(frozen=True)
 class TargetTest:
-    """What the other targets say of one, of k passes; NaN where they don't determine the trend.
+    """What the other targets say of one, of k passes.
 
     Parameters
     ----------
@@ -48,8 +48,12 @@ class TargetTest:
 
     @property
     def excess(self) -> float:
-        """Statistic over critical value; zero where there is none."""
-        return self.statistic / self.critical if np.isfinite(self.statistic) else 0.0
+        """Statistic over critical value."""
+        return self.statistic / self.critical
+
+    def document(self) -> dict[str, str | float]:
+        """What report.json says of an outlier."""
+        return {"name": self.name, "statistic": self.statistic, "critical": self.critical}
 
 
 def all_tests(
@@ -67,7 +71,7 @@ def all_tests(
     """
     tests, targets = [], len(equations.target_rows)
     for block in Objective.of(equations).blocks:
-        whole = len(block.names) == len(equations.names) and block.order == equations.order
+        whole = len(block.names) == len(equations.names)
         tests += _tests(block, block.target_rows, posterior, targets, visit if whole else None)
     return tests
 
@@ -97,8 +101,7 @@ def _tests(equations, names, posterior, targets, visit=None):
         solved = equations.solve(chosen)
         for name in largest_first:
             rows = equations.target_rows[name]
-            if solved.determined_without(rows):
-                left_out[name].append((weight, *solved.leave_out(rows)))
+            left_out[name].append((weight, *solved.leave_out(rows)))
         if visit is not None:
             visit(chosen, solved)
         del solved  # before the next one takes as much
@@ -113,9 +116,6 @@ def _test(equations, name, left_out, targets):
     """
     rows = equations.target_rows[name]
     critical = float(chdtri(len(rows), SETTINGS.significance / targets))
-    if not left_out:
-        nothing = np.full((len(rows) // 3, 3), np.nan)
-        return TargetTest(name, float("nan"), critical, nothing, nothing, nothing)
     mean, square = 0.0, 0.0
     for weight, residual, covariance in left_out:
         mean = mean + weight * residual

@@ -65,7 +65,7 @@ def _sufficient(equations, parameters, solved):
     while low < high:
         number = (low + high) // 2
         chosen = {names[i] for i in np.linspace(0, len(names) - 1, number).round().astype(int)}
-        part = equations.without([name for name in names if name not in chosen]).affordable()
+        part = equations.without([name for name in names if name not in chosen])
         if _median_sigma(part, parameters, part.solve(parameters)) <= limit:
             high = number
         else:

@@ -19,7 +19,7 @@ from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.outages import with_likely_starts
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters
 from mlscorr.estimate.prediction import GridPredictions
-from mlscorr.estimate.screening import Outlier, Screening, may_go
+from mlscorr.estimate.screening import Screening, may_go
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import all_tests
@@ -165,10 +165,7 @@ def screen_with_ties(
         screening,
         posterior=tied.posterior,
         tests=tuple(tests),
-        outliers=(
-            *screening.outliers,
-            *(Outlier(test.name, test.statistic, test.critical) for test in rejected),
-        ),
+        outliers=(*screening.outliers, *rejected),
         warnings=(
             *screening.warnings,
             *(_contradiction(test, "It takes no part") for test in rejected),

@@ -1,7 +1,5 @@
 """The model section of report.json."""
 
-from dataclasses import asdict
-
 import numpy as np
 
 from mlscorr.estimate import COMPONENTS, Estimate
@@ -31,7 +29,7 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
         "estimated_by": f"restricted maximum likelihood of {_observations(estimate)}",
         "log_likelihood": estimate.log_likelihood,
         "sigma0": estimate.sigma0,
-        "outliers": [asdict(outlier) for outlier in estimate.outliers],
+        "outliers": [outlier.document() for outlier in estimate.outliers],
         "alternatives": [
             {**_covariance(parameters), "probability": probability}
             for parameters, probability in estimate.families
@@ -108,26 +106,18 @@ def _order(alternative):
         "family": alternative.parameters.family,
         "log_likelihood": alternative.log_likelihood,
         "probability": alternative.probability,
-        "leave_one_out_rmse": _numbers(alternative.leave_one_out),
+        "leave_one_out_rmse": alternative.leave_one_out.tolist(),
     }
 
 
 def _test(test):
-    statistic = float(test.statistic)
     return {
-        "name": test.name,
-        "statistic": statistic if np.isfinite(statistic) else None,
-        "critical": test.critical,
-        "w": [_numbers(row) for row in test.w],
-        "redundancy": [_numbers(row) for row in test.redundancy],
-        "detectable": [_numbers(row) for row in test.detectable],
+        **test.document(),
+        "w": test.w.tolist(),
+        "redundancy": test.redundancy.tolist(),
+        "detectable": test.detectable.tolist(),
     }
 
 
 def _by_component(values):
     return dict(zip(COMPONENTS, values.tolist(), strict=True))
-
-
-def _numbers(values):
-    """A list of floats, or None where they are not numbers, which JSON can't hold."""
-    return values.tolist() if np.isfinite(values).all() else None

@@ -4,7 +4,7 @@ from collections.abc import Container, Iterable, Sequence
 
 import numpy as np
 
-from mlscorr.estimate import Outlier
+from mlscorr.estimate import TargetTest
 from mlscorr.evaluate.rows import CHECK_REASON, TargetRow
 from mlscorr.evaluate.scores import misclosures
 from mlscorr.matching import Refusal
@@ -16,7 +16,7 @@ def surveyed_rows(
     control: Matched,
     check: Matched,
     correction: Correcting,
-    outliers: Iterable[Outlier],
+    outliers: Iterable[TargetTest],
     left_out: np.ndarray | None = None,
 ) -> list[TargetRow]:
     """Rows of all observed points, control before check.
@@ -25,7 +25,7 @@ def surveyed_rows(
     ----------
     control, check : Matched
     correction : anything with ``apply(cloud) -> cloud``
-    outliers : iterable of Outlier
+    outliers : iterable of TargetTest
         Control points that took no part.
     left_out : (n, 3) array, optional
         Of the control points, as for ``target_rows``.
@@ -62,8 +62,7 @@ def target_rows(
     """
     observations, before = matched.observations, matched.misclosure
     after, sigma = misclosures(matched, correction), np.sqrt(matched.variance)  # Eq. 19
-    left_out = np.full_like(before, np.nan) if left_out is None else left_out.copy()
-    left_out[~np.isfinite(left_out).all(axis=1)] = np.nan
+    left_out = np.full_like(before, np.nan) if left_out is None else left_out
     vectors = matched.surveyed.position, observations.position, sigma, before, after, left_out
     origins = matched.name, observations.pass_number.tolist(), observations.gps_time.tolist()
     return [

@@ -191,7 +191,7 @@ class CalibratedSurvey(CalibrationResult):
             "determined": calibration.determined.tolist(),
             "scanner_errors": _scanner_errors(calibration.scanner),
             "parameters": _parameters(calibration.parameters),
-            "outliers": [vars(outlier) for outlier in calibration.outliers],
+            "outliers": [outlier.document() for outlier in calibration.outliers],
             "targets": [row.document() for row in rows],
             "ties": misfit_section(calibration.ties),
             "warnings": list(self.warnings),

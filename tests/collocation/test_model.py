@@ -1,85 +1,24 @@
-"""Noise that passes share, and the least squares that all solvers share."""
+"""The least squares that all solvers share."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.linalg import lstsq
+from scipy.stats import multivariate_normal
 
-from mlscorr.collocation import Noise, Signal, collocate
+from mlscorr.collocation import (
+    Noise,
+    Signal,
+    SparseRows,
+    collocate,
+    collocate_rows,
+    collocate_rows_dense,
+)
 from mlscorr.collocation.covariance import Covariance
 from mlscorr.collocation.model import signal_clocks, solve_trend
 from tests.beds.dense import collocate_dense
+from tests.beds.shared_noise import noise_of, written_out
 
 START = 413_200.0  # s of week
-
-
-def noise_of(seed, n=8, r=3, groups=4):
-    "Noise of n epochs of which some see one target"
-    rng = np.random.default_rng(seed)
-    root = rng.normal(size=(n, r, r))
-    own = 1e-4 * (root @ root.swapaxes(1, 2) + np.eye(r))
-    return Noise(own, rng.integers(0, groups, n), rng.uniform(0.0, 0.02, (groups, r)))
-
-
-def written_out(noise):
-    "The covariance element by element: own on the diagonal, the survey wherever a target is one"
-    n, r = noise.own.shape[:2]
-    total = np.zeros((n, r, n, r))
-    for i in range(n):
-        total[i, :, i] += noise.own[i]
-        for j in range(n):
-            if noise.group[i] == noise.group[j]:
-                total[i, :, j] += np.diag(noise.shared[noise.group[i]] ** 2)
-    return total.reshape(n * r, n * r)
-
-
-@settings(max_examples=40, deadline=None)
-@given(seed=st.integers(0, 10_000), n=st.integers(1, 9), groups=st.integers(1, 9))
-def test_passes_share_the_survey_error(seed, n, groups):
-    "All of the noise is the formula written out, whichever targets are seen once or more"
-    noise = noise_of(seed, n, groups=groups)
-    np.testing.assert_allclose(noise.matrix, written_out(noise), atol=1e-18)
-
-
-@settings(max_examples=40, deadline=None)
-@given(seed=st.integers(0, 10_000), size=st.integers(0, 12))
-def test_a_block_is_one_of_the_matrix(seed, size):
-    "Any rows in any order, with their own and shared part"
-    noise = noise_of(seed)
-    rows = np.random.default_rng(seed).permutation(24)[:size]
-    np.testing.assert_allclose(noise.block(rows), noise.matrix[np.ix_(rows, rows)], atol=1e-18)
-
-
-def test_separate_and_common_parts_are_all_of_it():
-    "What epochs have alone, and U U^T of what they share, sum to the whole"
-    noise = noise_of(3)
-    separate = np.zeros((8, 3, 8, 3))
-    separate[np.arange(8), :, np.arange(8)] = noise.separate
-    total = separate.reshape(24, 24) + noise.common @ noise.common.T
-    np.testing.assert_allclose(total, written_out(noise), atol=1e-18)
-
-
-def test_a_target_seen_once_costs_no_column():
-    "Three columns for each target of several passes, none for one that is known perfectly"
-    own, group = np.tile(np.eye(3), (5, 1, 1)), np.array([0, 1, 1, 2, 2])
-    shared = np.array([[0.01] * 3, [0.02] * 3, [0.0] * 3])
-    noise = Noise(own, group, shared)
-    assert noise.common.shape == (15, 3)
-    np.testing.assert_allclose(noise.separate[0], np.eye(3) * (1.0 + 0.01**2))
-    np.testing.assert_allclose(noise.separate[1:], own[1:])
-    assert Noise(own).common.shape == (15, 0)
-
-
-def test_noise_of_some_epochs_is_that_part_of_all():
-    "Chosen by number or by mask, a target that is left with one pass shares nothing more"
-    noise, kept = noise_of(5), np.array([True, False] * 4)
-    rows = np.flatnonzero(np.repeat(kept, 3))
-    for choice in (kept, np.flatnonzero(kept)):
-        part = noise.select(choice)
-        np.testing.assert_allclose(part.matrix, noise.matrix[np.ix_(rows, rows)], atol=1e-18)
-    alone = Noise(noise.own).select(kept)
-    np.testing.assert_array_equal(alone.own, noise.own[kept])
 
 
 def test_clocks_are_gps_time_where_a_signal_has_none():
@@ -233,3 +172,62 @@ def test_any_solver_serves():
     squares = np.sum((misclosure - mean) ** 2 / variance)
     density = squares + np.log(variance).sum() + np.log(np.sum(1.0 / variance))
     assert solved.log_likelihood == pytest.approx(-0.5 * (density + 3 * np.log(2 * np.pi)))
+
+
+def believing_rows(seed, p=2, n=7):
+    "(rows, sigma): SparseRows of targets that share errors, and one sigma (p,) of each coefficient"
+    rng = np.random.default_rng(seed)
+    time = START + np.sort(rng.uniform(0.0, 100.0, n))
+    drift = Signal(0.1 * rng.normal(size=(n, 3, 3)), Covariance("matern32", 30.0), time - START)
+    design, misclosure = rng.normal(size=(n, 3, p)), rng.normal(0.0, 0.3, (n, 3))
+    rows = SparseRows(time[:, None], misclosure, noise_of(seed, n), design, [drift])
+    return rows, rng.uniform(0.05, 0.3, p)
+
+
+def solved_by(solver, rows, believed):
+    "By one of the three solvers"
+    if solver == "recursion":
+        parts = rows.misclosure, rows.noise, rows.design, rows.signals
+        return collocate(rows.gps_time[:, 0], *parts, believed)
+    if solver == "knots":
+        return collocate_rows([rows], believed=believed)
+    return collocate_rows_dense([rows], believed)
+
+
+@pytest.mark.parametrize("solver", ["recursion", "knots", "dense"])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_believed_of_the_trend_is_a_part_of_the_covariance(seed, solver):
+    "Likelihood, coefficients and left-out misclosures are those of V + A S A^T without any trend"
+    rows, sigma = believing_rows(seed)
+    solved = solved_by(solver, rows, np.diag(1 / sigma))
+    (drift,), n = rows.signals, rows.misclosure.size
+    time, mixing = np.repeat(drift.clock, 3), drift.mixing.reshape(n, 3)
+    total = (mixing @ mixing.T) * drift.covariance(time[:, None] - time) + rows.noise.matrix
+    spread = rows.design.reshape(n, -1) * sigma
+    total += spread @ spread.T
+    misclosure = rows.misclosure.ravel()
+    density = multivariate_normal(np.zeros(n), total).logpdf(misclosure)
+    assert solved.log_likelihood == pytest.approx(density, abs=0.01 if solver == "knots" else 1e-7)
+    weights = np.linalg.solve(total, misclosure)
+    np.testing.assert_allclose(solved.trend, sigma * (spread.T @ weights), atol=1e-5)  # m
+    residual, covariance = solved.leave_out(np.arange(3, 6))
+    block = np.linalg.inv(np.linalg.inv(total)[3:6, 3:6])
+    np.testing.assert_allclose(covariance, block, rtol=1e-3, atol=1e-9)
+    np.testing.assert_allclose(residual, block @ weights[3:6], atol=1e-4)  # m
+    assert solved.sigma0 == pytest.approx(np.sqrt(misclosure @ weights / n), rel=1e-3)
+
+
+def test_a_trend_of_any_size_is_that_of_least_squares():
+    "Believed within 100 km they are those of Eq. 13 to 1e-6 m; within 1 nm there is no trend"
+    rows, _ = believing_rows(7)
+    free = solved_by("dense", rows, None).trend
+    np.testing.assert_allclose(solved_by("dense", rows, np.eye(2) / 1e5).trend, free, atol=1e-6)
+    assert np.abs(solved_by("dense", rows, np.eye(2) * 1e9).trend).max() < 1e-9  # m
+
+
+def test_a_part_of_the_trend_may_be_believed():
+    "Of more coefficients than misclosures some must be"
+    rows, _ = believing_rows(8, p=22)
+    assert np.isfinite(solved_by("dense", rows, np.eye(22)[:2]).trend).all()
+    with pytest.raises(ValueError, match="22 trend parameters are not determined by 21"):
+        solved_by("dense", rows, None)

@@ -27,3 +27,16 @@ def test_the_likelihood_changes_as_its_differences_do(family):
     differences = np.array([*apart, solved.log_likelihood]) - solved.log_likelihood
     assert np.abs(differences[:2]).min() > 1e-5  # so that there is something to recover
     np.testing.assert_allclose(changes, differences, rtol=0.01, atol=1e-8)
+
+
+def test_the_likelihood_changes_with_the_sigma_of_the_trend():
+    "With coefficients believed a thousandth larger it changes as two solutions differ"
+    street = Street("matern32", 40.0)
+    believed = np.eye(street.rows[0].design.shape[2]) / 0.2
+    solved = collocate_rows_dense(street.rows, believed)
+    given = street.rows, [street.rows] * 2, [believed / 1.001, believed]
+    change, none = likelihood_changes(solved, *given)
+    difference = collocate_rows_dense(street.rows, believed / 1.001).log_likelihood
+    difference -= solved.log_likelihood
+    assert abs(difference) > 1e-5 and none == 0.0
+    assert change == pytest.approx(difference, rel=0.01)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.added_unknowns import AddedUnknowns, misclosures_of, with_misclosures
+from mlscorr.estimate.added_unknowns import AddedUnknowns, with_added
 from mlscorr.estimate.tie_equations import TieEquations
 from tests.beds.tied_passes import tied_passes
 
@@ -23,14 +23,15 @@ def tied():
 
 def columns_of(equations, seed):
     "Two columns at random"
-    return np.random.default_rng(seed).standard_normal((len(misclosures_of(equations)), 2))
+    rows = equations.misclosure.size + len(equations.ties)
+    return np.random.default_rng(seed).standard_normal((rows, 2))
 
 
 def test_what_was_added_to_the_misclosures_is_found(tied):
     "Columns times known sizes of centimetres, within three sigmas, and highly significant"
     equations, parameters = tied
     columns, sizes = columns_of(equations, 1), np.array([0.03, -0.02])
-    changed = with_misclosures(equations, misclosures_of(equations) + columns @ sizes)
+    changed = with_added(equations, columns @ sizes)
     added = AddedUnknowns.of(changed, parameters, columns, np.ones(2))
     assert (np.abs(added.correction - sizes) < 3 * added.sigma).all()
     assert (added.sigma < 0.002).all()  # m
@@ -43,7 +44,7 @@ def test_the_response_is_what_the_trend_takes_of_a_unit(tied):
     equations, parameters = tied
     columns, sizes = columns_of(equations, 2), np.array([0.03, -0.02])
     added = AddedUnknowns.of(equations, parameters, columns, np.ones(2))
-    changed = with_misclosures(equations, misclosures_of(equations) + columns @ sizes)
+    changed = with_added(equations, columns @ sizes)
     before, after = (each.solve(parameters).trend for each in (equations, changed))
     assert np.abs(after - before - added.response @ sizes).max() < 1e-9  # m
 

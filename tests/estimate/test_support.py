@@ -37,7 +37,7 @@ def test_between_control_points_a_drive_is_held():
 
 def test_an_outage_that_does_not_end_is_extrapolated_past_its_last_control_point():
     "From 190 s on, with a sigma that tells of decimetres and more"
-    support, _ = support_of(2, (180.0, 400.0), EVEN[EVEN < 200.0])
+    support, _ = support_of(3, (180.0, 400.0), EVEN[EVEN < 200.0])
     last = support.weak[-1]
     assert last.why.startswith(LATE)
     assert last.start - START == pytest.approx(191.4, abs=0.3)

@@ -35,7 +35,6 @@ def test_data_snooping_by_hand():
     detectable = test.detectable[0, 0] / 0.005
     assert norm.sf(norm.isf(0.0005) - detectable) == pytest.approx(0.8, abs=1e-6)
     assert test.excess == pytest.approx(2.0)
-    assert made_test(np.nan, np.nan, np.nan).excess == 0.0
 
 
 @pytest.fixture(scope="module")
@@ -122,12 +121,12 @@ def test_doubt_about_parameters_is_a_part_of_the_sigma(equations, known):
         np.testing.assert_allclose(test.sigma.ravel() ** 2, variance, rtol=1e-9)
 
 
-def test_what_carries_the_trend_alone_is_not_tested():
-    "Of two targets under a slope neither has a statistic, and neither exceeds anything"
+def test_what_is_believed_of_the_trend_tests_two_targets():
+    "Under a slope either of two is tested by the other, and a shift of 0.5 m in both is no fault"
     case = Case(EPOCHS, CONSTANT, even(2), np.random.default_rng(1))
     equations = case.equations(order=1)
     objective = Objective.of(equations)
     pairs = ((objective.parameters("matern32", objective.initial), 1.0),)
     for test in all_tests(equations, Posterior(pairs, pairs)):
-        assert np.isnan(test.statistic) and test.excess == 0.0
-        assert np.isnan(test.w).all() and np.isfinite(test.critical)
+        assert test.statistic > 0.0 and test.excess < 1.0
+        assert np.isfinite(test.w).all() and np.isfinite(test.critical)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mlscorr.correction import Correction
-from mlscorr.estimate import Outlier
+from mlscorr.estimate import TargetTest
 from mlscorr.evaluate.rows import PointCounts
 from mlscorr.evaluate.target_rows import surveyed_rows, target_rows, unseen_rows
 from mlscorr.matching import Refusal
@@ -41,7 +41,8 @@ def test_control_stands_before_check(matched, correction):
 def test_outliers_give_their_statistic(matched, correction):
     "Rejected control points are not used, in all passes, and say by how much"
     twice = matched[np.append(np.arange(16), 4)]
-    rows = surveyed_rows(twice, matched[:0], correction, [Outlier("T04", 41.26, 16.27)])
+    test = TargetTest("T04", 41.26, 16.27, *np.full((3, 1, 3), np.nan))
+    rows = surveyed_rows(twice, matched[:0], correction, [test])
     wrong = [row for row in rows if not row.used]
     assert [row.name for row in wrong] == ["T04", "T04"]
     assert {row.reason for row in wrong} == {"outlier: statistic 41.3 against 16.3"}

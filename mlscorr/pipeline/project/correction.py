@@ -63,7 +63,7 @@ class Options:
         Whether what is there already may be replaced.
     """
 
-    order: int = 1
+    order: int = 0
     ties: TieUse | None = None
     sigma: bool = False
     page: bool = True
