@@ -122,7 +122,8 @@ def _stationary(trajectory, matched):
 
     def parameters(x):
         scale, time = np.exp(x)
-        return SignalParameters("exponential", scale, time, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, time, 1.0)
+        any_size = 1e3  # m, of the trend
+        return SignalParameters("exponential", scale, time, *[1.0] * 6, time, any_size)
 
     def negative(x):
         return -equations.solve(parameters(x)).log_likelihood

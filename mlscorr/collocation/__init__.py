@@ -5,7 +5,7 @@
 - trend: the polynomial, and what is believed of it
 - markov: linear in observations and epochs, by recursion and interpolation between them
 - dense: the same by the formula written out, with work that grows as the observations cubed
-- slopes: how the likelihood by that formula changes with signals and noise
+- slopes: how the likelihood by that formula changes with signals and trend
 - linked: of rows that see two epochs and more, and errors that any number of them share
 - whitening: V of scalar observations, factored once for thousands of columns
 - literal: the paper's own predictor, whose covariances don't fit each other

@@ -94,6 +94,14 @@ def outage(rng, begin=60.0, length=60.0, size=0.7):
     return size * rng.normal(size=3) * bridge + waves(rng, 0.005), sigma
 
 
+def filtered_outage(rng, begin=60.0, end=110.0, size=0.5):
+    "A drift that grows until GNSS returns, and the sigma(t) that tells of it; else millimetres"
+    share = np.clip((EPOCHS - begin) / (end - begin), 0, 1)[:, None] ** 1.5
+    share[end <= EPOCHS] = 0.0
+    sigma = 0.015 + size * share + np.zeros((1, 3))
+    return size * rng.normal(size=3) * share + waves(rng, 0.003), sigma
+
+
 def even(n):
     return np.linspace(3.0, LENGTH - 3.0, n)
 
