@@ -197,7 +197,8 @@ def _doubtful_pairs(equations, posterior):
             both = {
                 pair: np.concatenate([rows[name] for name in pair]) for pair in _neighbours(block)
             }
-            for pair, gain in _gains(solved, both).items():
+            # a target of very many passes is a block without a neighbour
+            for pair, gain in (_gains(solved, both) if both else {}).items():
                 if score + gain > pairs.get(pair, -np.inf):
                     pairs[pair] = score + gain
                     ways[pair] = solved.leave_out(both[pair])[0].reshape(-1, 3)

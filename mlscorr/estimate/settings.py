@@ -55,7 +55,7 @@ class Settings:
     # or in another unit; the paper's rule for correlation times within two.
     start_ratio: float = 4.0  # correlation time over control interval: 3 to 5, paper 3.1.4
     attitude_time: float = 120.0  # s, paper's Table 7: gyro biases change over minutes
-    # m, of a coefficient: 1 cm of a base station to 1 m of a reference frame, as two sigmas
+    # m, of a coefficient: 1 cm of a base station to 1 m between ETRS89 and ITRF, as two sigmas
     trend_sigma: float = 0.1
     walk_scale: float = 0.1  # of the random walk in an integrated drift
     precise_factor: float = 2.0  # of drift_time and attitude_scale

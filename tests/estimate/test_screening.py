@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.estimate import estimate_correction
+from mlscorr.estimate.posterior import Objective, Posterior
+from mlscorr.estimate.screening import _doubtful_pairs
 from mlscorr.survey import Matched
 from tests.beds import lying_pos
 from tests.beds.pos_errors import (
@@ -105,3 +107,17 @@ def test_attitude_errors_larger_than_stated_are_found():
     estimate = case.estimate()
     assert estimate.parameters.attitude_scale > 1.5
     assert rms(case.remaining(estimate)) < 0.02  # m
+
+
+def test_targets_of_very_many_passes_have_no_neighbour_in_their_block():
+    "Seven seen 90 times each are a block each: no two are doubted together, and nothing breaks"
+    times = np.repeat(even(7), 90) + np.tile(np.linspace(0.0, 1.5, 90), 7)
+    case = Case(EPOCHS, 0.0 * CONSTANT, times, np.random.default_rng(1))
+    names = tuple(f"T{i}" for i in range(7))
+    case.control = replace(case.control[np.arange(0, 630, 90)], name=names)
+    case.observations = replace(case.observations, name=tuple(np.repeat(names, 90).tolist()))
+    equations = case.equations()
+    objective = Objective.of(equations)
+    assert [len(block.target_rows) for block in objective.blocks] == [1] * 7
+    known = ((objective.parameters("exponential", objective.initial), 1.0),)
+    assert list(_doubtful_pairs(equations, Posterior(known, known))) == []
