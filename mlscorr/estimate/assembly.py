@@ -64,21 +64,10 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
     steps = steps[np.linalg.norm(steps.size, axis=1) < SEARCH_RADIUS]
     if len(steps) == 0:
         return equations
-    number = len(steps)
-    times = np.append(equations.gps_time, steps.before)
-    stated = stated_sigma(equations.trajectory, equations.pos, times, equations.stated.starts)
-    stated = replace(stated, history=equations.stated.history)
-    variance = steps.sigma[:, None] ** 2 + 2 * stated.gnss[-number:] ** 2
-    position = np.tile(np.eye(3, 6), (number, 1, 1))
-    return replace(
-        equations,
-        gps_time=times,
-        misclosure=np.vstack([equations.misclosure, steps.size]),
-        noise=equations.noise.insert(len(equations.gps_time), variance[:, :, None] * np.eye(3)),
-        partials=np.vstack([equations.partials, position]),
-        stated=stated,
-        fallbacks=number,
-    )
+    stated = _stated(equations, steps.before)
+    variance = (steps.sigma[:, None] ** 2 + 2 * stated.gnss**2)[:, :, None] * np.eye(3)
+    inserted = steps.before, steps.size, variance, np.tile(np.eye(3, 6), (len(steps), 1, 1))
+    return replace(_insert(equations, len(equations.gps_time), *inserted), fallbacks=len(steps))
 
 
 def mounting_equations(
@@ -140,21 +129,30 @@ def with_mountings(
     """
     n, number = len(equations.names), len(sigma) // 3
     held = equations.gps_time[0] if n else equations.trajectory.gps_time[0]
-    times = np.insert(equations.gps_time, n, np.full(number, held))
-    stated = stated_sigma(equations.trajectory, equations.pos, times, equations.stated.starts)
-    mounting = np.zeros((len(times), 3, len(sigma)))
+    mounting = np.zeros((len(equations.gps_time) + number, 3, len(sigma)))
     mounting[:n] = columns
     mounting[n : n + number] = np.eye(len(sigma)).reshape(number, 3, -1)
     variance = sigma.reshape(-1, 3, 1) ** 2 * np.eye(3)
+    inserted = np.full(number, held), lacking.reshape(-1, 3), variance, np.zeros((number, 3, 6))
+    return replace(_insert(equations, n, *inserted), mounting=mounting)
+
+
+def _insert(equations, place, gps_time, misclosure, variance, partials):
+    """The equations with epochs (k,), their misclosures and noise before the epoch of a number."""
+    times = np.insert(equations.gps_time, place, gps_time)
     return replace(
         equations,
         gps_time=times,
-        misclosure=np.insert(equations.misclosure, n, lacking.reshape(-1, 3), axis=0),
-        noise=equations.noise.insert(n, variance),
-        partials=np.insert(equations.partials, n, np.zeros((number, 3, 6)), axis=0),
-        stated=replace(stated, history=equations.stated.history),
-        mounting=mounting,
+        misclosure=np.insert(equations.misclosure, place, misclosure, axis=0),
+        noise=equations.noise.insert(place, variance),
+        partials=np.insert(equations.partials, place, partials, axis=0),
+        stated=_stated(equations, times),
     )
+
+
+def _stated(equations, gps_time):
+    stated = stated_sigma(equations.trajectory, equations.pos, gps_time, equations.stated.starts)
+    return replace(stated, history=equations.stated.history)
 
 
 def _noise(matched):

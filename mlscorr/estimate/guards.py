@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import chdtri
@@ -117,15 +118,13 @@ def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guard
 
 
 def _longest_gap(passes, control):
-    longest = (0.0, 0.0)
-    for (first, last), inside in zip(passes, control, strict=True):
-        if len(inside):
-            edges = np.concatenate([[first], inside, [last]])
-            k = int(np.argmax(np.diff(edges)))
-            longest = max(
-                longest, (float(edges[k]), float(edges[k + 1])), key=lambda gap: gap[1] - gap[0]
-            )
-    return longest
+    gaps = [
+        gap
+        for (first, last), inside in zip(passes, control, strict=True)
+        if len(inside)
+        for gap in pairwise([first, *inside.tolist(), last])
+    ]
+    return max(gaps, key=lambda gap: gap[1] - gap[0], default=(0.0, 0.0))
 
 
 def _variance_ratio(equations, parameters, corrected):

@@ -59,6 +59,8 @@ def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameter
     for _ in range(SETTINGS.rounds):
         before = starts
         for number, segment in enumerate(segments):
+            if not (segment[-1] or np.any((times > segment[0]) & (times < segment[1]))):
+                continue  # nothing there tells starts apart
             part = _about(equations, *segment[:2])
             candidates = np.append(starts[number], _candidates(times, *segment))
             scores = []

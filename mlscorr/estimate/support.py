@@ -117,7 +117,7 @@ def find_support(
     """
     codes = _reasons(equations, solved, parameters, corrected)
     history, starts = equations.stated.history, equations.stated.starts
-    ends_by_step = np.append(np.isin(history.restarts, history.steps.middle), False)
+    ends_by_step = np.isin(history.edges[1:], history.steps.middle)
     shown = np.isfinite(starts) & (ends_by_step | history.is_stated)
     return Support(
         tuple(weak_stretches(codes, corrected)),
@@ -134,12 +134,13 @@ def _reasons(equations, solved, parameters, corrected):
     """Number of the reason (n,) why each epoch of the trajectory is extrapolated; HELD where not.
 
     No control holds an epoch before the first or past the last control point of its pass, nor
-    past the last one of an outage, as drift goes on growing there: a fall-back tells how far it
-    had come at its end, and leaves decimetres open before it. Between them, what control tells
-    has faded where the drift's variance is above half of what it is without control: there the
-    correction is closer to the trend than to its neighbours. Drift below the noise of GNSS
-    doesn't count: there is nothing to tell. Within a second an epoch is that of its control. Where
-    ties hold the passes together, a control point holds both, and the variance alone decides.
+    past the last one of an outage, as drift goes on growing there (unless a smoother ties it
+    down): a fall-back tells how far it had come, and leaves decimetres open before it. Between
+    them, what control tells has faded where the drift's variance is above half of what it is
+    without control: there the correction is closer to the trend than to its neighbours. Drift
+    below the noise of GNSS doesn't count: there is nothing to tell. Within a second an epoch is
+    that of its control. Where ties hold the passes together, a control point holds both, and the
+    variance alone decides.
     """
     trajectory, stated = equations.trajectory, equations.stated_epochs
     time, control = trajectory.gps_time, np.sort(equations.observed)
@@ -149,7 +150,7 @@ def _reasons(equations, solved, parameters, corrected):
     if equations.ties is not None:
         return codes
     for first, last in pairwise(equations.stated.history.edges):
-        rows = (time > first) & (time <= last) & (stated.since > 0)
+        rows = (time > first) & (time <= last) & (stated.since > 0) & (stated.ahead == 1)
         inside = control[(control > first) & (control <= last)]
         codes[rows & (time > inside.max(initial=-np.inf) + SAME_EPOCH)] = IN_OUTAGE
     for first, last in trajectory.passes:

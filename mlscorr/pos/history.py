@@ -1,6 +1,7 @@
 """When the drift of a trajectory starts anew, and when it is said to grow."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -21,9 +22,12 @@ class DriftHistory:
         Fall-backs that stand in the recorded path.
     restarts : (k,) array
         When drift starts anew: at steps, starts of passes, falls of sigma(t). Units: s.
-    starts : (k + 1,) array
-        When it begins to grow in each segment between restarts: where sigma(t) says so, never
-        (infinite) where it says that it doesn't, else at once. Units: s.
+    returns : (r,) array
+        When a smoothed drift is back, as sigma(t) has sunk gently from the middle of an outage.
+        Units: s.
+    starts : (k + r + 1,) array
+        When it begins to grow after the start, each restart and each return: where sigma(t) says
+        so, never (infinite) where it says that it doesn't, else at once. Units: s.
     held : (3,) array
         The sigma of E, N, H that stays while GNSS holds the POS; zero where sigma(t) doesn't tell
         it from the part that grows. Units: m.
@@ -32,6 +36,7 @@ class DriftHistory:
     trajectory: Trajectory
     steps: Steps
     restarts: np.ndarray
+    returns: np.ndarray
     starts: np.ndarray
     held: np.ndarray
 
@@ -40,14 +45,22 @@ class DriftHistory:
         """Whether sigma(t) tells when drift grows."""
         return bool(self.held.any())
 
-    @property
+    @cached_property
     def edges(self) -> np.ndarray:
-        """Ends (k + 2,) of the segments. Units: s."""
+        """Start, restarts and returns, and end of the drive: (k + r + 2,). Units: s."""
         ends = self.trajectory.gps_time[[0, -1]]
-        return np.concatenate([ends[:1], self.restarts, ends[1:]])
+        return np.sort(np.concatenate([ends, self.restarts, self.returns]))
+
+    @cached_property
+    def ends(self) -> np.ndarray:
+        """Until when each drift that grows is back without a restart (k + r + 1,); infinite: never.
+
+        Units: s.
+        """
+        return np.where(np.isin(self.edges[1:], self.returns), self.edges[1:], np.inf)
 
     def segment(self, gps_time: np.ndarray) -> np.ndarray:
-        """Number of the segment of each time, from 0.
+        """Number of the segment between restarts of each time, from 0.
 
         Parameters
         ----------
@@ -55,6 +68,16 @@ class DriftHistory:
             Units: s.
         """
         return np.searchsorted(self.restarts, gps_time, side="right")
+
+    def growth(self, gps_time: np.ndarray) -> np.ndarray:
+        """Number of the drift that may grow at each time, from 0.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        """
+        return np.searchsorted(self.edges[1:-1], gps_time, side="right")
 
     def raised(self, gps_time: np.ndarray) -> np.ndarray:
         """Number of the stretch in which sigma(t) is raised, from 0; -1 where it isn't: (n,).
@@ -92,19 +115,34 @@ def drift_history(trajectory: Trajectory) -> DriftHistory:
 
 
 def _history(trajectory):
-    held, steps = held_sigma(trajectory), find_steps(trajectory)
+    time, held, steps = trajectory.gps_time, held_sigma(trajectory), find_steps(trajectory)
     restarts = np.sort(np.concatenate([trajectory.passes[1:, 0], steps.middle]))
     if not held.any():
-        starts = np.append(trajectory.gps_time[0], restarts)
-        return DriftHistory(trajectory, steps, restarts, starts, held)
+        starts = np.append(time[0], restarts)
+        return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, held)
     restarts = np.sort(np.append(restarts, _falls(trajectory, held, restarts)))
     excess = np.maximum(trajectory.position_sigma**2 - held**2, 0.0).sum(axis=1)
-    is_grown = excess > held @ held
-    begins = trajectory.gps_time[np.flatnonzero(np.diff(is_grown, prepend=False) & is_grown)]
-    after = np.searchsorted(begins, np.append(trajectory.gps_time[0], restarts))
-    first = np.append(begins, np.inf)[after]
-    starts = np.where(first < np.append(restarts, np.inf), first, np.inf)
-    return DriftHistory(trajectory, steps, restarts, starts, held)
+    change = np.diff((excess > held @ held).astype(int), prepend=0)
+    rises, sinks = np.flatnonzero(change > 0), np.flatnonzero(change < 0)
+    returns = _returns(trajectory, zip(rises, sinks, strict=False), restarts)
+    edges = np.sort(np.concatenate([time[:1], restarts, returns]))
+    first = np.append(time[rises], np.inf)[np.searchsorted(time[rises], edges)]
+    starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
+    return DriftHistory(trajectory, steps, restarts, returns, starts, held)
+
+
+def _returns(trajectory, grown, restarts):
+    """Ends of outages in the middle of which sigma(t) is largest, as a smoother states it. s."""
+    size, time = np.linalg.norm(trajectory.position_sigma, axis=1), trajectory.gps_time
+    returns = []
+    for first, last in grown:
+        # sigma of a filter grows until GNSS is back, that of a smoother until the middle
+        peak = time[first + np.argmax(size[first:last])]
+        is_tied = first > 0 and peak < (time[first] + 3 * time[last]) / 4
+        is_cut = (restarts > time[first]) & (restarts < time[last] + SETTINGS.fix_time)
+        if is_tied and not is_cut.any():
+            returns.append(time[last])
+    return np.array(returns)
 
 
 def _falls(trajectory, held, restarts):

@@ -38,7 +38,7 @@ class StatedSigma:
     history : DriftHistory
         Of the whole trajectory.
     starts : (k,) array
-        When drift begins to grow in each segment of the history. Units: s.
+        When each drift of the history begins to grow. Units: s.
     """
 
     gps_time: np.ndarray
@@ -78,7 +78,20 @@ class StatedSigma:
     @cached_property
     def since(self) -> np.ndarray:
         """Time (n,) since drift began to grow, zero before. Units: s."""
-        return np.maximum(self.gps_time - self.starts[self.history.segment(self.gps_time)], 0.0)
+        return np.maximum(self.gps_time - self.starts[self.history.growth(self.gps_time)], 0.0)
+
+    @cached_property
+    def ahead(self) -> np.ndarray:
+        """Share (n,) of a drift's time that lies ahead, as a smoother ties it down; else 1.
+
+        A (integrated) random walk w(t) that is back at zero at T, with its velocity, is a free
+        one of another time, (1 - t / T)^p w(t / (1 - t / T)), with p = 1 (3).
+        """
+        number = self.history.growth(self.gps_time)
+        start, end = self.starts[number], self.history.ends[number]
+        is_tied = (self.since > 0) & np.isfinite(end)
+        whole = np.subtract(end, start, out=np.ones(len(number)), where=is_tied)
+        return np.where(is_tied, np.maximum(end - self.gps_time, SOONEST) / whole, 1.0)
 
     def grown(self, power: float) -> np.ndarray:
         """Sigma (n, 3) of drift that grows by a power of time to a POS's largest in an outage. m.
@@ -88,8 +101,8 @@ class StatedSigma:
         power : float
             3/2 for an integrated random walk, 1/2 for a random walk.
         """
-        share = (np.maximum(self.since, SOONEST) / SETTINGS.outage) ** power
-        return self.largest * np.where(self.since > 0, share, 0.0)[:, None]
+        time = np.maximum(self.since * self.ahead, SOONEST) / SETTINGS.outage
+        return self.largest * np.where(self.since > 0, time**power, 0.0)[:, None]
 
     @cached_property
     def clock(self) -> np.ndarray:
@@ -100,9 +113,10 @@ class StatedSigma:
     @cached_property
     def growth_clock(self) -> np.ndarray:
         """Logarithm (n,) of the time since drift began to grow, with leaps where it does."""
-        number = 2 * self.history.segment(self.gps_time) + (self.since > 0)
+        number = 2 * self.history.growth(self.gps_time) + (self.since > 0)
         onward = ONWARD * (self.gps_time - self.history.trajectory.gps_time[0])
-        return np.log(np.maximum(self.since, SOONEST) / SOONEST) + onward + LOG_LEAP * number
+        time = np.maximum(self.since, SOONEST) / (SOONEST * self.ahead)
+        return np.log(time) + onward + LOG_LEAP * number
 
     def at(self, rows: slice | np.ndarray) -> StatedSigma:
         """That of some epochs.
@@ -137,7 +151,7 @@ def stated_sigma(
     gps_time : (n,) array, optional
         The trajectory's own epochs by default. Units: s.
     starts : (k,) array, optional
-        When drift begins to grow in each segment; what sigma(t) says by default. Units: s.
+        When each drift begins to grow; what sigma(t) says by default. Units: s.
 
     Raises
     ------

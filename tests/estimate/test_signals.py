@@ -53,6 +53,33 @@ def test_integrated_drift_is_two_walks_on_one_clock(stated):
     assert growth == pytest.approx((since[0] / since[1]) ** 1.5, rel=1e-6)
 
 
+def test_drift_that_a_smoother_ties_down_is_a_walk_that_is_known_at_its_end():
+    "Its covariance is that of a free walk of 40 s after its end, with its velocity, is known: 0"
+    hump = np.clip(TIME - TIME[60], 0.0, 40.0)
+    sigma = np.repeat((0.02 + (hump * (40.0 - hump) / 400.0) ** 1.5)[:, None], 3, axis=1)
+    path = np.array([528000.0, 3379000.0, 20.0]) + np.outer(TIME - TIME[0], [0.0, 10.0, 0.0])
+    trajectory = Trajectory(TIME, path, Rotation.identity(len(TIME)), sigma)
+    history = stated_sigma(trajectory, Pos()).history
+    asked = np.linspace(history.starts[0], history.returns[0], 9)[1:-1]
+    stated = stated_sigma(trajectory, Pos(), asked)
+    velocity, walk = pose_signals(stated, replace(PARAMETERS, family=INTEGRATED), partials(7))[:2]
+    since, whole = asked - history.starts[0], history.returns[0] - history.starts[0]
+    s, t = np.minimum.outer(since, since), np.maximum.outer(since, since)
+    position, at_end = s**2 * (3 * t - s) / 6, since**2 * (3 * whole - since) / 6
+    ends = np.array([[whole**3 / 3, whole**2 / 2], [whole**2 / 2, whole]])
+    across = np.column_stack([at_end, since**2 / 2])
+    tied = {
+        "velocity": (velocity, position - across @ np.linalg.solve(ends, across.T)),
+        "walk": (walk, s - np.outer(since, since) / whole),
+    }
+    for signal, expected in tied.values():
+        root = signal.mixing[:, 0, 0]
+        lags = signal.covariance(np.subtract.outer(signal.clock, signal.clock))
+        covariance = np.outer(root, root) * lags
+        scale = covariance[3, 3] / expected[3, 3]
+        np.testing.assert_allclose(covariance, scale * expected, rtol=1e-3)
+
+
 def test_fall_backs_show_nothing_but_drift(stated):
     "In the last rows jitter, bias and attitude are hidden, in the others they stay"
     signals = pose_signals(stated, PARAMETERS, partials(len(TIME)))

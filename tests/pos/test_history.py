@@ -48,6 +48,29 @@ def test_without_sigma_each_segment_may_grow_at_once():
     assert history.starts == pytest.approx([START, history.restarts[0]])
 
 
+def test_a_smoothed_outage_ends_where_sigma_has_sunk():
+    "A hump of sigma from 80 to 120 s is back at its end, without a restart; after it none grows"
+    time = np.clip(TIME - 80.0, 0.0, 40.0)
+    history = drift_history(drive(0.02 + (time * (40.0 - time) / 400.0) ** 1.5))
+    assert len(history.restarts) == 0
+    assert history.returns == pytest.approx([START + 118.0], abs=2.0)  # s: still twice at 118 s
+    assert history.ends == pytest.approx([*history.returns, np.inf])
+    assert history.starts == pytest.approx([START + 82.0, np.inf], abs=2.0)
+    assert history.growth(START + np.array([10.0, 100.0, 150.0])).tolist() == [0, 0, 1]
+    assert history.segment(START + np.array([10.0, 150.0])).tolist() == [0, 0]
+
+
+def test_what_grows_until_it_falls_is_not_smoothed():
+    "Growth that falls within a second at 120 s, and a hump that a step of the path cuts: none back"
+    fall = np.interp(TIME, [119.9, 120.0, 120.4], [1.0, 0.6, 0.0])
+    filtered = np.where(TIME < 119.9, grown(1.0), fall)
+    assert len(drift_history(drive(0.02 + filtered)).returns) == 0
+    time = np.clip(TIME - 80.0, 0.0, 40.0)
+    hump = (time * (40.0 - time) / 400.0) ** 1.5
+    cut = drift_history(drive(0.02 + hump, np.where(TIME < 100.0, grown(0.8), 0.0)))
+    assert len(cut.steps) == 1 and len(cut.returns) == 0
+
+
 def test_clocks_leap_at_restarts_and_drift_grows_from_zero():
     "Across a restart lags are thousands of correlation times; sigma grows as t^1.5 from a start"
     trajectory = drive(None, grown(0.8))
