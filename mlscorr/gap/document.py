@@ -216,12 +216,9 @@ def _innovations(rows, where):
 
 
 def _windows(cause, survey):
-    """When the events of a cause act, as far as the drive reaches."""
-    first, last = survey.trajectory.gps_time[[0, -1]].tolist()
-    return [
-        {"effect": name, "start": max(start, first), "end": min(end, last)}
-        for name, start, end in cause.stretches(survey.trajectory)
-    ]
+    """When the events of a cause act."""
+    stretches = cause.stretches(survey.trajectory)
+    return [{"effect": name, "start": start, "end": end} for name, start, end in stretches]
 
 
 def map_document(survey: Survey) -> dict:

@@ -65,8 +65,8 @@ class Cause:
         return tuple(signature.effect(estimate) for signature, estimate in self.parts)
 
     def stretches(self, trajectory: Trajectory) -> tuple[tuple[str, float, float], ...]:
-        """Name, start and end of each event and window; an event's where it is half as large as
-        at its largest, or larger.
+        """Name, start and end of each event and window, as far as the drive reaches; an event's
+        where it is half as large as at its largest, or larger.
 
         Parameters
         ----------
@@ -82,7 +82,8 @@ class Cause:
                 stretches.append((part.name, float(time - half), float(end)))
         for start, length, *_ in self.model.windows:
             stretches.append((PositionNoise.name, start, start + length))
-        return tuple(stretches)
+        first, last = trajectory.gps_time[[0, -1]].tolist()
+        return tuple((name, max(start, first), min(end, last)) for name, start, end in stretches)
 
 
 @dataclass(frozen=True)
