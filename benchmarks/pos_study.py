@@ -1,12 +1,13 @@
 """Is the collocation ever worse than interpolation between control points?
 
-python benchmarks/pos_study.py [FILE of real POS errors (.err)] [--seeds 2]
+python benchmarks/pos_study.py [FILE of real POS errors (.err)] [--seeds 2] [--every 1]
 
 RMS in 3D of the whole trajectory over many drives: windows of a real error series with and without
 its sigma(t); clones of the paper's car and boat; MEMS and tactical units, filtered and smoothed,
 with their stated sigmas, without any, and with sigmas ten times too small and too large. Beside
 it what practitioners use on the same control points: linear and monotone interpolation, the former
-cut at the steps of the path, and a Gaussian process of scikit-learn.
+cut at the steps of the path, and a Gaussian process of scikit-learn. With --every 4 each fourth
+control point along the drive takes part, with its passes.
 """
 
 import argparse
@@ -84,12 +85,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("series", nargs="?", help="of real POS errors, as OB_GINS writes (.err)")
     parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--every", type=int, default=1, help="only each n-th control point")
     arguments = parser.parse_args()
     titles = ["raw", *PEERS, "mlscorr"]
     print(f"{'survey':34s}" + "".join(f"{title:>13s}" for title in titles) + "   within")
     rows = []
-    for name, *survey in surveys(arguments.series, arguments.seeds):
-        rows.append(row(*survey))
+    for name, trajectory, matched, *truth in surveys(arguments.series, arguments.seeds):
+        kept = list(dict.fromkeys(matched.name))[:: arguments.every]
+        rows.append(row(trajectory, matched[np.isin(matched.name, kept)], *truth))
         numbers = "".join(f"{value:13.3f}" for value in rows[-1][:-1])
         best = min(rows[-1][1:-2])
         mark = "  worse" if rows[-1][-2] > WORSE * best else ""
