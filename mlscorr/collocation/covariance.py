@@ -22,6 +22,7 @@ it has the poles -3/2 and -1/2 and, with E = 1 - exp(-x),
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,7 +86,7 @@ class Covariance:
     @property
     def rate(self) -> float:
         """Rate of the process's poles. Units: 1/s."""
-        scale = 1.0 if self.family == INTEGRATED else np.sqrt(2.0 * self.states - 1.0)
+        scale = 1.0 if self.family == INTEGRATED else math.sqrt(2.0 * self.states - 1.0)
         return scale / self.correlation_time
 
 

@@ -221,7 +221,7 @@ def solve_trend(
     p = design.shape[1]
     believed = np.zeros((0, p)) if believed is None else believed
     whitened = solver.whiten(np.column_stack([design, misclosure]))
-    whitened = np.vstack([whitened, np.pad(believed, ((0, 0), (0, 1)))])
+    whitened = np.vstack([whitened, np.column_stack([believed, np.zeros(len(believed))])])
     basis, triangle = np.linalg.qr(whitened[:, :p])
     values = np.linalg.svd(triangle, compute_uv=False)
     smallest = len(whitened) * np.finfo(float).eps  # of a rank, as numpy's matrix_rank has it
