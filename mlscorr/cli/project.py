@@ -38,14 +38,14 @@ def correct_drives(
         Where something failed.
     """
     from mlscorr.evaluate.quality import failures
-    from mlscorr.io.project_file import read_project, read_project_file
+    from mlscorr.io.project_file import read_project, stated_project
     from mlscorr.pipeline.project import check_engine, check_project_output, correct_project
 
     with terminal.exit_code(terminal.Exit.USAGE):
-        read_project_file(project)
+        stated = stated_project(project)
         check_engine(options.workers, options.scheduler)
     with terminal.exit_code(terminal.Exit.BAD_DATA):
-        parts = read_project(project)
+        parts = read_project(stated)
     with terminal.exit_code(terminal.Exit.USAGE):
         check_project_output(parts, out, options)
     with terminal.exit_code(terminal.Exit.BAD_DATA, lambda: RESUMPTION):

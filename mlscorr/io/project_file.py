@@ -1,8 +1,9 @@
 """project.toml: several drives, one control list, and what is believed of all of them."""
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,7 +16,7 @@ from mlscorr.io.project_sections import ProjectFile
 from mlscorr.io.projection import check_crs
 from mlscorr.io.storage import as_path, beside, is_folder, is_there, resolved
 from mlscorr.io.survey_file import SurveyParts, read_parts, read_survey_file, survey_toml
-from mlscorr.io.survey_paths import check_distinct, existing, matching
+from mlscorr.io.survey_paths import SurveyPaths, check_distinct, existing, files_of, matching
 from mlscorr.io.survey_sections import CloudSection, SurveyFile
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory_sessions import check_systems
@@ -24,6 +25,25 @@ from mlscorr.survey import ControlPoints, InputFile, Trajectory
 FILE_NAME = "project.toml"
 BELIEFS = ("pos", "matching", "ties")  # sections that hold for all drives
 SHARED = ("mounting", "scanner", *BELIEFS)  # and those that hold where a drive has none of its own
+
+
+class StatedDrive(NamedTuple):
+    """A drive as project.toml states it, or its survey.toml (path); else as DriveParts."""
+
+    name: str
+    path: Path
+    settings: SurveyFile
+    files: SurveyPaths
+    notes: tuple[str, ...]
+    ids: tuple[int, ...] | None
+
+
+class StatedProject(NamedTuple):
+    """A project as its project.toml states it, with the drives."""
+
+    path: Path
+    settings: ProjectFile
+    drives: tuple[StatedDrive, ...]
 
 
 @dataclass(frozen=True)
@@ -101,13 +121,13 @@ def is_project(path: str | Path) -> bool:
     return is_named or (is_table and b"[[drive" in read_bytes(path))
 
 
-def read_project(path: str | Path) -> ProjectParts:
+def read_project(project: str | Path | StatedProject) -> ProjectParts:
     """All of a project but its clouds.
 
     Parameters
     ----------
-    path : path
-        project.toml, or the folder that holds it.
+    project : path or StatedProject
+        project.toml, or the folder that holds it; or what it states.
 
     Raises
     ------
@@ -116,25 +136,25 @@ def read_project(path: str | Path) -> ProjectParts:
     FileNotFoundError
         For files that aren't there.
     """
-    path = as_path(path).absolute()
-    path = path / FILE_NAME if is_folder(path) else path
-    settings = read_project_file(path)
-    drives = tuple(_drive(path, settings, name, section) for name, section in settings.drives)
-    _check_tiles(path, settings, drives)
-    _check_alike(path, settings, drives)
-    drives = tuple(_with_beliefs(path, drives))
+    stated = project if isinstance(project, StatedProject) else stated_project(project)
+    path, settings = stated.path, stated.settings
+    drives = tuple(
+        DriveParts(name, read_parts(toml, own, files), notes, ids)
+        for name, toml, own, files, notes, ids in stated.drives
+    )
+    check_systems([drive.name for drive in drives], [drive.trajectory for drive in drives])
     crs = settings.crs or drives[0].parts.settings.crs
     inputs, surveyed = [input_file("project", path)], NOTHING_SURVEYED
     if settings.control is not None:
         file = existing(path, "control.file", settings.control.file)
         inputs.append(input_file("control", file))
         surveyed = read_surveyed(file, settings.control, _everywhere(drives))
-    name = settings.name or path.absolute().parent.name
+    name = settings.name or path.parent.name
     return ProjectParts(name, path, crs, drives, *surveyed, tuple(inputs))
 
 
-def read_project_file(path: str | Path) -> ProjectFile:
-    """What stands in a project.toml; no other file is opened.
+def stated_project(path: str | Path) -> StatedProject:
+    """What a project.toml and the survey.toml of its drives state; no data are read.
 
     Parameters
     ----------
@@ -144,43 +164,45 @@ def read_project_file(path: str | Path) -> ProjectFile:
     Raises
     ------
     ValueError
-        For anything wrong in it.
+        For anything wrong in these, or between them.
     FileNotFoundError
-        Where there is none.
+        For files that aren't there.
     """
-    path = as_path(path)
+    path = as_path(path).absolute()
     path = path / FILE_NAME if is_folder(path) else path
     settings = read_toml(path, ProjectFile, "a project")
     if settings.crs is not None:
         check_crs(settings.crs)
-    return settings
+    drives = [_stated(path, settings, name, section) for name, section in settings.drives]
+    _check_tiles(path, settings, drives)
+    _check_crs_alike(path, settings, drives)
+    return StatedProject(path, settings, tuple(_with_beliefs(path, drives)))
 
 
-def _drive(path, settings, name, section):
-    """DriveParts of a [[drive]]."""
+def _stated(path, settings, name, section):
+    """StatedDrive of a [[drive]]."""
+    toml, key, notes = path, f"files of [[drive]] {name}", ()
+    names = SHARED if section.survey is None else BELIEFS
+    given = {n: getattr(settings, n) for n in names if n in settings.model_fields_set}
     if section.survey is None:
-        shared = {n: getattr(settings, n) for n in SHARED if n in settings.model_fields_set}
         own = {n: getattr(section, n) for n in ("mounting", "scanner") if getattr(section, n)}
         files = CloudSection(files=section.files, gps_time=settings.cloud.gps_time)
-        given = {"name": name, "crs": settings.crs, "cloud": files} | shared | own
-        own_settings = SurveyFile(trajectory=section.trajectory, **given)
-        ids = _ids(path, name, section, own_settings)
-        key = f"files of [[drive]] {name}"
-        return DriveParts(name, read_parts(path, own_settings, key), ids=ids)
-    toml = survey_toml(beside(path, section.survey))
-    stated = read_survey_file(toml)
-    given = {n: getattr(settings, n) for n in BELIEFS if n in settings.model_fields_set}
-    notes = []
-    if stated.control is not None:
-        if settings.control is None:
-            raise ValueError(
-                f"{toml} has a [control] of its own ({stated.control.file}), and {path} none: a "
-                "project has one list for all drives. Name it under [control] in project.toml."
-            )
-        notes.append(f"Control points are those of the project, not {stated.control.file}.")
-    whole = stated.model_copy(update={**given, "control": None, "name": name})
+        given = {"name": name, "crs": settings.crs, "cloud": files} | given | own
+        whole = SurveyFile(trajectory=section.trajectory, **given)
+    else:
+        toml, key = survey_toml(beside(path, section.survey)), "cloud.files"
+        whole = read_survey_file(toml)
+        if whole.control is not None:
+            own = whole.control.file
+            if settings.control is None:
+                raise ValueError(
+                    f"{toml} has a [control] of its own ({own}), and {path} none: a project has "
+                    f"one list for all drives. Name it under [control] in {path.name}."
+                )
+            notes = (f"Control points are those of the project, not {own}.",)
+        whole = whole.model_copy(update={**given, "control": None, "name": name})
     ids = _ids(path, name, section, whole)
-    return DriveParts(name, read_parts(toml, whole), tuple(notes), ids)
+    return StatedDrive(name, toml, whole, files_of(toml, whole, key), notes, ids)
 
 
 def _ids(path, name, section, settings):
@@ -199,9 +221,9 @@ def _ids(path, name, section, settings):
 
 def _check_tiles(path, settings, drives):
     """Refuse a tile of no drive, and one of two whose points nothing tells apart."""
-    owners: dict[Path, list[DriveParts]] = {}
+    owners: dict[Path, list[StatedDrive]] = {}
     for drive in drives:
-        for file in drive.parts.files.clouds:
+        for file in drive.files.clouds:
             owners.setdefault(resolved(file), []).append(drive)
     for copy, first in find_copies(owners).items():
         both = [*owners[first], *owners[copy]]
@@ -238,10 +260,10 @@ def _check_tiles(path, settings, drives):
         )
 
 
-def _check_alike(path, settings, drives):
-    """Refuse drives in two CRS, or in two systems of time."""
-    stated = {drive.name: drive.parts.settings.crs or settings.crs for drive in drives}
-    crs = settings.crs or drives[0].parts.settings.crs
+def _check_crs_alike(path, settings, drives):
+    """Refuse drives in two CRS."""
+    crs = settings.crs or drives[0].settings.crs
+    stated = {drive.name: drive.settings.crs or settings.crs for drive in drives}
     other = [name for name, own in stated.items() if own != crs]
     if other:
         raise ValueError(
@@ -249,15 +271,14 @@ def _check_alike(path, settings, drives):
             f"{crs} (first: {other[0]}, {stated[other[0]]}). Bring their clouds into one CRS, and "
             "say it in their survey.toml: an SBET is projected into it by itself."
         )
-    check_systems([drive.name for drive in drives], [drive.trajectory for drive in drives])
 
 
 def _with_beliefs(path, drives):
     """Drives that all believe what some of them state; refuses what two state differently."""
     beliefs = {}
     for what in BELIEFS:
-        stated = [drive for drive in drives if what in drive.parts.settings.model_fields_set]
-        values = [getattr(drive.parts.settings, what) for drive in stated]
+        stated = [drive for drive in drives if what in drive.settings.model_fields_set]
+        values = [getattr(drive.settings, what) for drive in stated]
         unlike = [d.name for d, own in zip(stated, values, strict=True) if own != values[0]]
         if unlike:
             raise ValueError(
@@ -266,8 +287,7 @@ def _with_beliefs(path, drives):
             )
         beliefs |= {what: values[0]} if values else {}
     for drive in drives:
-        settings = drive.parts.settings.model_copy(update=beliefs)
-        yield replace(drive, parts=replace(drive.parts, settings=settings))
+        yield drive._replace(settings=drive.settings.model_copy(update=beliefs))
 
 
 def _everywhere(drives):

@@ -1,6 +1,7 @@
 """What stands in project.toml, section by section."""
 
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -61,17 +62,14 @@ class ProjectFile(CommonSections):
 
     @model_validator(mode="after")
     def _names_drives(self) -> Self:
-        names = [name.casefold() for name, _ in self.drives]
-        doubled = sorted({name for name in names if names.count(name) > 1})
-        if doubled:
+        names = [name for name, _ in self.drives]
+        count = Counter(map(str.casefold, names))
+        if doubled := [name for name, number in count.items() if number > 1]:
             raise ValueError(
                 f"the {len(names)} [[drive]] need names of their own, as each is a folder of the "
-                f"results, and {len(doubled)} stand twice or more (first: {doubled[0]})"
+                f"results: {len(doubled)} in use twice or more (first: {doubled[0]})"
             )
-        wrong = [
-            n for n, _ in self.drives if not FOLDER_NAME.fullmatch(n) or n.casefold() in RESERVED
-        ]
-        if wrong:
+        if wrong := [n for n in names if n.casefold() in RESERVED or not FOLDER_NAME.fullmatch(n)]:
             raise ValueError(
                 f"{len(wrong)} of the {len(names)} drives have a name that can't be a folder of "
                 f"the results (first: {wrong[0]!r})"

@@ -63,7 +63,8 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     (3, 401)
     """
     path = survey_toml(path)
-    parts = read_parts(path, read_survey_file(path, planned))
+    settings = read_survey_file(path, planned)
+    parts = read_parts(path, settings, files_of(path, settings))
     return parts.survey([parts.cloud_file(cloud) for cloud in parts.files.clouds])
 
 
@@ -149,19 +150,18 @@ class SurveyParts:
         )
 
 
-def read_parts(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") -> SurveyParts:
+def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> SurveyParts:
     """All of a survey but its clouds.
 
     Parameters
     ----------
     path : Path
-        Beside which the files lie that are named.
+        Of the file that says it.
     settings : PlannedSurveyFile
         What raises is as of read_survey.
-    key : str
-        As of files_of.
+    files : SurveyPaths
+        That are named there.
     """
-    files = files_of(path, settings, key)
     inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
     recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
     surveyed = read_surveyed(files.control, settings.control, recorded.trajectory)

@@ -1,7 +1,9 @@
 """project.toml: what is wrong in it or between its drives is said in a sentence."""
 
 import pytest
+from typer.testing import CliRunner
 
+from mlscorr.cli import app
 from mlscorr.io.project_file import is_project, read_project
 
 TRAJECTORY = "gps_time,easting,northing,height,roll,pitch,heading\n" + "".join(
@@ -59,25 +61,49 @@ def test_a_project_may_have_any_name(city):
     assert [is_project(city / name) for name in names] == [True, False, False, False]
 
 
-@pytest.mark.parametrize(
-    ("parts", "words"),
-    [
-        ([DRIVE.format("a"), DRIVE.format("a")], "names of their own"),
-        ([DRIVE.format("a"), DRIVE.format("b").replace("b/*", "a/*")], "of two drives"),
-        ([DRIVE.format("a").replace('name = "a"', 'name = "tiles"')], "can't be a folder"),
-        ([IDS.format("a", "[1, 2]"), IDS.format("b", "[2]")], "point_source_id 2 of .* of one"),
-        ([IDS.format("a", "[1]") + SCANNER, IDS.format("b", "[2]")], "can't tell both"),
-        (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "are of no drive"),
-        ([DRIVE.format("a").replace("a/*.laz", "s4://bucket/a.laz")], "unknown scheme s4://"),
-        (['[[drive]]\nname = "a"\n'], "give a drive its survey"),
-        (["name = 1\n", DRIVE.format("a")], "name = 1 can't be used"),
-        (['nmae = "x"\n', DRIVE.format("a")], "the nearest known one is name"),
-    ],
-)
+WRONG = [
+    ([DRIVE.format("a"), DRIVE.format("a")], r": 1 in use twice or more \(first: a\)"),
+    ([DRIVE.format("a"), DRIVE.format("b").replace("b/*", "a/*")], "of two drives"),
+    ([DRIVE.format("a").replace('name = "a"', 'name = "tiles"')], "can't be a folder"),
+    ([IDS.format("a", "[1, 2]"), IDS.format("b", "[2]")], "point_source_id 2 of .* of one"),
+    ([IDS.format("a", "[1]") + SCANNER, IDS.format("b", "[2]")], "can't tell both"),
+    (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "are of no drive"),
+    ([DRIVE.format("a").replace("a/*.laz", "s4://bucket/a.laz")], "unknown scheme s4://"),
+    (['[[drive]]\nname = "a"\n'], "give a drive its survey"),
+    (["name = 1\n", DRIVE.format("a")], "name = 1 can't be used"),
+    (['nmae = "x"\n', DRIVE.format("a")], "the nearest known one is name"),
+]
+
+
+@pytest.mark.parametrize(("parts", "words"), WRONG)
 def test_what_is_wrong_is_said(city, parts, words):
     "Drives without names or files of their own, files of no drive, unknown schemes and keys"
     with pytest.raises(ValueError, match=words):
         read_project(write(city, *parts))
+
+
+def exit_codes(project):
+    "Those of `check` and `correct`, by a set: they are the same"
+    commands = (["check", str(project)], ["correct", str(project), "-o", f"{project}.out"])
+    return {CliRunner().invoke(app, command).exit_code for command in commands}
+
+
+@pytest.mark.parametrize("parts", [parts for parts, _ in WRONG])
+def test_what_project_toml_states_wrong_is_wrong_use(city, parts):
+    "Exit code 2, as of a fault in survey.toml, between its drives too"
+    assert exit_codes(write(city, *parts)) == {2}
+
+
+def test_a_fault_of_a_drives_survey_toml_is_wrong_use_and_one_of_its_data_is_not(city):
+    "Exit code 2 for an unknown key and for two CRS; 3 for a trajectory of another time system"
+    both = ['[[drive]]\nsurvey = "a"\n', '[[drive]]\nsurvey = "b"\n']
+    (city / "a" / "survey.toml").write_text(SURVEY.format('crs = "EPSG:32650"\n\n'))
+    for head in ('crs = "EPSG:32649"\n\n', 'nmae = "b"\n\n'):
+        (city / "b" / "survey.toml").write_text(SURVEY.format(head))
+        assert exit_codes(write(city, *both)) == {2}
+    (city / "b" / "survey.toml").write_text(SURVEY.format('crs = "EPSG:32650"\n\n'))
+    (city / "b" / "way.csv").write_text(TRAJECTORY.replace("\n357", "\n1234357"))
+    assert exit_codes(write(city, *both)) == {3}
 
 
 def test_the_key_of_a_drives_clouds_is_named(city):

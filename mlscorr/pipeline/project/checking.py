@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mlscorr.estimate import few_targets
 from mlscorr.io.preparation import glance
-from mlscorr.io.project_file import ProjectParts, read_project, read_project_file
+from mlscorr.io.project_file import ProjectParts, read_project, stated_project
 from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
 from mlscorr.pipeline.faults import Faults
 from mlscorr.pipeline.needs import Amount
@@ -38,8 +38,8 @@ def check_project(path: str | Path) -> CheckedSurvey:
     """
     faults = Faults()
     with glance():
-        settings = faults.of("survey.toml", read_project_file, path)
-        project = settings and faults.of("data", read_project, path)
+        stated = faults.of("survey.toml", stated_project, path)
+        project = stated and faults.of("data", read_project, stated)
         if project is None:
             reason = "Clouds and targets: the faults come first."
             return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
