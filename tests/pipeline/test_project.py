@@ -125,6 +125,16 @@ def test_workers_change_no_byte(project, corrected, tmp_path):
         assert (tmp_path / "out" / drive / "report.html").is_file()
 
 
+def test_a_drive_that_nothing_corrects_is_done_in_part(project, tmp_path):
+    "Exit code 4 without ties, of which the second drive has nothing else; its points stay"
+    command = ["correct", str(project), "-o", str(tmp_path / "out"), "--no-ties", "--no-report"]
+    ended = CliRunner().invoke(app, command)
+    assert ended.exit_code == 4, ended.stderr
+    rows = json.loads((tmp_path / "out" / "project.json").read_text())["drives"]
+    assert [row["state"] for row in rows] == ["controlled", "uncorrected"]
+    assert np.abs(moved(project, tmp_path / "out", "second")).max() < 1e-6  # m
+
+
 def test_tiles_of_two_drives_are_told_apart_by_point_source_id(project, corrected, tmp_path):
     "Each point moves as in a tile of its drive alone, and a tile keeps all of its points"
     result, separate = corrected

@@ -77,10 +77,10 @@ class ProjectResult:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing failed, and no point was left as it was."""
-        return not self.document["faults"] and not any(
-            report["coverage"]["points_untouched"] for report in self.reports.values()
-        )
+        """Whether nothing failed, and no drive and no point was left as it was."""
+        left = [row["state"] == "uncorrected" for row in self.document["drives"]]
+        untouched = [report["coverage"]["points_untouched"] for report in self.reports.values()]
+        return not any([*self.document["faults"], *left, *untouched])
 
 
 def older_clouds(out: Path, clouds: Mapping[str, WrittenClouds]) -> list[str]:
