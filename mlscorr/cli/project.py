@@ -57,11 +57,8 @@ def correct_drives(
         terminal.say(f"{row['name']}: {row['headline']}")
     if options.page:
         terminal.say(f"Project:   {out / 'project.html'}")
-    failed = [
-        f"{name}: {sentence}"
-        for name, report in result.reports.items()
-        for sentence in failures(gates, report)
-    ]
+    reports = result.reports.items()
+    failed = [f"{name}: {text}" for name, own in reports for text in failures(gates, own)]
     terminal.end(failed, result.is_whole)
 
 
@@ -90,10 +87,7 @@ def status(
         content = project_status(out)
     print_json(content, as_json)
     for row in content["drives"]:
-        stages = [
-            f"{stage['title'].lower()} {stage['done']} of {stage['tasks']}"
-            for stage in row["stages"]
-        ]
+        stages = [f"{s['title'].lower()} {s['done']} of {s['tasks']}" for s in row["stages"]]
         terminal.say(f"{row['name']}: {', '.join(stages)}")
     shares = [f"{stage['title'].lower()} {stage['share']:.0%}" for stage in content["all"]]
     terminal.say(f"All: {', '.join(shares)}")

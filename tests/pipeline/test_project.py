@@ -191,6 +191,10 @@ def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
     checked = check_project(folder)
     (fault,) = checked.faults
     assert "tile-2.laz" in fault.sentence and "cut off" in fault.sentence
+    (folder / "second" / "tile-1.laz").unlink()  # the drive has none but the cut one now
+    (alone,) = check_project(folder).faults
+    assert alone == fault
+    shutil.copy(project.parent / "second" / "tile-1.laz", folder / "second")
     assert any("(first: far)" in sentence for sentence in checked.warnings)
     tile.write_bytes(whole)
     header, *points = (folder / "control.csv").read_text().splitlines()

@@ -58,15 +58,17 @@ def check_project(path: str | Path) -> CheckedSurvey:
 
 def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
     """Surveys of the drives, with the clouds that can be read."""
-    read = [faults.of("data", read_tile, *task.arguments) or {} for task in tile_tasks(project)]
+    tasks = [task.arguments for task in tile_tasks(project)]
+    read = [(owners, faults.of("data", read_tile, path, owners)) for path, owners in tasks]
+    damaged = {owner.name for owners, tiles in read if tiles is None for owner in owners}
     surveys = []
     for drive in project.drives:
-        own = [tiles[drive.name] for tiles in read if drive.name in tiles]
+        own = [tiles[drive.name] for _, tiles in read if tiles and drive.name in tiles]
         planned = faults.of("data", planned_drive, project, drive, own) if own else None
         if planned is not None:
             surveys.append(planned.survey)
-        elif not own:
-            faults.add("data", f"No cloud of drive {drive.name} can be read, or has points of it.")
+        elif not own and drive.name not in damaged:  # of which these files say why
+            faults.add("data", f"No cloud of drive {drive.name} has points of it.")
     return surveys
 
 
@@ -75,9 +77,7 @@ def _checked(survey: Survey) -> tuple[Survey, CheckedSurvey]:
     checked, name = checked_survey(survey, Faults(), needs_control=False), survey.name
     return survey, replace(
         checked,
-        faults=tuple(
-            replace(fault, sentence=f"{name}: {fault.sentence}") for fault in checked.faults
-        ),
+        faults=tuple(replace(f, sentence=f"{name}: {f.sentence}") for f in checked.faults),
         warnings=tuple(f"{name}: {sentence}" for sentence in checked.warnings),
         unchecked=tuple(f"{name}: {sentence}" for sentence in checked.unchecked),
     )
