@@ -45,6 +45,8 @@ def read_layout(path: str | Path) -> LasLayout:
     source = path if is_foreign(path) else None
     path = converted(path).path if source else path
     size = file_state(path)[0]
+    if not size:
+        raise ValueError(f"{path} is empty (0 bytes): its copying was interrupted. Copy it anew.")
     with open_file(path, is_scattered=True) as file:
         head = file.read(HEADER_SIZES[0])
         if head[:4] != b"LASF" or len(head) < HEADER_SIZES[0]:

@@ -107,6 +107,8 @@ def read_trajectory_file(
     path = as_path(path)
     with open_file(path) as file:
         start = file.read(SETTINGS.longest_line)
+    if not start:
+        raise ValueError(f"{path} is empty (0 bytes): its copying was interrupted. Copy it anew.")
     suffix = path.suffix.lower()
     if suffix == POF_SUFFIX or suffix in SBET_SUFFIXES or is_sbet(path):
         return _read_geographic(path, crs, accuracy, section, suffix == POF_SUFFIX)

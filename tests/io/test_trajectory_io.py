@@ -126,7 +126,7 @@ def test_bad_epochs_are_refused(tmp_path, change, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "is empty"),
+        ("", r"is empty \(0 bytes\): .* interrupted. Copy it anew"),
         ("\n\n", "is empty"),
         (HEADER + "\n", "header but no epochs"),
         (HEADER.replace("heading", "yaw") + "\n1,2,3,4,5,6,7\n", "no column heading; it has"),
@@ -320,6 +320,14 @@ def test_bad_sbet_is_refused(tmp_path, change, message):
     path = written(tmp_path / "sbet.out", change(sbet_records()))
     with pytest.raises(ValueError, match=message):
         read_sbet(path, "EPSG:32611")
+
+
+@pytest.mark.parametrize("name", ["way.sbet", "way.pof", "way.txt"])
+def test_an_empty_trajectory_is_no_kind_at_all(tmp_path, name):
+    "Neither a CRS nor a version is asked of 0 bytes, whose copying was interrupted"
+    (tmp_path / name).touch()
+    with pytest.raises(ValueError, match=rf"{name} is empty \(0 bytes\): .* Copy it anew"):
+        read_trajectory(tmp_path / name)
 
 
 def test_an_accuracy_file_of_another_drive_is_refused(tmp_path):
