@@ -155,9 +155,9 @@ def role_doubts(layout: TableLayout, rows: Sequence[Sequence[str]]) -> Iterator[
         if is_check or (is_few and all(word.isalpha() for word in words)):
             yield (
                 f"The column {column} of {layout.path} is not used, and all points are control "
-                f"points, though it may tell check points: it holds "
+                "points, though it may tell check points: it holds "
                 f"{shown(', '.join(sorted(words)))}. If so, say columns.role = '{column}' under "
-                "[control] in survey.toml."
+                "[control]."
             )
 
 

@@ -39,7 +39,7 @@ class StatedDrive(NamedTuple):
 
 
 class StatedProject(NamedTuple):
-    """A project as its project.toml states it, with the drives."""
+    """A project as its project.toml states it."""
 
     path: Path
     settings: ProjectFile
@@ -86,7 +86,6 @@ class ProjectParts:
     layout : str or None
         How the list of these was understood.
     inputs : tuple of InputFile
-        project.toml and the control list.
     """
 
     name: str
@@ -127,7 +126,7 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
     Parameters
     ----------
     project : path or StatedProject
-        project.toml, or the folder that holds it; or what it states.
+        project.toml, its folder, or what it states.
 
     Raises
     ------
@@ -148,7 +147,11 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
     if settings.control is not None:
         file = existing(path, "control.file", settings.control.file)
         inputs.append(input_file("control", file))
-        surveyed = read_surveyed(file, settings.control, _everywhere(drives))
+        try:
+            surveyed = read_surveyed(file, settings.control, _everywhere(drives))
+        except ValueError as error:  # which names where a survey has its [control]
+            error.args = (str(error).replace("survey.toml", path.name),)
+            raise
     name = settings.name or path.parent.name
     return ProjectParts(name, path, crs, drives, *surveyed, tuple(inputs))
 
@@ -159,7 +162,6 @@ def stated_project(path: str | Path) -> StatedProject:
     Parameters
     ----------
     path : path
-        project.toml, or the folder that holds it.
 
     Raises
     ------
@@ -197,7 +199,7 @@ def _stated(path, settings, name, section):
             if settings.control is None:
                 raise ValueError(
                     f"{toml} has a [control] of its own ({own}), and {path} none: a project has "
-                    f"one list for all drives. Name it under [control] in {path.name}."
+                    "one list for all drives. Name it there."
                 )
             notes = (f"Control points are those of the project, not {own}.",)
         whole = whole.model_copy(update={**given, "control": None, "name": name})
@@ -247,8 +249,7 @@ def _check_tiles(path, settings, drives):
         if count > 1:
             names = " and ".join(drive.name for drive in own if number in drive.ids)
             raise ValueError(
-                f"point_source_id {number} of {file} is of drives {names} in {path}: each point is "
-                "of one."
+                f"point_source_id {number} of {file} is of {names} in {path}: a point is of one."
             )
     if shared:
         check_distinct(path, [*shared])
@@ -292,9 +293,8 @@ def _with_beliefs(path, drives):
 
 def _everywhere(drives):
     """A Trajectory that comes by wherever one of some drives does, an epoch each second."""
-    seconds = [np.floor(drive.trajectory.gps_time) for drive in drives]
-    rows = [np.unique(each, return_index=True)[1] for each in seconds]
-    places = [d.trajectory.position[some] for d, some in zip(drives, rows, strict=True)]
-    position = np.concatenate(places)
+    ways = [drive.trajectory for drive in drives]
+    rows = [np.unique(np.floor(way.gps_time), return_index=True)[1] for way in ways]
+    position = np.concatenate([w.position[some] for w, some in zip(ways, rows, strict=True)])
     number = np.arange(len(position), dtype=float)
     return Trajectory(number, position, Rotation.identity(len(position)))

@@ -106,6 +106,27 @@ def test_a_fault_of_a_drives_survey_toml_is_wrong_use_and_one_of_its_data_is_not
     assert exit_codes(write(city, *both)) == {3}
 
 
+@pytest.mark.parametrize(
+    ("head", "row", "words"),
+    [
+        (
+            "name,easting,northing,height",
+            "T1,532010,3374002,44",
+            r"\[control\] in project.toml, len",
+        ),
+        ("name,x,y,height", "T1,1,2,44", r"under \[control.columns\] in project.toml"),
+    ],
+)
+def test_what_a_control_list_lacks_is_wanted_in_project_toml(city, head, row, words):
+    "Kinds and sizes, and which of X and Y is easting: a project has no survey.toml for these"
+    (city / "control.csv").write_text(f"{head}\n{row}\n")
+    control = '[control]\nfile = "control.csv"\nsigma = [0.003, 0.004]\n'
+    control += 'kind = "circle"\nsize = 0.6\n' if "x,y" in head else ""
+    with pytest.raises(ValueError, match=words) as refusal:
+        read_project(write(city, control, DRIVE.format("a"), DRIVE.format("b")))
+    assert "survey.toml" not in str(refusal.value)
+
+
 def test_the_key_of_a_drives_clouds_is_named(city):
     "`files` of the [[drive]], which is what stands in project.toml, for none and for one twice"
     for files, words in (('"a/b*.laz"', "no file is like .*b"), ('"a/*.laz", "a/t*"', "2 times")):
