@@ -46,7 +46,8 @@ class Estimate(Summary):
     used : (n,) bool array
         Which observations took part.
     left_out : (n, 3) array
-        Misclosures that remain at each used one when its target takes no part. Units: m.
+        Misclosures that remain at each used one when its target takes no part; NaN at a single
+        target, which has no others. Units: m.
     log_likelihood, sigma0 : float
     guards : Guards
     support : Support
@@ -253,7 +254,7 @@ def _estimate(trajectory, names, predictions, screening, notes):
     parameters = posterior.modes[0][0]
     solved = kept.solve(parameters)
     left_out = np.full((len(names), 3), np.nan)
-    left_out[used] = leave_targets_out(kept, solved)
+    left_out[used] = leave_targets_out(kept, solved) if len(kept.target_rows) > 1 else np.nan
     pose_error = predict_pose_error(kept, posterior, predictions, solved)
     correction = Correction.by_pose_error(trajectory, *pose_error)
     return Estimate(

@@ -198,10 +198,8 @@ def _uncontrolled(report):
 
 
 def _weakest(report):
-    """The parts of the drive that no control point holds.
-
-    They are no matter where control holds other parts, and their sigma is below the largest
-    residual that the verdict rests on.
+    """The parts of the drive that no control point holds: no matter where control holds others,
+    and their sigma is below the largest residual that the verdict rests on.
     """
     weak = report.support.weak
     if not weak and report.is_held_by_others:
@@ -243,6 +241,9 @@ def _left_out(report) -> Iterator[Statement]:
             "that the others alone correct."
         )
         yield Statement("Left out in turn", "green", sentence)
+    elif left_out is not None and not left_out.n and report.points("control").scored == 1:
+        sentence = "A single control point has no others: the POS's own sigmas alone check it."
+        yield Statement("Left out in turn", "amber", sentence)
 
 
 def _sigma(report) -> Iterator[Statement]:
@@ -285,7 +286,6 @@ def capped(items: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
     Parameters
     ----------
     items : iterable of (str, str)
-        As of a Statement.
     """
     items = tuple(items)
     more = len(items) - NAMED

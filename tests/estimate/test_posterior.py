@@ -183,6 +183,13 @@ def test_what_is_stated_stands_where_nothing_can_tell_its_scale(sigma):
     assert (sigma < largest).all() and (largest < 3 * sigma).all()  # m
 
 
+@pytest.mark.parametrize("times, is_known", [([100.0], False), ([60.0, 100.0], True)])
+def test_a_single_target_is_left_out_for_no_others(times, is_known):
+    "Nothing predicts it but the POS, which is no test; of two each tests the other"
+    case = Case(EPOCHS, CONSTANT / 4, times, np.random.default_rng(3), np.full((2001, 3), 0.5))
+    assert (np.isfinite(case.estimate().left_out) == is_known).all()
+
+
 def test_a_target_is_in_one_block_with_all_its_passes():
     "Of 150 targets seen twice each has both looks in its block, and blocks are alike in size"
     times = np.sort(np.random.default_rng(4).uniform(2.0, 198.0, 300))

@@ -10,7 +10,7 @@ from mlscorr.estimate import Support, WeakStretch
 from mlscorr.estimate.support import DRIFT, NO_CONTROL, REASONS
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.report.headline import first_screen, headline, statements
-from tests.beds.reports import drive, fabricate, page, words
+from tests.beds.reports import drive, fabricate, page, report_of, words
 
 
 def lost(name, role="check", scanned=True, number=None):
@@ -49,6 +49,17 @@ def test_refused_and_missing_control_points_are_counted():
     rows = [replace(report.targets[0], **out), *report.targets[1:], lost("T40", "control")]
     text = headline(replace(report, targets=rows))
     assert "Control: 5 of 7 surveyed points used, 1 refused (T01), 1 not seen (T40)." in text
+
+
+@pytest.mark.parametrize("checks", [True, False])
+def test_a_single_control_point_is_corrected_by_no_others(checks):
+    "It is said that the POS alone checks it, and no number of what the others make of it"
+    rows = [row for row in fabricate(drive(), count=3)[2].targets if row.name != "T02"]
+    report = report_of(drive(), rows if checks else rows[:1])
+    (fact,) = [fact for fact in statements(report) if fact.what == "Left out in turn"]
+    assert fact.rating == "amber" and fact.sentence.startswith("A single control point has no oth")
+    said = " ".join(f"{fact.sentence} {fact.items}" for fact in statements(report))
+    assert "the others" not in said and "were left out in turn" not in said
 
 
 def test_what_was_found_half_a_metre_off_is_not_said_to_be_unseen():

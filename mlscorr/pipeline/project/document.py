@@ -130,11 +130,10 @@ def project_document(
             "faults": faults,
         },
     )
-    names = [row["name"] for row in rows]
     return ProjectResult(
         content,
-        {name: result.track for name, (result, _) in zip(names, drives, strict=True)},
-        {name: report for name, (_, report) in zip(names, drives, strict=True)},
+        {result.state.name: result.track for result, _ in drives},
+        {result.state.name: report for result, report in drives},
     )
 
 
@@ -169,15 +168,13 @@ def _statements(project, rows, drives, faults):
     """What stands first on the page: drives, control, files."""
     count = {state: [row["name"] for row in rows if row["state"] == state] for state in STATES}
     held = len(count["controlled"]) + len(count["tied"])
-    states = [(state, names) for state, names in count.items() if names]
+    others = [(s, names) for s, names in count.items() if names and s != "controlled"]
     yield headline.Statement(
         "Drives",
         "green" if held == len(project.drives) else "red",
         f"{held} of {len(project.drives)} drives are held by control points, "
         f"{len(count['tied'])} of them through ties with other drives.",
-        tuple(
-            (", ".join(names), STATES[state]) for state, names in states if state != "controlled"
-        ),
+        tuple((", ".join(names), STATES[state]) for state, names in others),
     )
     used = {
         target["name"]
