@@ -86,6 +86,7 @@ class ProjectParts:
     layout : str or None
         How the list of these was understood.
     inputs : tuple of InputFile
+        project.toml and the control list.
     """
 
     name: str

@@ -198,8 +198,10 @@ def _uncontrolled(report):
 
 
 def _weakest(report):
-    """The parts of the drive that no control point holds: no matter where control holds others,
-    and their sigma is below the largest residual that the verdict rests on.
+    """The parts of the drive that no control point holds.
+
+    They are no matter where control holds other parts, and their sigma is below the largest
+    residual that the verdict rests on.
     """
     weak = report.support.weak
     if not weak and report.is_held_by_others:
@@ -286,6 +288,7 @@ def capped(items: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
     Parameters
     ----------
     items : iterable of (str, str)
+        As of a Statement.
     """
     items = tuple(items)
     more = len(items) - NAMED
