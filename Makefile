@@ -3,16 +3,17 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
 
-.PHONY: demo test docs wheel faults folders bench bench-scale tables assets pages examples clean
+.PHONY: demo test test-all docs wheel faults folders bench bench-scale tables assets pages examples clean
 
 demo: $(VENV)/ready
 	$(RUN)/mlscorr demo -o demo --overwrite
 
-test: $(VENV)/ready
+# In under ten minutes on two cores; test-all, in half an hour, runs what is marked long as well
+test test-all: $(VENV)/ready
 	$(RUN)/ruff check .
 	$(RUN)/ruff format --check .
 	$(RUN)/mypy
-	$(RUN)/python -m pytest -n 2 --dist loadfile
+	$(RUN)/python -m pytest -n 2 --dist loadfile $(if $(filter test,$@),-m "not long")
 
 # The manual, build/manual/index.html; its notebook runs, and a warning is an error
 docs: $(VENV)/ready

@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from tests.beds.joint_scores import records
 from tests.beds.places import BENCHMARKS, EXAMPLES
 
@@ -18,6 +20,7 @@ def test_correct_a_survey_makes_its_picture(street, tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_pos_error_makes_its_picture(tmp_path):
     "The example on POS errors draws simulated ones where no real series is at hand"
     picture = tmp_path / "picture.png"
@@ -27,6 +30,7 @@ def test_pos_error_makes_its_picture(tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_decision_costs_makes_its_picture(tmp_path):
     "Of records that are there no world is made anew: a picture, and a line each operating point"
     for world in range(2):

@@ -51,6 +51,7 @@ def test_tuned_on_the_truth_it_is_never_worse_than_least_squares(paper):
         assert np.all(tables.rms(other) >= tables.rms(left))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("script", "tables"),
     [("car", (1, 2, 3, 4)), ("boat", (5,)), ("calibration", (6, 7))],

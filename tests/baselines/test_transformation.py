@@ -60,6 +60,7 @@ def test_the_height_is_shifted_alone_where_targets_lie_on_a_line():
     assert np.abs(correction.change).max() < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(5))
 def test_a_constant_shift_is_removed_by_shift_rigid_and_collocation_alike(seed):
     "Where the POS doesn't drift, collocation costs at most 2 mm against the right model"

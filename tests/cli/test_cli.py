@@ -409,6 +409,7 @@ def test_paths_may_be_relative_with_spaces_and_umlauts(commanded):
     assert [path.name for path in out.parent.iterdir()] == [out.name]
 
 
+@pytest.mark.long
 def test_a_quality_gate_fails_with_everything_written_and_nothing_else_said(survey):
     "Exit code 6 and one line for each gate that is met; the results are whole, stderr quiet"
     out = survey.parent / "out"
@@ -420,6 +421,7 @@ def test_a_quality_gate_fails_with_everything_written_and_nothing_else_said(surv
     assert (out / "report.json").exists() and (out / "pass-1.laz").exists()
 
 
+@pytest.mark.long
 def test_a_gate_that_cannot_be_read_stops_before_any_work(survey):
     "Exit code 2 and the nearest name; no folder appears"
     out = survey.parent / "out"
@@ -445,6 +447,7 @@ def test_points_without_a_pose_are_counted_and_the_rest_is_done(in_part):
     assert process.stdout == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kept", "order"), [(4, 5), (1, 1)])
 def test_few_control_points_lower_the_order_with_a_warning(kept, order, survey):
     "Still done, exit code 0: what is doubtful is warned of and in report.json, without a page"
@@ -505,6 +508,7 @@ def libraries_load(folder, process):
         time.sleep(0.002)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name
 )
@@ -526,6 +530,7 @@ def test_an_interruption_while_libraries_load_is_not_lost(survey):
     assert list(survey.parent.iterdir()) == [survey]
 
 
+@pytest.mark.long
 def test_a_killed_process_leaves_no_folder_under_the_name(survey):
     "After SIGKILL while writing only a folder named .part is there, and a second run works"
     code, _ = interrupt(survey, signal.SIGKILL, writing_has_begun)
@@ -545,6 +550,7 @@ app(sys.argv[1:])
 """
 
 
+@pytest.mark.long
 def test_a_system_without_locks_and_hangups_corrects(survey):
     "Windows knows no fcntl, SIGHUP and timers: a survey is corrected there, nothing else is left"
     out = survey.parent / "out"

@@ -37,6 +37,7 @@ def random_matrix(seed):
     return pattern, values, dense
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(6))
 def test_everything_is_that_of_the_dense_matrix(seed):
     "Determinant, solution of five columns, and each block of the inverse, to 1e-10"

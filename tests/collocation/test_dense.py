@@ -196,6 +196,7 @@ def test_observations_without_noise_are_predicted_back():
         assert np.sqrt(covariance).max() < 1.01 * sigma
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("family", FAMILIES)
 def test_stated_covariances_are_those_of_the_errors(family):
     """Where the model is right the normalised prediction errors are chi-squared.

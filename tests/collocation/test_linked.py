@@ -54,6 +54,7 @@ def test_a_millionth_of_weight_leaves_a_wrong_tie_out():
         reweight(SOLVED, [np.ones(10), np.append(np.ones(29), 0.0)])
 
 
+@pytest.mark.long
 def test_each_tie_left_out_is_what_the_others_predict():
     "Residual and variance by leaving it out in earnest, to 1e-7 m; control rows by leave_out"
     left_out = leave_each_out(SOLVED)

@@ -49,6 +49,7 @@ def sigma_of(partials, covariance):
     return np.sqrt(np.einsum("nij,njk,nik->ni", partials, covariance, partials))
 
 
+@pytest.mark.long
 def test_the_pose_is_carried_to_points_with_its_full_covariance():
     "With any covariance of the six components the sigmas are those of J C J^T"
     rng = np.random.default_rng(1)
@@ -150,6 +151,7 @@ def assert_only_sigmas_added(target, plain, sigma):
     assert len(new.evlrs or []) == len(old.evlrs or [])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".laz", ".las"])
 @pytest.mark.parametrize("point_format", [1, 7, 10])
 def test_corrected_copies_carry_the_sigmas(point_format, suffix, tmp_path):
@@ -162,6 +164,7 @@ def test_corrected_copies_carry_the_sigmas(point_format, suffix, tmp_path):
     assert_only_sigmas_added(target, plain, sigma)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["las_with_several_extra_byte_bloc.laz", "sample_c.las"])
 def test_real_files_carry_the_sigmas(name, tmp_path):
     "Real files keep every field and get three"

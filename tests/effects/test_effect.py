@@ -169,6 +169,7 @@ def clean():
     return simulated()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CLOUD)
 def test_simulated_targets_shift_as_the_partial_derivative_says(name, clean):
     "A survey simulated with and without: the same returns, and each target moved to 1 %"

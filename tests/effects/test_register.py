@@ -101,6 +101,7 @@ def test_the_simulator_applies_it():
     assert (shift[:, :2] == 0).all()
 
 
+@pytest.mark.long
 def test_the_diagnosis_differentiates_it(tmp_path):
     "Its signature on a survey's planned rows is its own effect by its own size, to 1 %"
     drive().write(tmp_path / "survey")
@@ -122,6 +123,7 @@ def test_the_diagnosis_differentiates_it(tmp_path):
     assert "Squatting vehicle" in words(plan_page(document, "street"))
 
 
+@pytest.mark.long
 def test_the_report_words_it():
     "A verdict has its sentence with size and side, its title and its meaning"
     document = gap_document()

@@ -18,6 +18,7 @@ MOUNTING = Mounting(np.array([0.1, -0.6, 0.4]), Rotation.from_euler("xyz", [90, 
 WEAK = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])  # m, rad
 
 
+@pytest.mark.long
 def test_passes_of_one_target_share_its_survey_error():
     "Many passes average the extraction, not the survey: sigma never falls below the survey's"
     rng, passes = np.random.default_rng(1), 25

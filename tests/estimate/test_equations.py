@@ -142,6 +142,7 @@ def test_the_solution_is_the_dense_one(family):
     assert solved.log_likelihood == pytest.approx(expected.log_likelihood, abs=1e-6)
 
 
+@pytest.mark.long
 def test_few_rows_with_ties_are_weighed_as_they_are_solved():
     "The log-likelihood by the covariance matrix is that of the knots, to 0.01 in any family"
     survey = tied_passes(1)

@@ -22,6 +22,7 @@ from mlscorr.survey import Trajectory
 from tests.beds.pos_errors import CONSTANT, EPOCHS, START, Case, even, smooth_case, waves
 
 
+@pytest.mark.long
 def test_signals_extrapolated_in_time_are_told():
     "Both ends beyond the control span are named in seconds and correlation times"
     rng = np.random.default_rng(2)

@@ -49,6 +49,7 @@ def test_negative_sigmas_of_the_pos_are_refused():
         case.estimate()
 
 
+@pytest.mark.long
 def test_sigmas_missing_in_part_are_filled_and_told():
     "Zeros over 10 s of a constant sigma: the same result as without them, and a sentence"
     case = smooth_case(1)

@@ -15,6 +15,8 @@ from mlscorr.estimate import (
 from mlscorr.frames import scanner_position
 from tests.beds.scanner_site import LACKS, RECORDED, scanner_site
 
+pytestmark = pytest.mark.long
+
 SEEDS = range(1, 5)
 UNITS = np.repeat([1.0, np.degrees(1.0)], 3)  # m, deg
 

@@ -148,6 +148,7 @@ def test_the_partials_are_those_of_georeferencing():
         assert np.allclose((ends[0] - ends[1]) / (2 * step), partials[:, :, axis], atol=1e-4)
 
 
+@pytest.mark.long
 def test_a_wrong_mounting_is_found_exactly_where_nothing_else_is_wrong():
     "Without noise 5 deg and 0.3 m are recovered to 0.1 mm and 0.0002 deg by both methods"
     lacks = np.append([0.3, -0.2, 0.1], np.radians([3.0, -2.0, 4.0]))
@@ -157,6 +158,7 @@ def test_a_wrong_mounting_is_found_exactly_where_nothing_else_is_wrong():
         assert np.abs(np.degrees(estimate.correction - lacks))[3:].max() < 2e-4  # deg
 
 
+@pytest.mark.long
 def test_the_sigmas_are_honest(sites):
     "Over 20 sites errors over sigma have an RMS of about one, and nearly all are below two"
     ratio = np.array(
@@ -166,6 +168,7 @@ def test_the_sigmas_are_honest(sites):
     assert np.mean(np.abs(ratio) < 2) > 0.93
 
 
+@pytest.mark.long
 def test_collocation_is_as_good_as_least_squares_or_better(sites):
     "The RMS error over 20 sites, each component over its sigma, is no larger than that of LS"
     errors = [
@@ -182,6 +185,7 @@ def test_collocation_is_as_good_as_least_squares_or_better(sites):
     assert errors[0] < 1.02 * errors[1]
 
 
+@pytest.mark.long
 def test_the_correction_moves_points_as_the_true_mounting_does(sites):
     "Targets come as near to where they were surveyed as noise and the POS error leave them"
     for site, calibration in sites[:5]:
@@ -192,6 +196,7 @@ def test_the_correction_moves_points_as_the_true_mounting_does(sites):
         assert size[0] > 0.03 and size[1] < 0.016 and size[2] < 0.9 * size[1]  # m
 
 
+@pytest.mark.long
 def test_correlations_and_covariance_agree(sites):
     "The correlation matrix has ones on its diagonal and gives the covariance with the sigmas"
     estimate = sites[0][1].lsc
@@ -202,6 +207,7 @@ def test_correlations_and_covariance_agree(sites):
     assert np.linalg.eigvalsh(estimate.correlation).min() > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("move, wait", [([400_000.0, -3e6, 500.0], 0.0), ([0.0] * 3, 172_800.0)])
 def test_neither_origin_nor_time_zero_matter(move, wait):
     "A survey moved by thousands of kilometres or by two days has the same calibration"
@@ -222,6 +228,7 @@ def test_neither_origin_nor_time_zero_matter(move, wait):
     assert np.abs(here.lsc.correction - there.lsc.correction).max() < 1e-6
 
 
+@pytest.mark.long
 def test_the_order_of_the_targets_does_not_matter():
     "Observations and control points in any order give the same calibration"
     site = Site(4)
@@ -231,6 +238,7 @@ def test_the_order_of_the_targets_does_not_matter():
     assert np.abs(here.lsc.correction - there.lsc.correction).max() < 1e-9
 
 
+@pytest.mark.long
 def test_one_straight_pass_does_not_determine_the_lever_arm():
     "On one heading a lever arm looks like a constant error of the POS; its sigma is no better"
     straight, both = Site(5, passes=1, swing=0.0).calibrate(), Site(5).calibrate()
@@ -239,6 +247,7 @@ def test_one_straight_pass_does_not_determine_the_lever_arm():
     assert "does not determine lever arm right" in straight.warnings[0]
 
 
+@pytest.mark.long
 def test_two_directions_determine_all_but_the_height(sites):
     "Driven in both directions, a level way hides the lever arm up alone: it may be the datum"
     assert all(c.determined.tolist() == [True, True, False, True, True, True] for _, c in sites)
@@ -263,6 +272,7 @@ def test_what_no_target_tells_stays_as_it_was_recorded():
     assert (calibration.lsc.sigma[~calibration.determined] > 0.002).all()
 
 
+@pytest.mark.long
 def test_a_wrong_control_point_is_named_and_left_out():
     "A point surveyed 0.3 m off is found by its statistic; the rest calibrates as without it"
     site = Site(7)
@@ -277,6 +287,7 @@ def test_a_wrong_control_point_is_named_and_left_out():
     assert np.abs(ratio).max() < 1.5
 
 
+@pytest.mark.long
 def test_a_large_site_is_calibrated_with_parameters_from_a_part_of_it():
     "With 105 targets seen twice the sigmas are smaller, and the truth lies within four of them"
     large, small = Site(9, targets=105), Site(9)
@@ -416,6 +427,7 @@ def test_the_command_writes_the_calibration(commanded):
     assert max(content["with_drift"]["check"]["after"]["rmse"]) < 0.03
 
 
+@pytest.mark.long
 def test_the_survey_it_writes_can_be_calibrated_again(street, commanded):
     "survey.toml holds recorded + c and names the new clouds, which lack nothing any more"
     _, out = commanded
@@ -435,6 +447,7 @@ def test_the_survey_it_writes_can_be_calibrated_again(street, commanded):
     assert (np.abs(again.lsc.correction) < 1.5 * again.lsc.sigma).all()
 
 
+@pytest.mark.long
 def test_control_that_corrected_the_trajectory_does_not_count_again_in_silence(commanded, tmp_path):
     "A correction and a check say how many points count twice; of other points nobody complains"
     survey = mlscorr.read_survey(commanded[1])
@@ -452,6 +465,7 @@ def test_control_that_corrected_the_trajectory_does_not_count_again_in_silence(c
     assert not list(reuse_warnings(replace(survey, control=others)))
 
 
+@pytest.mark.long
 def test_check_points_take_no_part(street, commanded, tmp_path):
     "With check points that are decimetres off the calibration is the same to the last digit"
     _, out = commanded
@@ -494,6 +508,7 @@ def test_files_measured_at_the_same_time_are_warned_of(street, tmp_path):
         warn_of_scanners(mlscorr.read_survey(folder))
 
 
+@pytest.mark.long
 def test_the_example_makes_its_picture(street, tmp_path):
     "The example calibrates a survey, prints what its mounting lacks, and draws it"
     script = EXAMPLES / "calibrate_mounting.py"
@@ -503,6 +518,7 @@ def test_the_example_makes_its_picture(street, tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_a_measured_lever_arm_is_a_prior():
     "To a millimetre by tape: the calibration keeps it, and the boresight is told better too"
     site = Site(5, passes=1, swing=0.0)

@@ -39,12 +39,14 @@ def checked(seed, degrees, number=120):
     return find_mounting_error(estimate, matched, RECORDED)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_drift_alone_is_no_boresight(seed):
     "Half a metre of drift and a right mounting: no sentence"
     assert mounting_warnings(checked(seed, [0.0, 0.0, 0.0])) == ()
 
 
+@pytest.mark.long
 def test_a_boresight_of_a_degree_is_named():
     "The sentence says by how much, and which command finds it"
     check = checked(1, [0.0, 1.0, 0.0])
@@ -65,6 +67,7 @@ def test_a_lever_arm_is_named_where_it_exceeds_its_sigma_and_alone():
     assert mounting_warnings(replace(check, statistic=20.0)) == ()
 
 
+@pytest.mark.long
 def test_without_ties_nothing_is_tested():
     "Control points alone: None"
     street = tied_passes(1)

@@ -14,6 +14,7 @@ from mlscorr.evaluate.model import model_section
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, smooth_case
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("n", "order"), [(1, 0), (2, 0), (3, 1), (4, 2), (5, 3), (6, 3)])
 def test_the_order_falls_with_too_few_control_points(n, order):
     "A trend needs one control point more than parameters per axis; a lowered order is told"
@@ -24,6 +25,7 @@ def test_the_order_falls_with_too_few_control_points(n, order):
     assert len(lowered) == (order < 3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [1, 7, 14])
 def test_left_out_misclosures_are_those_of_an_estimate_without_the_target(number):
     "left_out of a target is what the others' trend and signals leave there, to 1e-9 m"
@@ -41,6 +43,7 @@ def test_left_out_misclosures_are_those_of_an_estimate_without_the_target(number
     assert estimate.left_out[number] == pytest.approx((one.misclosure - mean)[0], abs=1e-9)
 
 
+@pytest.mark.long
 def test_orders_and_families_are_set_side_by_side():
     "None, 0 and 1 in four families; probabilities sum to one, and the report has them all"
     estimate = smooth_case(2).estimate()
@@ -53,6 +56,7 @@ def test_orders_and_families_are_set_side_by_side():
     assert section["global_test"]["passed"]
 
 
+@pytest.mark.long
 def test_a_shift_needs_no_slope():
     "Where only a constant is wrong, order 0 is more probable than order 1"
     rng = np.random.default_rng(5)
@@ -113,6 +117,7 @@ def test_the_likelihood_is_that_of_a_trend_with_a_prior(equations, alternatives)
     assert row.log_likelihood == pytest.approx(density, abs=1e-6)
 
 
+@pytest.mark.long
 def test_a_slope_is_worth_an_order():
     "A drift of 1 m over the drive that no signal is believed to make needs order 1, no higher"
     slope = np.outer(EPOCHS / EPOCHS[-1], [1.0, -0.7, 0.5])

@@ -75,6 +75,7 @@ def test_control_in_a_smoothed_outage_leaves_the_rest_alone():
     assert np.median(left) < 0.15  # m
 
 
+@pytest.mark.long
 def test_nothing_that_control_does_not_tell_makes_the_head_surer_than_the_tail():
     "A constant error and sigma: 40 s before the first control are as open as 40 s after the last"
     error, ends = np.tile([0.1, -0.05, 0.03], (len(TIME), 1)), []
@@ -90,6 +91,7 @@ def test_nothing_that_control_does_not_tell_makes_the_head_surer_than_the_tail()
     assert head < 0.05  # m, where an error was the same for 200 s
 
 
+@pytest.mark.long
 def test_ties_tell_when_an_outage_began_where_no_control_point_does():
     "With control at both ends of the drive alone the start is found within 8 s in every drive"
     for seed in range(3):

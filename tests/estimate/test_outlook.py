@@ -93,6 +93,7 @@ def sigma_ratio(estimate, fewer, step):
     return np.median(some / complete)
 
 
+@pytest.mark.long
 def test_fewer_rows_hold_the_drive_as_all_of_them_do():
     "A hundred ties, each as precise as the twelve that it stands for: its sigma to 10 %"
     case = tied_passes(1, number=1200)
@@ -102,6 +103,7 @@ def test_fewer_rows_hold_the_drive_as_all_of_them_do():
     assert sigma_ratio(estimate, fewer, step=20) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_hundreds_of_control_points_are_thinned_alike():
     "400 points, a third of them as precise as three each: sigma to 10 % in the median"
     times = np.linspace(2.0, 238.0, 400)

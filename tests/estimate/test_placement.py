@@ -47,6 +47,7 @@ def test_places_are_the_same_with_any_number_of_threads(gapped):
     assert places[0] == places[1]
 
 
+@pytest.mark.long
 def test_a_target_there_gives_the_sigma_that_was_promised(gapped):
     "A new estimate with a target at the first place has its sigmas, there and all along, to 10 %"
     first = place_control(gapped)[0]

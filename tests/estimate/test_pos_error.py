@@ -104,6 +104,7 @@ def _predicted(equations, solved, parameters):
     return solved.predict(trajectory.gps_time, design, mixings, clocks)
 
 
+@pytest.mark.long
 def test_a_constant_shift_is_recovered_to_millimetres():
     "0.5 m that do not change are found to 3 mm at each epoch between 16 targets of 6 mm"
     worst = []
@@ -114,6 +115,7 @@ def test_a_constant_shift_is_recovered_to_millimetres():
     assert np.median(worst) < 0.003  # m
 
 
+@pytest.mark.long
 def test_a_heading_error_is_told_from_a_position_error():
     "0.2 deg of heading, 6 to 14 m of range on both sides: recovered to 0.03 deg, position to 1 cm"
     sigma = np.radians(np.tile([0.01, 0.01, 0.2], (len(EPOCHS), 1)))
@@ -154,6 +156,7 @@ def test_one_control_point_moves_the_drive_by_what_it_misses():
     assert (away > 1.5 * there).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("datum", [0.0, 1.0])
 def test_two_control_points_in_an_outage_leave_what_gnss_held(datum):
     """Elsewhere 6 mm become 9 mm at most in the median, and of a datum of 0.54 m a tenth is left.
@@ -197,12 +200,14 @@ def test_a_wrong_control_point_is_found_and_named(size, sigma, share):
     assert np.mean(named) >= share and others == 0
 
 
+@pytest.mark.long
 def test_good_control_points_are_rarely_rejected(smooth, outages):
     "None of 14 clean surveys loses a target"
     rejected = [bool(estimate.outliers) for _, estimate in smooth + outages]
     assert not any(rejected)
 
 
+@pytest.mark.long
 def test_four_targets_cannot_tell_which_is_wrong():
     "With fewer than five targets, passes counted once, none is rejected however wrong it is"
     case = smooth_case(1, n=4)
@@ -245,6 +250,7 @@ def moved(case, days, offset):
     return there
 
 
+@pytest.mark.long
 def test_origin_and_order_do_not_matter():
     "Two days later, 300 km away, observations shuffled: the same remaining errors to 0.1 mm"
     for case in (smooth_case(5), outage_case(5)):
@@ -291,6 +297,7 @@ def test_targets_at_the_same_time_are_solved(gps_time):
     assert (np.abs(left) < 3 * sigma).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wrong", ["millimetres", "kilometres", "constant", "jumping"])
 def test_sigma_that_lies_costs_little(wrong):
     "In another unit, constant, or jumping at single epochs: a fifth of the raw error at most"
@@ -321,6 +328,7 @@ def real_windows(length=248.0):
         yield gps_time[inside] - START, error[inside], sigma[inside]
 
 
+@pytest.mark.long
 def test_real_drift_is_corrected_better_than_by_a_polynomial():
     """A real MEMS drive's outages: far better than an order 5 polynomial fit to the same targets.
 

@@ -145,6 +145,7 @@ def test_weights_and_probabilities_sum_to_one(posterior):
     assert by_family == pytest.approx({family: s / total for family, s in listed.items()})
 
 
+@pytest.mark.long
 def test_points_are_always_the_same(equations, posterior):
     "No random number enters: again, and with targets in another order, the same points to 1e-3"
     again = choose_parameters(equations, points=8)
@@ -231,6 +232,7 @@ def test_a_calibration_frees_the_attitude_time():
     assert replace(chosen, attitude_time=1.0).drift_time != pytest.approx(chosen.attitude_time)
 
 
+@pytest.mark.long
 def test_a_search_turns_back_from_scales_that_rounding_spoils():
     "Drift of kilometres beside ties seen twice to a micrometre: improbable, not the end"
     survey = tied_passes(1, number=40)

@@ -16,6 +16,7 @@ def smoothed_case(seed, stated=0.02):
     return Case(EPOCHS, error, even(20), rng, np.full_like(sigma, stated)), error
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 8])
 def test_a_run_of_neighbours_is_drift(seed):
     "Five control points in an unstated outage are used, not rejected; 5 % of the error is left"
@@ -26,6 +27,7 @@ def test_a_run_of_neighbours_is_drift(seed):
     assert any("drifts there by more than it states" in line for line in estimate.warnings)
 
 
+@pytest.mark.long
 def test_a_lone_blunder_stays_an_outlier():
     "One control point wrong by 0.4 m beside the outage is still named, and nothing else"
     case, error = smoothed_case(1)

@@ -41,6 +41,7 @@ def calibrated(seed, ranges=0.0, scale=0.0):
     return site, tied, with_scanner_errors(tied, matched)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ranges", "scale"), [(0.03, 0.0), (0.0, 0.003)])
 def test_what_ranges_or_encoder_lack_is_found_and_the_mounting_freed_of_it(ranges, scale):
     "30 mm, or 3 mrad per rad, within three sigmas, and the mounting within three of the truth"
@@ -55,6 +56,7 @@ def test_what_ranges_or_encoder_lack_is_found_and_the_mounting_freed_of_it(range
     assert "The scanner itself is off" in freed.warnings[-1]
 
 
+@pytest.mark.long
 def test_a_scanner_that_is_right_changes_nothing():
     "No sentence, the same mounting, and values within three sigmas of zero"
     _, tied, freed = calibrated(1)

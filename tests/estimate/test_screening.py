@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from mlscorr.estimate import estimate_correction
 from mlscorr.estimate.posterior import Objective, Posterior
@@ -20,6 +21,7 @@ from tests.beds.pos_errors import (
 )
 
 
+@pytest.mark.long
 def test_two_wrong_control_points_do_not_hide_each_other():
     "Two of 16 wrong by 0.5 m at once, in any directions: both named in 3 of 4 surveys, no other"
     both, others = 0, 0
@@ -39,6 +41,7 @@ def test_two_wrong_control_points_do_not_hide_each_other():
     assert both >= 3 and others == 0
 
 
+@pytest.mark.long
 def test_a_fifth_of_the_control_points_may_be_wrong():
     "Three of 16 wrong: the result is that of the 13 good ones, to a millimetre"
     differences = []
@@ -54,6 +57,7 @@ def test_a_fifth_of_the_control_points_may_be_wrong():
     assert max(differences) < 1e-3  # m
 
 
+@pytest.mark.long
 def test_neighbours_wrong_together_are_rejected_or_told():
     "Two targets in turn wrong by one vector never pass as drift without a sentence"
     for seed in range(3):
@@ -68,6 +72,7 @@ def test_neighbours_wrong_together_are_rejected_or_told():
         assert wrong <= named or any("follow each other" in text for text in estimate.warnings)
 
 
+@pytest.mark.long
 def test_a_target_that_is_wrong_in_one_of_two_passes_is_found_among_many():
     "Of 60 targets, each seen again 120 s later, the second look at one is off by 0.3 m: it goes"
     rng, first = np.random.default_rng(3), np.linspace(3.0, 117.0, 60)
@@ -84,6 +89,7 @@ def test_a_target_that_is_wrong_in_one_of_two_passes_is_found_among_many():
     assert np.abs(moved - error).max() < 0.02  # m
 
 
+@pytest.mark.long
 def test_a_bias_that_the_pos_does_not_state_is_corrected_beside_one_that_it_does():
     "0.3 m that come and go over 30 s, under a sigma of 1.5 cm that knows of another place only"
     left = []

@@ -84,6 +84,7 @@ def test_times_at_which_nothing_was_scanned_are_not_extrapolated():
     assert len(places) == 3 and (times > 99.8).all() and (times < 180.2).all()
 
 
+@pytest.mark.long
 def test_no_control_is_asked_for_in_a_pause_of_the_scanner():
     "60 s without points between control: the next points belong beside it, not into it"
     rng = np.random.default_rng(2)

@@ -11,6 +11,7 @@ from mlscorr.estimate.target_tests import TargetTest, all_tests, single_test
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, rms, smooth_case
 
 
+@pytest.mark.long
 def test_what_tests_state_is_what_they_find():
     "Over good surveys w is at most standard normal, redundancies lie in [0, 1]"
     w = []

@@ -86,6 +86,7 @@ def test_without_control_passes_agree_and_nothing_more_is_claimed():
     assert tied.support.contains(survey.trajectory.gps_time).all()
 
 
+@pytest.mark.long
 def test_a_wrong_control_point_is_named():
     "A point that is 0.4 m off is an outlier where ties hold its epoch to the other pass"
     times = (5.0, 15.0, 25.0, 35.0, 45.0, 55.0)
@@ -97,6 +98,7 @@ def test_a_wrong_control_point_is_named():
     assert rms(survey.left(tied.correction)) < 0.04  # m
 
 
+@pytest.mark.long
 def test_a_wrong_control_point_among_three_is_named_and_used():
     "Too few are left to tell which is wrong, so each that contradicts the ties has a sentence"
     survey = tied_passes(3, control=(15.0, 30.0, 45.0), number=30)
@@ -109,6 +111,7 @@ def test_a_wrong_control_point_among_three_is_named_and_used():
     assert all("too few are left to tell" in text for text in sentences)
 
 
+@pytest.mark.long
 def test_ties_that_contradict_each_other_are_not_used():
     "Where more than half are wrong by up to metres, control alone decides, and it is said"
     survey = tied_passes(4, wrong=0.8, apart=3.0)
@@ -118,6 +121,7 @@ def test_ties_that_contradict_each_other_are_not_used():
     assert "None of the 300 ties" in " ".join(tied.warnings)
 
 
+@pytest.mark.long
 def test_what_ties_of_a_second_share_is_held_down_by_their_weights():
     "An error of 1 cm per second harms a tenth less by weights, though more is left of the ties"
     harm, residual = np.zeros((4, 2)), np.zeros((4, 2))
@@ -136,6 +140,7 @@ def test_what_ties_of_a_second_share_is_held_down_by_their_weights():
     assert (residual[:, 0] < residual[:, 1]).all()
 
 
+@pytest.mark.long
 def test_order_of_ties_does_not_matter(clean):
     "Ties in any order give the same correction to 2 mm: other ones choose the parameters"
     survey, alone, tied = clean

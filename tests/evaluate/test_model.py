@@ -73,6 +73,7 @@ def test_one_target_left_out_is_not_corrected():
         assert row["leave_one_out_rmse"] == pytest.approx([0.4, 0.3, 0.2], abs=0.03)  # m
 
 
+@pytest.mark.long
 def test_the_global_test_and_gap_are_those_of_the_guards():
     "Statistic within limits, start and end of the longest stretch without control"
     estimate = smooth_case(12, n=6).estimate()

@@ -10,6 +10,7 @@ from mlscorr.evaluate.ties import tie_section
 from tests.beds.tied_passes import tied_passes
 
 
+@pytest.mark.long
 def test_the_section_counts_and_measures_what_was_given():
     """300 planes of one pair of passes: decimetres apart before, their noise of 4 mm after; none
     that was refused counts, and where there are none there is a reason

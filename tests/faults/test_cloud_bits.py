@@ -79,6 +79,7 @@ def test_a_pointwise_file_is_named_as_such(tmp_path):
         sample_gps_times(path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
 def test_no_bit_of_a_header_changes_the_points(suffix, tmp_path, capfd):
     "Any bit of header and VLRs turned: the copy has the points of the input, or there is none"

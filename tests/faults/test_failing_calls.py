@@ -68,6 +68,7 @@ def check_again(stage, command, before, whole, left):
     assert (again.code, again.left) == (0, whole), again.stderr
 
 
+@pytest.mark.long
 def test_a_failing_call_leaves_all_or_nothing(stage, kept, record_property):
     "Whatever call fails: one sentence with the cause, the old results or the new, and no .part"
     rng, outcomes = np.random.default_rng(18), Counter()
@@ -138,6 +139,7 @@ def check_ended(ended, number, before, whole):
     return f"interrupted; {said}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("command", "call"), COMMANDS if IS_FULL else COMMANDS[:1])
 def test_every_command_says_that_the_disk_is_full(command, call, shim, tiny, tmp_path):
     "As users run them: exit code 5, one sentence, nothing left, the input intact"

@@ -9,6 +9,7 @@ from mlscorr.gap.agreement import agreements
 from mlscorr.gap.train import features
 
 
+@pytest.mark.long
 def test_errors_of_the_stated_size_agree_with_it():
     "Residuals drawn row by row with the stated variances have their RMS, to 10 %, in each channel"
     g = features.geometry(3, targets=30, patches=300, rough=False)

@@ -13,6 +13,8 @@ from mlscorr.survey import Pos
 from tests.beds.places import EXAMPLES
 from tests.beds.shared import shared
 
+pytestmark = pytest.mark.long
+
 REAL = EXAMPLES / "real"
 BELIEVED = Pos(0.023, np.radians([0.0145, 0.0145, 0.065]))  # as the simulated unit states it
 REPLICAS = 20

@@ -134,6 +134,7 @@ def test_a_glance_leaves_a_long_copc_as_it_is(pair, monkeypatch):
         assert (np.diff(next(read_chunks(cloud_of(pair[1]))).gps_time) < 0).any()
 
 
+@pytest.mark.long
 def test_a_survey_in_copc_is_corrected_as_in_laz(street, tmp_path):
     "The same figures, and the same points to the digit, as COPC again; slow by two corrections"
     folder = shutil.copytree(street, tmp_path / "survey")
@@ -295,6 +296,7 @@ def test_a_hierarchy_that_lies_is_refused(pair, name, words, tmp_path):
         read_layout(bad)
 
 
+@pytest.mark.long
 def test_a_copc_without_times_is_refused(street, tmp_path):
     "An octree made of points without gps_time has zeros there: no trajectory covers them"
     folder = shutil.copytree(street, tmp_path / "survey")
@@ -306,6 +308,7 @@ def test_a_copc_without_times_is_refused(street, tmp_path):
         mlscorr.read_survey(folder)
 
 
+@pytest.mark.long
 def test_a_header_with_a_wrong_box_costs_a_look_more(pair, tmp_path):
     "Bounds that are no numbers, or of a continent, do not spoil the cube"
     data = bytearray(pair[1].read_bytes())

@@ -93,6 +93,7 @@ def corrected(folder, out):
     return np.asarray(las.xyz), np.asarray(las.gps_time), np.asarray(las.intensity)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".e57", ".ply"])
 def test_a_survey_is_corrected_whatever_its_cloud_is_written_in(fine, suffix, tmp_path):
     "By init, check and correct the same points within 0.2 mm, as LAZ of the same stem"
@@ -317,6 +318,7 @@ def test_what_cannot_be_used_is_refused(write, message, tmp_path, request):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.long
 def test_a_cloud_and_its_copy_in_another_format_are_named(street, tmp_path):
     "Both would be written as pass-1.laz: init names them and takes none"
     folder = shutil.copytree(street, tmp_path / "survey")

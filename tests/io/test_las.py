@@ -107,6 +107,7 @@ def assert_same_but_coordinates(before, after):
     assert new.header.parse_crs() == old.header.parse_crs() or "LOCAL" in str(old.vlrs)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SAMPLES)
 def test_a_zero_correction_returns_real_files_unchanged(name, tmp_path):
     "A zero correction leaves every bit of every point of real files, and every record, as it was"
@@ -181,6 +182,7 @@ def test_a_known_shift_is_recovered(tmp_path):
     assert_same_but_coordinates(path, target)
 
 
+@pytest.mark.long
 def test_chunks_are_the_whole(tmp_path):
     "Chunks of any size join to the points that laspy reads at once"
     path = write_street(tmp_path / "in.laz", points=123_456)
@@ -206,6 +208,7 @@ def test_waveforms_of_several_channels_are_not_compressed(point_format, tmp_path
     assert laspy.read(tmp_path / "out.las").points.array.tobytes() == las.points.array.tobytes()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
 def test_samples_are_spread_over_the_file(suffix, tmp_path):
     "The sampled times are those of points from the first to the last, with count and time flag"
@@ -323,6 +326,7 @@ DAMAGES = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "suffix"),
     [(name, ".laz") for name in DAMAGES]

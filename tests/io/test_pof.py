@@ -97,6 +97,7 @@ def test_what_is_no_whole_pof_is_refused(content, message, tmp_path):
     assert "Export it" in str(refusal.value)
 
 
+@pytest.mark.long
 def test_every_cut_of_a_pof_and_a_poq_is_refused_or_whole(tmp_path):
     "At any byte: a sentence, or a POQ that ends between two records and covers less"
     expected = drive(10)

@@ -117,6 +117,7 @@ def test_a_header_and_a_window_are_read_by_ranges(store):
     assert store.read("long.laz")[0] < 5e6
 
 
+@pytest.mark.long
 def test_spans_of_time_are_those_of_a_disk(store):
     "Windows of a long cloud in a store hold the same points, and take a quarter of its bytes"
     spans = START + np.array([[1.0, 1.1], [9.0, 9.1]])
@@ -233,6 +234,7 @@ def test_a_dead_endpoint_is_named(store, monkeypatch):
         s3fs.S3FileSystem.clear_instance_cache()
 
 
+@pytest.mark.long
 def test_a_command_without_credentials_ends_with_a_sentence(store, monkeypatch):
     "It says where they are looked for, and ends with code 5"
     monkeypatch.delenv("AWS_ACCESS_KEY_ID")

@@ -452,6 +452,7 @@ def test_real_points_return_from_the_scanner(name):
         assert np.abs(again - xyz).max() < 0.01 * cloud.header.scales.min()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["practice_none", "wuhan_drive"])
 def test_frames_and_signs_of_simulated_beams(name):
     "Points taken back to the scanner lie in its plane to 0.4 mm and at their angle to 0.005 deg"

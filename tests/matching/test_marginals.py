@@ -237,6 +237,7 @@ def test_marginals_stay_as_they_were_written_down(name):
     assert found.moved == pytest.approx(WRITTEN[name]["moved"], rel=0.0, abs=1e-9)
 
 
+@pytest.mark.long
 def test_no_wrong_match_in_surveys_with_blunders():
     "Mis-numbered and moved control, look-alikes, drift to 3 m: none wrong, few refused, all told"
     causes = ("outages", "sinusoids", "mems")

@@ -12,6 +12,8 @@ from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.blind import make_blind, run_blind, score_blind
 from mlscorr.simulate import Scenario, simulate
 
+pytestmark = pytest.mark.long
+
 CASES, SEED = 2, 5
 
 

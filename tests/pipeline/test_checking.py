@@ -144,6 +144,7 @@ def test_a_survey_of_check_points_alone_names_what_does_without_control(survey):
         mlscorr.correct(mlscorr.read_survey(survey))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("number", "words"), [(1, "1 control point takes"), (2, "2 control points")]
 )
@@ -187,6 +188,7 @@ def test_a_small_difference_of_heights_is_a_warning_as_in_a_correction(survey):
     assert any("vertical datum" in sentence for sentence in checked.warnings)
 
 
+@pytest.mark.long
 def test_the_crs_of_the_cloud_counts(survey):
     "Another zone in survey.toml is a fault here and a warning in a correction; none is a hint"
     edit(survey / "survey.toml", "EPSG:32650", "EPSG:32649")
@@ -231,6 +233,7 @@ def test_what_lies_beside_the_cloud_is_counted(survey):
     assert any("first: T99" in sentence for sentence in mlscorr.check(survey).warnings)
 
 
+@pytest.mark.long
 def test_the_command_says_what_the_function_returns(survey):
     "A page without a fault ends with the next command; a fault with its code, warnings before"
     good = CliRunner().invoke(app, ["check", str(survey)])

@@ -15,6 +15,8 @@ from mlscorr.io.simulated_clouds import simulated_survey
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.documents import undocumented
 
+pytestmark = pytest.mark.long
+
 OFFSET = 0.02  # s
 
 

@@ -113,6 +113,7 @@ def test_a_left_out_point_is_predicted_from_the_others_alone(compared):
     assert compared.row("shift")["cross_validated"]["rmse"] == pytest.approx(wanted, abs=1e-9)
 
 
+@pytest.mark.long
 def test_check_points_have_no_influence_on_any_method(street, compared, tmp_path):
     "A check point surveyed 7 cm elsewhere changes its own misclosure by 7 cm and nothing else"
     folder = shutil.copytree(street, tmp_path / "survey")
@@ -134,6 +135,7 @@ def test_check_points_have_no_influence_on_any_method(street, compared, tmp_path
             assert gain == pytest.approx(0.07, abs=1e-3), name  # its cloud is cut about it
 
 
+@pytest.mark.long
 def test_without_check_points_the_control_points_are_left_out_in_turn(street, tmp_path):
     "No check point: the scores are cross-validated, and the document says so"
     folder = shutil.copytree(street, tmp_path / "survey")
@@ -148,6 +150,7 @@ def test_without_check_points_the_control_points_are_left_out_in_turn(street, tm
     assert other.row("shift")["check"] | {"n": 0} == other.row("shift")["check"]
 
 
+@pytest.mark.long
 def test_one_target_leaves_what_one_target_can_tell(street, tmp_path):
     "One control point determines raw, shift, lines and lsc; every other method says why it is not"
     folder = shutil.copytree(street, tmp_path / "survey")
@@ -170,6 +173,7 @@ def test_without_control_points_there_is_nothing_to_compare(street, tmp_path):
         mlscorr.compare(mlscorr.read_survey(folder))
 
 
+@pytest.mark.long
 def test_collocation_beats_every_single_move_on_the_real_drift():
     "On wuhan_drive lsc leaves less on each axis than any method that moves the cloud as one"
     compared = compare(shared("surveys", "wuhan_drive"))
@@ -184,6 +188,7 @@ def test_collocation_beats_every_single_move_on_the_real_drift():
 # ---- files
 
 
+@pytest.mark.long
 def test_the_command_writes_page_document_and_clouds(commanded):
     "compare --json prints what it writes; each method's cloud lies in a folder of its name"
     process, out = commanded
@@ -198,6 +203,7 @@ def test_the_command_writes_page_document_and_clouds(commanded):
     assert printed["statements"][0]["sentence"] in process.stderr
 
 
+@pytest.mark.long
 def test_a_shifted_cloud_keeps_all_but_its_coordinates(street, commanded, compared):
     "The cloud of the shift is the recorded one plus the shift, to half of the file's resolution"
     source = read_survey(street).clouds[0]
@@ -228,6 +234,7 @@ def test_a_cloud_that_does_not_fit_its_file_is_refused(street, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "code", "words"),
     [("rigit", 2, "The nearest is 'rigid'"), ("ls-5", 3, "ls-5 has no cloud to write: A polyn")],
@@ -242,6 +249,7 @@ def test_a_cloud_of_no_method_is_refused(street, tmp_path, method, code, words):
     assert not out.exists()
 
 
+@pytest.mark.long
 def test_the_example_makes_its_picture(street, tmp_path):
     "examples/compare_methods.py prints the table and draws it"
     script = EXAMPLES / "compare_methods.py"

@@ -79,6 +79,7 @@ def test_the_effect_that_acts_is_named_with_its_size(diagnosed):
     assert abs(sum(told["where"][0]["share"]) - 1) < 1e-9
 
 
+@pytest.mark.long
 def test_a_second_run_with_its_simulator_finds_nothing_more(late, diagnosed, tmp_path):
     "With the simulator that the first run wrote nothing is left to find"
     simulator = read_simulator(diagnosed / "simulator.toml")
@@ -101,6 +102,7 @@ def test_the_page_and_the_numbers_say_the_same(diagnosed):
     assert "http://" not in page.replace("http://www.w3.org", "")
 
 
+@pytest.mark.long
 def test_the_diagnosis_never_opens_the_truth(late, tmp_path, diagnosed):
     "With truth files that can't be read, and nobody counting, the result is the same to the byte"
     folder = shutil.copytree(late, tmp_path / "late")
@@ -152,6 +154,7 @@ def test_a_cause_that_the_simulator_has_already_is_joined_with_it(late, tmp_path
     assert as_believed(survey, improved)[0].pos.windows == (window,)
 
 
+@pytest.mark.long
 def test_too_few_targets_are_told_with_the_plan(tmp_path):
     "One target and no surface say nothing: what is missing, and what could be seen, is told"
     scenario = Scenario(
@@ -176,6 +179,7 @@ def test_a_simulator_with_an_unknown_effect_is_refused(late, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_a_reference_in_other_coordinates_is_an_error_of_input(tmp_path):
     "A reference surface 100 m off is named as such, not taken for an effect"
     import open3d as o3d
@@ -196,6 +200,7 @@ def test_a_reference_in_other_coordinates_is_an_error_of_input(tmp_path):
         mlscorr.diagnose(mlscorr.read_survey(folder))
 
 
+@pytest.mark.long
 def test_a_survey_is_planned_without_a_cloud(late, tmp_path):
     "Before driving, the plan tells the smallest effects that show and what can't be told apart"
     folder = shutil.copytree(late, tmp_path / "planned")
@@ -238,6 +243,7 @@ def sound(tmp_path_factory):
     return diagnosed_street.write(tmp_path_factory.mktemp("sound") / "survey")
 
 
+@pytest.mark.long
 def test_a_moved_control_point_is_named_with_its_size(sound, tmp_path):
     "A point surveyed 0.3 m too far east is the target_outlier, by name and to 2 cm"
     survey = _with_control_moved(sound, tmp_path / "moved", ("T05",), 0.3)
@@ -248,6 +254,7 @@ def test_a_moved_control_point_is_named_with_its_size(sound, tmp_path):
     assert np.allclose([east, north, height], [0.3, 0.0, 0.0], atol=0.02)
 
 
+@pytest.mark.long
 def test_nothing_wrong_is_not_said_of_what_was_not_seen(sound, tmp_path):
     "Where two stretches lie 3 m from their surveyed targets the verdict isn't none, and says where"
     away = ("T04", "T05", "T06", "T10", "T11")
@@ -273,6 +280,7 @@ def test_costs_that_are_none_are_refused_before_anything_is_read(late, tmp_path,
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_costs_choose_the_label(late, tmp_path):
     "Where a false alarm costs more than any odds, no cause is named for a clock that is surely off"
     command = ["diagnose", str(late), "-o", str(tmp_path / "out"), "--costs", "1e30,1,0.9"]

@@ -7,6 +7,8 @@ import pytest
 import mlscorr
 from tests.beds.shared import shared
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("name", ["none", "time_offset", "lever_arm", "position_bump"])
 def test_surveys_of_another_simulator_are_told_rightly(name):

@@ -16,6 +16,7 @@ def survey():
     return bed()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", FOLDERS, ids=[case.name for case in FOLDERS])
 def test_a_folder_gives_a_survey_or_the_sentence_on_what_to_add(case, tmp_path):
     "By init alone, or with what its sentence asks for; three of them are corrected too"

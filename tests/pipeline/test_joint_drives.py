@@ -162,6 +162,7 @@ def test_two_visits_move_alike_across_an_edge(together, by_areas):
     assert parted.max() < whole.max() + 0.005  # m
 
 
+@pytest.mark.long
 def test_areas_are_tasks_of_workers(drives, by_areas, tmp_path):
     "By two workers each area is estimated to the same bytes, and a second run finds them done"
     store, ended = TaskStore(tmp_path), []

@@ -19,6 +19,8 @@ from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.pipeline.clouds import write_clouds
 from tests.beds import scanner_pair
 
+pytestmark = pytest.mark.long
+
 FILES = {11: ["pass-1.laz", "pass-2.laz"], 12: ["pass-1-scanner-2.laz", "pass-2-scanner-2.laz"]}
 
 

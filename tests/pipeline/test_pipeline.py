@@ -456,6 +456,7 @@ def correct_shared(name):
         return mlscorr.correct(mlscorr.read_survey(shared("surveys", name)))
 
 
+@pytest.mark.long
 def test_a_real_drift_of_half_a_metre_is_corrected():
     "wuhan_drive: all 24 targets matched, check points within 0.10, 0.07, 0.07 m (raw 0.55 m)"
     result = correct_shared("wuhan_drive")
@@ -464,6 +465,7 @@ def test_a_real_drift_of_half_a_metre_is_corrected():
     assert max(result.check["before"]["rmse"]) > 0.5
 
 
+@pytest.mark.long
 def test_where_nothing_is_wrong_nothing_gets_worse():
     "practice_none: check points within 12 mm, and no axis more than 2 mm worse than before"
     check = correct_shared("practice_none").check
@@ -472,6 +474,7 @@ def test_where_nothing_is_wrong_nothing_gets_worse():
     assert (after - before).max() <= 0.002
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", ["lever_arm", "position_bump", "time_offset"])
 def test_effects_of_another_simulator_are_corrected(effect):
     "Whatever was wrong, check points fit within 2 cm on every axis"

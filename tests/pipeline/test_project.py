@@ -135,6 +135,7 @@ def test_a_drive_that_nothing_corrects_is_done_in_part(project, tmp_path):
     assert np.abs(moved(project, tmp_path / "out", "second")).max() < 1e-6  # m
 
 
+@pytest.mark.long
 def test_tiles_of_two_drives_are_told_apart_by_point_source_id(project, corrected, tmp_path):
     "Each point moves as in a tile of its drive alone, and a tile keeps all of its points"
     result, separate = corrected
@@ -160,6 +161,7 @@ def test_tiles_of_two_drives_are_told_apart_by_point_source_id(project, correcte
     assert report["coverage"] == alone["coverage"]
 
 
+@pytest.mark.long
 def test_points_of_no_drive_are_refused_with_their_tile(project, tmp_path):
     "A tile with an id that no drive names is named with the number of such points; exit code 4"
     folder = shutil.copytree(project.parent, tmp_path / "city")
@@ -174,6 +176,7 @@ def test_points_of_no_drive_are_refused_with_their_tile(project, tmp_path):
     assert [path.name for path in (tmp_path / "out" / "tiles").iterdir()] == ["tile-2.laz"]
 
 
+@pytest.mark.long
 def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
     "A good project has none; a cut tile, a drive without points near and a far point are named"
     checked = check_project(project)
@@ -210,6 +213,7 @@ def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
         correct_project(folder, tmp_path / "out", QUICK)
 
 
+@pytest.mark.long
 def test_a_project_of_one_drive_is_its_survey(project, tmp_path):
     "The same clouds and trajectory, to the byte, as of the survey by itself"
     folder = shutil.copytree(project.parent, tmp_path / "city")
@@ -249,6 +253,7 @@ def test_a_folder_of_tasks_that_no_run_made_is_refused(project, tmp_path, option
     assert {name: path.read_text() for name, path in there.items()} == texts
 
 
+@pytest.mark.long
 def test_overwriting_removes_results_of_tasks_alone(project, copy):
     "All tasks are done again, and what somebody keeps among their results stays"
     notes = copy / "tasks" / "mine" / "todo.result"
@@ -259,6 +264,7 @@ def test_overwriting_removes_results_of_tasks_alone(project, copy):
     assert {kind for kind, _ in worked(copy)} == {"tiles", "findings", "clouds", "reports"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("left", [(), ("plan.json.part",)])
 def test_a_run_that_was_ended_before_its_plan_is_resumed(project, corrected, tmp_path, left):
     "Only its lock, an empty log and half a plan are there: the same results as of a new folder"
@@ -297,6 +303,7 @@ def test_resume_does_what_is_missing_or_damaged(project, copy):
     assert sorted(kinds) == ["clouds", "tiles"]
 
 
+@pytest.mark.long
 def test_an_edited_control_list_reads_no_cloud_again(project, copy, tmp_path):
     "A check point that becomes control changes the estimate and all that follows, nothing before"
     folder, out = shutil.copytree(project.parent, tmp_path / "city"), copy
@@ -308,6 +315,7 @@ def test_an_edited_control_list_reads_no_cloud_again(project, copy, tmp_path):
     assert kinds == {"tiles", "clouds", "reports"}  # whose paths are new, or their correction
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sent, code", [(signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)])
 def test_an_ended_run_is_resumed_to_the_same_bytes(project, corrected, tmp_path, sent, code):
     "SIGKILL or Ctrl-C in the middle, then --resume: the same results as without"
@@ -328,6 +336,7 @@ def test_an_ended_run_is_resumed_to_the_same_bytes(project, corrected, tmp_path,
     assert not [*(tmp_path / "out" / "tasks").glob("part.*")]
 
 
+@pytest.mark.long
 def test_one_corrupt_file_is_named_and_the_rest_done(project, tmp_path):
     "Exit code 4, the file by its name in the log and in project.json, all others corrected"
     folder = shutil.copytree(project.parent, tmp_path / "city")

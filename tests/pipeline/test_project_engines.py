@@ -99,6 +99,7 @@ def lose_a_call(scheduler):
         call.result()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("workers", [1, 2])
 def test_tasks_that_fail_end_no_run(tmp_path, workers):
     "The results of all others, in the order of their tasks, and the sentence of the one"
@@ -135,6 +136,7 @@ def test_long_tasks_are_begun_first(tmp_path):
     assert begun == [3, 2, 1, 4]
 
 
+@pytest.mark.long
 def test_a_lost_worker_is_counted_and_its_task_done_again(tmp_path):
     "A task that ends its worker once has a result; one that ends it each time is given up"
     ends = []
@@ -150,6 +152,7 @@ def test_a_lost_worker_is_counted_and_its_task_done_again(tmp_path):
     assert len(ends) == len(tasks)
 
 
+@pytest.mark.long
 def test_a_cluster_works_on_tasks(tmp_path):
     "Workers of dask.distributed give the same results and failures; one that is lost is counted"
     pytest.importorskip("distributed", reason="pip install 'mlscorr[cluster]' tests clusters")

@@ -21,6 +21,7 @@ def survey(street):
     return mlscorr.read_survey(street)
 
 
+@pytest.mark.long
 def test_the_example_makes_its_picture(street, tmp_path):
     "The example draws a survey that it is given, and puts three pages together"
     picture, out = tmp_path / "picture.png", tmp_path / "pages"

@@ -15,6 +15,8 @@ from mlscorr.simulate.simulator_file import read_simulator
 from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def survey(tmp_path_factory):

@@ -81,6 +81,7 @@ def together(site, tmp_path_factory):
     return out, done.output
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["commanded", "together"])
 def test_both_scanners_are_calibrated(name, request):
     "Two boresights and lever arms are found within 3 sigmas, in the terminal as in the document"
@@ -145,6 +146,7 @@ def thinned(site, tmp_path):
     return mlscorr.read_survey(folder)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("ties", "fault"), [(True, r"has nothing to calibrate with: 0 con"), (False, r"0 control poi")]
 )

@@ -11,6 +11,8 @@ import pytest
 import mlscorr
 from mlscorr.simulate import Scenario, simulate
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def street(tmp_path_factory):

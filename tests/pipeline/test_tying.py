@@ -49,6 +49,7 @@ def test_passes_come_together(tied):
     assert tied.estimate.ties.used.mean() > 0.9
 
 
+@pytest.mark.long
 def test_check_points_fit_no_worse(survey, tied):
     "With ties check points fit as well as without, to 2 mm, or better"
     alone = mlscorr.correct(survey, ties="off")
@@ -58,6 +59,7 @@ def test_check_points_fit_no_worse(survey, tied):
     assert left[1] < left[0] + 0.002  # m
 
 
+@pytest.mark.long
 def test_ties_alone_bring_passes_together(survey):
     "Without control all points are check points, passes agree, and all rests on the POS"
     with pytest.warns(UserWarning, match="relative only"):
@@ -102,6 +104,7 @@ def test_the_report_tells_what_ties_did(tied, tmp_path):
     assert 1 <= section["sufficient_control"] <= 4
 
 
+@pytest.mark.long
 def test_one_pass_has_no_ties(street):
     "A survey of one pass is corrected as without ties, and ties alone are refused in a sentence"
     survey = mlscorr.read_survey(street)
@@ -123,6 +126,7 @@ def test_one_pass_is_named_as_the_reason_in_terminal_report_and_page(commanded):
     assert reason in words((out / "report.html").read_text(encoding="utf-8"))
 
 
+@pytest.mark.long
 def test_one_pass_of_a_scanner_that_spins_is_tied_to_itself(tmp_path):
     "Things seen for seconds as it passes: ties of one visit, which agree to 6 mm"
     rings = np.linspace(-15.0, 15.0, 16).tolist()

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from mlscorr.report.cloud import CloudViews, close_ups
 from mlscorr.report.correction_page import write_report
@@ -30,6 +31,7 @@ def test_of_many_targets_the_worst_and_evenly_spread_ones_are_drawn():
     assert close_ups(rows[:24]) == [f"T{k}" for k in range(24)]
 
 
+@pytest.mark.long
 def test_24_targets_fit_in_15_megabytes_whatever_they_look_like(tmp_path):
     "Pictures of pure noise, which no format makes smaller; names that hold a script don't run"
     rng, evil = np.random.default_rng(6), "</script><script>alert(1)</script>"

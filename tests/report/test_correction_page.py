@@ -29,6 +29,7 @@ def test_the_page_needs_nothing_but_itself(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
+@pytest.mark.long
 def test_every_target_stands_in_the_table_with_its_numbers(tmp_path):
     "Nothing of targets[] is lost on the way to the reader"
     survey, correction, report = fabricate(drive())
@@ -103,6 +104,7 @@ def test_says_so_when_the_correction_made_it_worse(rise, worse, tmp_path):
     assert ('class="verdict red"' in html) == worse
 
 
+@pytest.mark.long
 def test_warnings_come_before_the_tables(tmp_path):
     "A doubt is read before the numbers that it concerns; without one there is no empty box"
     survey, correction, report = fabricate(drive())
@@ -112,6 +114,7 @@ def test_warnings_come_before_the_tables(tmp_path):
     assert html.index("Signal extrapolated 214 s") < html.index('id="statistics"')
 
 
+@pytest.mark.long
 def test_a_target_that_was_not_seen_is_listed_with_its_reason(tmp_path):
     "Control first, then check, then unused, and missing numbers are dashes"
     survey, correction, report = fabricate(drive())
@@ -139,6 +142,7 @@ def test_a_long_drive_makes_a_small_page(tmp_path):
     assert len(html.encode()) < 3e6
 
 
+@pytest.mark.long
 def test_the_page_tells_what_two_passes_both_saw(tmp_path):
     "Sentence, map and a row of each two passes in millimetres; without ties there is no section"
     survey, correction, report, residuals = tied_report(wrong=0.1)

@@ -14,6 +14,7 @@ def test_pictures_are_written_as_png(tmp_path):
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
 
 
+@pytest.mark.long
 def test_ties_have_a_map_of_their_own(tmp_path):
     "ties.png and the page's figure, where something was seen twice"
     _, correction, report, residuals = tied_report()

@@ -174,6 +174,7 @@ def test_the_examples_can_be_simulated(path):
     assert min(points.values()) > 1000
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "least", "most"),  # m, RMS of E, N, H
     [
@@ -216,6 +217,7 @@ def test_a_bad_scenario_ends_in_a_sentence_and_writes_nothing(write, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_a_scenario_becomes_a_survey_that_can_be_read(write, tmp_path):
     "Scenario in, survey folder out, one JSON document on stdout; the same seed, the same bytes"
     scenario = write(SMALL + "[[effects]]\nname = 'vertical_datum'\nmagnitude = 0.1\n")

@@ -490,6 +490,7 @@ def test_bad_meshes_are_refused(tmp_path):
         drive(on_mesh(tmp_path / "absent.ply"), rng(1))
 
 
+@pytest.mark.long
 def test_targets_without_room_beside_the_drive_are_refused(tmp_path):
     "In a trench with walls at 2 m there is no place for a post, and the error says where"
     vertices, triangles = ground_mesh(250.0)

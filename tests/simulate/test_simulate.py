@@ -120,6 +120,7 @@ def test_the_same_seed_gives_the_same_survey_and_another_seed_does_not(short):
     assert len(other.cloud) != len(short.cloud)
 
 
+@pytest.mark.long
 def test_pulses_can_be_made_again_in_blocks_of_any_size(pair):
     "Memory is one block; asked again, with effects and all, blocks of any size give the same"
     noisy = make(
@@ -362,6 +363,7 @@ def test_the_written_cloud_keeps_frames_and_signs(short, tmp_path):
     np.testing.assert_array_equal(target, short.target)
 
 
+@pytest.mark.long
 def test_a_written_survey_can_be_corrected(tmp_path):
     "The readers take the folder, and the correction brings the check points to 2 cm"
     several = with_(
@@ -431,6 +433,7 @@ def write_apart(folder, limit=None, **environment):
     )
 
 
+@pytest.mark.long
 def test_the_same_seed_writes_the_same_bytes_with_any_number_of_threads(pair, tmp_path):
     "A survey can be made again, bit for bit, on another day, by one core as by many"
     pair.write(tmp_path / "many")
@@ -445,6 +448,7 @@ def test_the_same_seed_writes_the_same_bytes_with_any_number_of_threads(pair, tm
         )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("limit", [0, 30_000, 300_000])
 def test_a_full_disk_leaves_nothing(tmp_path, limit):
     "One sentence that names the folder, and nothing half written, wherever the disk is full"
@@ -513,6 +517,7 @@ def look_of(folder):
     return np.median(rows, axis=0)
 
 
+@pytest.mark.long
 def test_the_shared_survey_looks_like_this_simulators(tmp_path):
     "With its parameters, spacing, noise on planes and contrast agree with another simulator's"
     real = look_of(shared("surveys", "practice_none"))

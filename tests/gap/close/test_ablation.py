@@ -1,12 +1,14 @@
 """Each effect alone in the simulator."""
 
 import numpy as np
+import pytest
 
 from mlscorr.gap.close.ablation import lone_effects
 from mlscorr.gap.infer.causes import infer_causes
 from mlscorr.gap.observe.rows import background
 
 
+@pytest.mark.long
 def test_the_effect_that_acts_leaves_least(late):
     "Of five effects the clock, which acts, takes the systematic gap away; others leave a third"
     rows, rng = late.rows, np.random.default_rng(1)

@@ -49,6 +49,7 @@ def test_a_simulator_that_adds_the_opposite_makes_the_gap_grow(late):
     assert -1 <= closure.interval[0] <= closure.interval[1] <= 1
 
 
+@pytest.mark.long
 def test_noise_closes_within_its_bounds(shaky):
     "A POS noisier than stated: the size found in the other blocks closes 80 to 100 % of its gap"
     closure = shaky.close("position_noise")

@@ -148,6 +148,7 @@ def test_rows_of_other_beams_are_refused(case):
         run(case, rows=replace(rows, gps_time=rows.gps_time + 1.0))
 
 
+@pytest.mark.long
 def test_without_a_mounting_the_pose_can_still_be_wrong(case):
     "Clock and POS effects are simulated from the navigation centre; those of beams are refused"
     blind = replace(case[0], mounting=None, reference=None)

@@ -31,6 +31,7 @@ def beyond(table, start):
     return values[np.isfinite(values)]
 
 
+@pytest.mark.long
 def test_a_falloff_that_the_simulator_lacks_is_measured_and_named(pair):
     "Returns 1.4 times weaker beyond 8 m: to 2 %, by range and by nothing else, in a sentence"
     survey, _, simulated = pair
@@ -49,6 +50,7 @@ def test_a_falloff_that_the_simulator_lacks_is_measured_and_named(pair):
     assert not sentences([faded["density"], faded["dropout"], faded["edge_width"]])
 
 
+@pytest.mark.long
 def test_returns_that_are_lost_far_away_are_measured_and_named(pair):
     "A fifth of the points lost beyond 10 m: density and beams without return say so, to 3 %"
     survey, _, simulated = pair
@@ -76,6 +78,7 @@ def test_a_simulation_of_half_of_the_drive_says_nothing_of_the_rest(pair):
     assert not density.sentences
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [11, 12])
 def test_twins_differ_in_nothing(tmp_path, seed):
     "Another POS error and other noise: no channel says anything, with beams wide and thin"
@@ -87,6 +90,7 @@ def test_twins_differ_in_nothing(tmp_path, seed):
     assert not any(contrast.silent for contrast in contrasts)
 
 
+@pytest.mark.long
 def test_a_wide_beam_smears_edges(pair, tmp_path):
     "A beam of 12 mrad against a thin one: edges are wider by several mrad, beyond 3 sigma"
     survey, _, simulated = pair

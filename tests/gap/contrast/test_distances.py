@@ -41,6 +41,7 @@ def test_the_chamfer_distance_of_a_moved_grid():
     assert chamfer_distance(grid, grid + 0.2 * EAST) == pytest.approx(0.2)
 
 
+@pytest.mark.long
 def test_twins_lie_within_the_floor(pair):
     "No distance of a twin stands out by more than the floor's own scatter"
     _, real, simulated = pair
@@ -49,6 +50,7 @@ def test_twins_lie_within_the_floor(pair):
         assert np.isfinite(each.after)
 
 
+@pytest.mark.long
 def test_a_moved_cloud_stands_out(pair):
     "0.3 m to the east: the Chamfer distance grows beyond its floor, and its unit is m"
     survey, _, simulated = pair

@@ -13,6 +13,7 @@ from mlscorr.gap.signatures import signatures
 from mlscorr.gap.train.features import geometry
 
 
+@pytest.mark.long
 def test_replicas_are_as_many_and_as_wide_as_the_model_says():
     "A clean survey of features: an innovation each, about as wide as its own, each time the same"
     g = geometry(5, targets=16, patches=40)

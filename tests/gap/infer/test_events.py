@@ -12,6 +12,7 @@ from mlscorr.gap.signatures.signatures import signatures
 from tests.beds.gap_inference import surveyed
 
 
+@pytest.mark.long
 def test_an_event_is_found_between_the_times_of_the_bank(with_surface):
     "Time within 1 s, width within 30 %, size within four sigmas"
     g, signs = with_surface
@@ -26,6 +27,7 @@ def test_an_event_is_found_between_the_times_of_the_bank(with_surface):
         assert abs(told[name].estimate - true) < 4 * told[name].sigma
 
 
+@pytest.mark.long
 def test_an_event_beside_an_effect_is_found_when_it_acts(with_surface):
     "Within 3 s, where it can be known to 1.3 s; alone it would best explain what the other does"
     g, signs = with_surface
@@ -56,6 +58,7 @@ def test_a_refined_event_counts_over_none_as_all_models_have_it(study, seed):
         assert event.gain == pytest.approx(expected, abs=1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("time", [18.4, 27.3])
 @pytest.mark.parametrize("size", [0.4, 1.0])
 def test_a_jump_is_found_between_the_rows_next_to_it(with_surface, time, size):

@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from mlscorr.effects import make_effect
 from tests.beds.gap_inference import named, surveyed
 
 
+@pytest.mark.long
 def test_noise_is_named_alone_and_found_again_beside_a_cause(with_surface):
     "range_noise shows in the roughness, with and without a range bias"
     g, signs = with_surface
@@ -20,6 +22,7 @@ def test_noise_is_named_alone_and_found_again_beside_a_cause(with_surface):
     assert set(both.split("+")) == {"range_noise", "range_bias"}
 
 
+@pytest.mark.long
 def test_patches_that_are_no_planes_are_no_noise(with_surface):
     "One patch in twelve fifteen times as rough as the scanner: leaves and kerbs; and noise beside"
     g, signs = with_surface

@@ -41,6 +41,7 @@ def test_an_offset_that_all_share_is_integrated_over():
     assert told.log_likelihood(0.2)[0] == pytest.approx(plain, abs=0.02)
 
 
+@pytest.mark.long
 def test_a_wrong_target_is_named_before_it_is_taken_for_a_tail(with_surface):
     "Both passes find the target off; a single row that is off is noise"
     g, signs = with_surface

@@ -9,6 +9,7 @@ from mlscorr.effects import make_effect
 from tests.beds.gap_inference import named, surveyed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["sines", "walk"])
 def test_a_clean_survey_is_called_clean_whatever_its_drift(kind, with_surface, with_planes):
     "Drift of sinusoids, or of a random walk through a smoother, is no effect"
@@ -16,6 +17,7 @@ def test_a_clean_survey_is_called_clean_whatever_its_drift(kind, with_surface, w
         assert named(surveyed(g, 20 + seed, kind=kind), g, signs).label == "none"
 
 
+@pytest.mark.long
 def test_a_withheld_effect_is_unknown_and_the_lead_points_at_it(with_surface):
     "Without range_scale in the library nothing else takes its name"
     g, signs = with_surface
@@ -26,6 +28,7 @@ def test_a_withheld_effect_is_unknown_and_the_lead_points_at_it(with_surface):
     assert "range" in answer.lead
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name, word", [("roll with turn rate", "turn"), ("cyclic range", "range")])
 def test_an_effect_of_no_library_is_unknown(name, word, study, with_surface):
     "Rotations and fine functions are in the bank of the unknown"
@@ -37,6 +40,7 @@ def test_an_effect_of_no_library_is_unknown(name, word, study, with_surface):
     assert word in answer.lead
 
 
+@pytest.mark.long
 def test_without_the_time_offset_another_error_of_the_clock_does_not_take_its_name(with_surface):
     "A time error that is constant is unknown then, not clock_drift"
     g, signs = with_surface
@@ -46,6 +50,7 @@ def test_without_the_time_offset_another_error_of_the_clock_does_not_take_its_na
     assert "time error" in answer.lead
 
 
+@pytest.mark.long
 def test_two_effects_are_named_together(with_surface):
     "A pair is needed when each alone leaves what the other explains"
     g, signs = with_surface
@@ -56,6 +61,7 @@ def test_two_effects_are_named_together(with_surface):
     assert named(surveyed(g, 36, *effects), g, signs).label == "time_offset+range_bias"
 
 
+@pytest.mark.long
 def test_a_drift_far_beyond_its_sigma_is_a_noisy_pos_not_an_effect(with_surface):
     "Five times the stated sigma is neither absorbed nor explained by an effect"
     g, signs = with_surface

@@ -12,6 +12,7 @@ from mlscorr.gap.signatures.displacements import displacements
 from tests.beds.gap_inference import surveyed
 
 
+@pytest.mark.long
 def test_the_gap_adds_up_over_every_split_and_may_be_negative(with_surface):
     "Shares sum to one; a survey quieter than believed has a negative gap, inside the band or below"
     g, signs = with_surface
@@ -26,6 +27,7 @@ def test_the_gap_adds_up_over_every_split_and_may_be_negative(with_surface):
         assert total == pytest.approx(-(where.before**2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("middle", [30.0, 160.0])
 def test_a_bump_is_shown_when_it_is_not_when_it_surprises(with_surface, middle):
     "30 cm for 8 s (sigma): the stretch in time is where it is half as large, to 3 s at each end"
@@ -41,6 +43,7 @@ def test_a_bump_is_shown_when_it_is_not_when_it_surprises(with_surface, middle):
     assert "of what the cause moves lies at a time of" in where.headline
 
 
+@pytest.mark.long
 def test_an_error_in_a_band_of_ranges_is_shown_there(with_surface):
     "3 cm of range between 10 and 13 m, which no effect is: the stretch of ranges to 0.7 m"
     g, signs = with_surface

@@ -50,6 +50,7 @@ def weighed(g, residual):
     return weigh_windows(observed, signs, blocks, column, column[:, :0])[0]
 
 
+@pytest.mark.long
 def test_windows_of_drift_are_found_in_time_and_number(survey):
     "Each window is found to within a few targets, is likelier than none, and no other one is"
     g, clean = survey
@@ -69,6 +70,7 @@ def test_a_clean_survey_has_no_windows(survey):
     assert weighed(g, clean).gain[0] < 0
 
 
+@pytest.mark.long
 def test_windows_hang_on_times_not_on_their_zero(survey):
     "Another zero of time moves the windows with it"
     g, clean = survey
@@ -117,6 +119,7 @@ def diagnosed(g, residual):
     return infer_causes(rows, background(rows, g.survey), g.survey, signs, rng, 20)
 
 
+@pytest.mark.long
 def test_a_pos_that_is_worse_in_windows_is_noise_of_the_pos(survey):
     "The verdict is position_noise, its parameters tell the windows, and what is left is as chance"
     g, clean = survey

@@ -40,6 +40,7 @@ def assert_equal(first, second):
         np.testing.assert_array_equal(one.gps_time, two.gps_time)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [3_001, 20_000, 123_457])
 @pytest.mark.parametrize("pool", [SETTINGS.pool, 200])
 def test_patches_do_not_depend_on_where_a_cloud_is_cut_into_chunks(survey, size, pool):
@@ -48,6 +49,7 @@ def test_patches_do_not_depend_on_where_a_cloud_is_cut_into_chunks(survey, size,
     assert_equal(find_patches(survey, pool, partial(read_chunks, chunk_size=size)), whole)
 
 
+@pytest.mark.long
 def test_beams_that_come_late_are_not_cut_off(survey):
     "Points up to 0.4 s late, and a drive told backwards, are cut nowhere either"
     file, rng = survey.clouds[0], np.random.default_rng(2)

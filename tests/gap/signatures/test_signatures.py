@@ -32,6 +32,7 @@ def test_effects_do_to_targets_what_the_full_simulator_does(clean, name):
     np.testing.assert_allclose(np.atleast_1d(again.magnitude), np.atleast_1d(effect.magnitude))
 
 
+@pytest.mark.long
 def test_noise_shows_in_the_roughness_as_it_grows(clean, patches):
     "Roughness rows of a noisier scanner have the mean log(1 + growth x^2), within 0.03"
     survey = clean[0]

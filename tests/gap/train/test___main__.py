@@ -3,10 +3,13 @@
 import json
 import sys
 
+import pytest
+
 from mlscorr.gap.train.__main__ import main
 from tests.beds.joint_scores import records
 
 
+@pytest.mark.long
 def test_prints_both_operating_points(tmp_path, monkeypatch, capsys):
     "From records that are there already, rates for cheap and for dear false alarms"
     made = records(160)

@@ -25,6 +25,7 @@ def known():
     return records(240)
 
 
+@pytest.mark.long
 def test_evidence_that_shows_the_truth_is_learned(known):
     "Out of fold effects of 3 MDB and more are right in nine of ten, and stated as often"
     rates = figures(known, out_of_fold(known), Costs(1.0, 1.0, 1.0))
@@ -33,6 +34,7 @@ def test_evidence_that_shows_the_truth_is_learned(known):
     assert rates["calibration error"][0] < 0.1
 
 
+@pytest.mark.long
 def test_a_dear_false_alarm_makes_alarms_rare(known):
     "With ten times the cost no more clean surveys alarm, and no more effects are found"
     probabilities = out_of_fold(known)
@@ -41,6 +43,7 @@ def test_a_dear_false_alarm_makes_alarms_rare(known):
         assert dear[name][0] <= cheap[name][0]
 
 
+@pytest.mark.long
 def test_a_decision_comes_back_from_its_document(known):
     "Rounded coefficients give the same probabilities to 1e-3, and say what made them"
     decision = fit(known)
@@ -52,6 +55,7 @@ def test_a_decision_comes_back_from_its_document(known):
     assert content["made_of"] == {"seeds": [0, 7]}
 
 
+@pytest.mark.long
 def test_p_values_of_clean_surveys_are_remembered(known):
     "Of beta(1/2, 1) in 48 clean records the parameters are found within a third"
     a, b = fit(known).p_value

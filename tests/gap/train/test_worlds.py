@@ -14,6 +14,7 @@ def world():
     return World.random(2)
 
 
+@pytest.mark.long
 def test_errors_are_as_large_as_the_sensors_state(world):
     "Over ten surveys the residuals of targets lie within a factor of three of what is stated"
     ratios = []
@@ -27,6 +28,7 @@ def test_errors_are_as_large_as_the_sensors_state(world):
     assert 1 / 3 < np.median(ratios) < 3
 
 
+@pytest.mark.long
 def test_a_bad_sky_raises_the_stated_sigma(world):
     "Some looks lie in a stretch where sigma is raised, most don't"
     _, background, survey = world.errors(np.random.default_rng(1))
@@ -36,6 +38,7 @@ def test_a_bad_sky_raises_the_stated_sigma(world):
     assert sigma.max() > 2 * np.percentile(sigma, 5)
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_world(world):
     "Residuals to the last bit"
     again = World.random(2)
@@ -43,6 +46,7 @@ def test_the_same_seed_gives_the_same_world(world):
     assert np.array_equal(one, two)
 
 
+@pytest.mark.long
 def test_points_lie_where_the_recorded_pose_puts_them(world):
     "A lever arm that is a micrometre off moves them by that, whatever the POS errs by"
     rows, _, survey = world.errors(np.random.default_rng(3))

@@ -1,5 +1,7 @@
 """Channels beside geometry on page and first screen."""
 
+import pytest
+
 from mlscorr.report.gap import diagnosis_page
 from mlscorr.report.gap.channels import channel_rows, channel_statements, distance_rows
 from tests.beds.gap_documents import gap_document
@@ -35,6 +37,7 @@ def test_a_distance_stands_beside_its_floor():
     assert "95 % below 0.0114" in first.floor
 
 
+@pytest.mark.long
 def test_the_page_shows_all_of_it():
     "Sentence, silence with its reason, figure and both tables; without them no section"
     page = diagnosis_page(gap_document(), "street").html()

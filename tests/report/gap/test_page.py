@@ -132,6 +132,7 @@ def test_what_was_left_out_and_warned_of_reaches_the_page(pages):
     assert [piece for piece in expected if piece not in text] == []
 
 
+@pytest.mark.long
 def test_many_rows_make_no_large_page_and_names_are_shown_and_not_run():
     "20 000 rows stay below 5 MB: their marks are a picture; a name that holds HTML is text"
     name = '<img src=x onerror="alert(1)">&$_{'
@@ -235,6 +236,7 @@ def test_a_table_sorts_by_the_heading_that_is_pressed(opened):
     assert values == sorted(values)
 
 
+@pytest.mark.long
 def test_the_plan_says_whether_an_addition_is_needed_or_helps():
     """Two effects that look alike need one: where none is offered, those that were tried failed."""
     needed = plan_document(next_data=[])

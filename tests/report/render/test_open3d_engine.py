@@ -33,6 +33,7 @@ def test_a_broken_driver_costs_a_warning_and_no_picture(
     np.testing.assert_array_equal(picture.before, drawn[0].before)
 
 
+@pytest.mark.long
 def test_open3d_draws_what_the_z_buffer_draws(survey, estimated, drawn):
     "Both engines put points of the same colours on the same pixels, but for their rims"
     if not (finding := _rendering()).ok:
