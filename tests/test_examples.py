@@ -11,6 +11,7 @@ from tests.beds.joint_scores import records
 from tests.beds.places import BENCHMARKS, EXAMPLES
 
 
+@pytest.mark.long
 def test_correct_a_survey_makes_its_picture(street, tmp_path):
     "The first example corrects a survey that it is given, prints its RMSE and draws a picture"
     picture = tmp_path / "picture.png"

@@ -101,8 +101,8 @@ class ProjectParts:
     @property
     def files(self) -> list[Path]:
         """Every file that is read."""
-        named = [file.path for drive in self.drives for file in drive.parts.inputs]
-        return list(dict.fromkeys([*(file.path for file in self.inputs), *named]))
+        named = [*self.inputs, *(file for drive in self.drives for file in drive.parts.inputs)]
+        return list(dict.fromkeys(file.path for file in named))
 
 
 def is_project(path: str | Path) -> bool:
@@ -225,9 +225,8 @@ def _ids(path, name, section, settings):
 def _check_tiles(path, settings, drives):
     """Refuse a tile of no drive, and one of two whose points nothing tells apart."""
     owners: dict[Path, list[StatedDrive]] = {}
-    for drive in drives:
-        for file in drive.files.clouds:
-            owners.setdefault(resolved(file), []).append(drive)
+    for owner, file in ((drive, file) for drive in drives for file in drive.files.clouds):
+        owners.setdefault(resolved(file), []).append(owner)
     for copy, first in find_copies(owners).items():
         both = [*owners[first], *owners[copy]]
         ids = [number for drive in both for number in drive.ids or ()]

@@ -198,10 +198,8 @@ def _uncontrolled(report):
 
 
 def _weakest(report):
-    """The parts of the drive that no control point holds.
-
-    They are no matter where control holds other parts, and their sigma is below the largest
-    residual that the verdict rests on.
+    """The parts of the drive that no control point holds: no matter where control holds others,
+    and their sigma is below the largest residual that the verdict rests on.
     """
     weak = report.support.weak
     if not weak and report.is_held_by_others:

@@ -175,6 +175,7 @@ def test_two_control_points_in_an_outage_leave_what_gnss_held(datum):
     assert max(ratios) < (0.1 if datum else 2.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("size", "sigma", "share"), [(0.01, 0.02, 1.0), (0.05, 0.1, 0.75)])
 def test_a_wrong_control_point_is_found_and_named(size, sigma, share):
     """One of 16 surveyed wrongly by 0.5 m is named, and no other one in its place.
@@ -218,6 +219,7 @@ def test_four_targets_cannot_tell_which_is_wrong():
     assert case.estimate().outliers == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["smooth", "outages"])
 def test_the_stated_sigma_is_honest(name, request):
     "Over the seeds the errors are 0.6 to 1.4 times the stated sigma, and 90 % lie within two"

@@ -93,6 +93,7 @@ def test_targets_json_csv_and_picture_hold_the_same_targets(extracted):
     assert (out / "targets.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_targets_are_found_without_control(street, blind):
     "With an empty control file, kinds and sizes are those of the street, to 3 cm, and no others"
     found = mlscorr.extract(mlscorr.read_survey(blind)).targets

@@ -18,6 +18,8 @@ from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.stages import area_tasks
 from tests.beds import project_street as bed
 
+pytestmark = pytest.mark.long
+
 ORIGIN = np.array([*bed.PLACE, 0.0])
 AWAY = np.array([5000.0, 0.0, 0.0])  # m
 ABOVE = np.array([0.0, 0.0, 60.0])  # m
@@ -162,7 +164,6 @@ def test_two_visits_move_alike_across_an_edge(together, by_areas):
     assert parted.max() < whole.max() + 0.005  # m
 
 
-@pytest.mark.long
 def test_areas_are_tasks_of_workers(drives, by_areas, tmp_path):
     "By two workers each area is estimated to the same bytes, and a second run finds them done"
     store, ended = TaskStore(tmp_path), []

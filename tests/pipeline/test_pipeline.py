@@ -226,6 +226,7 @@ def test_the_corrected_trajectory_can_be_read_again(corrected):
     assert np.degrees(turned.max()) < 1e-6
 
 
+@pytest.mark.long
 def test_further_files_hold_the_corrected_trajectory(commanded, corrected):
     "--trajectory writes an SBET with its smrmsg and TUM's quaternions, and the report lists them"
     out, expected = commanded[1], corrected[0].trajectory
@@ -338,6 +339,7 @@ def test_passes_count_in_time_whatever_the_files_are_called(corrected, copy):
 # ---- what has no pose
 
 
+@pytest.mark.long
 def test_points_without_a_pose_stay_as_they_were_and_are_counted(in_part):
     "Before the trajectory and in its gap nothing moves, everywhere else something does"
     out = in_part[1]
@@ -481,6 +483,7 @@ def test_effects_of_another_simulator_are_corrected(effect):
     assert max(correct_shared(f"practice_{effect}").check["after"]["rmse"]) <= 0.020
 
 
+@pytest.mark.long
 def test_a_drive_that_is_known_to_millimetres_is_not_called_extrapolated():
     "practice_lever_arm: 16 control points and ties hold nine tenths of it, drift or bias alike"
     support = correct_shared("practice_lever_arm").estimate.support

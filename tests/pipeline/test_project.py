@@ -114,6 +114,7 @@ def test_each_drive_has_results_of_its_own(project, corrected):
     assert not undocumented(shown)
 
 
+@pytest.mark.long
 def test_workers_change_no_byte(project, corrected, tmp_path):
     "Two processes write what this one does, and the page leads to that of each drive"
     _, out = corrected

@@ -13,6 +13,8 @@ from tests.beds.copc_files import write_copc
 from tests.beds.las_1_5 import as_las_1_5
 from tests.beds.object_store import object_store
 
+pytestmark = pytest.mark.long
+
 PROJECT, OUT = "s3://city/project.toml", "s3://city/out"
 
 
@@ -56,7 +58,6 @@ def test_status_is_told_from_a_store(store):
     assert [row["share"] for row in rows] == [1.0] * 4
 
 
-@pytest.mark.long
 def test_only_what_is_missing_is_done_again(store):
     "A run on whole results writes no cloud; a lost and a damaged one are written anew"
     assert resumed(store)[1] == []
@@ -68,7 +69,6 @@ def test_only_what_is_missing_is_done_again(store):
     assert store.files.cat_file(path) == whole
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("lost", ["city/second/tile-1.laz", "city/out/second/tile-1.laz"])
 def test_a_connection_that_is_lost_fails_a_single_file(store, lost):
     "Read or written, one file is named with the reason, others are done, and --resume does it"
@@ -87,7 +87,6 @@ def test_a_connection_that_is_lost_fails_a_single_file(store, lost):
     assert resumed(store)[1] == ["second/tile-1.laz"]
 
 
-@pytest.mark.long
 def test_copc_and_las_1_5_in_a_store_are_corrected_as_on_a_disk(store, tmp_path):
     "The same bytes from a store into it: an octree that is read by ranges, and LAS 1.5 with offset"
     folder = bed.write_project(tmp_path, duration=6.0, tiles=2).parent

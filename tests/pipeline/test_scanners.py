@@ -25,6 +25,8 @@ from mlscorr.ties import TieCollector
 from tests.beds import scanner_pair
 from tests.beds.documents import undocumented
 
+pytestmark = pytest.mark.long
+
 LACKS = np.array(  # right, forward, up: m and deg, of each scanner's recorded mounting
     [[0.03, -0.02, 0.0, 0.3, -0.3, 0.4], [-0.02, 0.0, 0.0, -0.4, 0.2, -0.3]]
 )
@@ -81,7 +83,6 @@ def together(site, tmp_path_factory):
     return out, done.output
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", ["commanded", "together"])
 def test_both_scanners_are_calibrated(name, request):
     "Two boresights and lever arms are found within 3 sigmas, in the terminal as in the document"
@@ -146,7 +147,6 @@ def thinned(site, tmp_path):
     return mlscorr.read_survey(folder)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("ties", "fault"), [(True, r"has nothing to calibrate with: 0 con"), (False, r"0 control poi")]
 )

@@ -11,6 +11,8 @@ from mlscorr.simulate import Scenario, simulate
 from tests.beds.documents import undocumented
 from tests.beds.places import MLSCORR
 
+pytestmark = pytest.mark.long
+
 LACKS = [0.03, -0.02, 0.0]  # m, of the recorded lever arm
 
 

@@ -89,6 +89,7 @@ def test_what_is_no_order_and_no_generator_is_refused(survey, given, sentence):
         mlscorr.correct(survey, **given)
 
 
+@pytest.mark.long
 def test_the_report_tells_what_ties_did(tied, tmp_path):
     """report.json has misfits by pair of passes, and shares that add up to one; the page shows the
     ties on a map, and a wall as each pass saw it
@@ -208,6 +209,7 @@ def apart_on_road(features, shift):
     return shift + np.median(change[back], axis=0) - np.median(change[~back], axis=0)
 
 
+@pytest.mark.long
 def test_paint_holds_passes_on_a_bare_road():
     """Passes 0.12 m apart along, across and up: the road alone tells the height, with paint 5 mm
     are left across and 15 mm along, where dashes are 9 m apart
@@ -224,6 +226,7 @@ def test_paint_holds_passes_on_a_bare_road():
     assert np.abs(painted[1]) < 0.005  # m
 
 
+@pytest.mark.long
 def test_ties_of_paint_are_counted(tmp_path):
     "Through files: lines and dashes of a painted street are in ties.json, and in what is printed"
     scenario = Scenario(

@@ -13,6 +13,8 @@ from tests.beds.reports import drive, fabricate, page
 from tests.report.test_calibration_page import calibrated, calibrated_together
 from tests.report.test_comparison_page import fake
 
+pytestmark = pytest.mark.long
+
 PAPER = {"compare": 1031}  # px: A4 lying, without its margins; the others stand
 UPRIGHT = 688  # px, so too
 FRAMES = [("400", 400), ("1000", 1000), ("1600", 1600), ("dark", 1000), ("print", UPRIGHT)]

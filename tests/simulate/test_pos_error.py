@@ -15,6 +15,8 @@ from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Trajectory
 from tests.beds.shared import shared
 
+pytestmark = pytest.mark.long
+
 START = 357_700.0  # s of the week
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m
 LOST, BACK = 20.0, 80.0  # s, an outage of 60 s
@@ -140,7 +142,6 @@ def test_the_smoother_equals_dense_least_squares():
     np.testing.assert_allclose(ratio, 1.0, atol=1e-5)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("grade", ["tactical", "mems"])
 def test_the_sigmas_are_right_when_filter_and_truth_agree(grade, monkeypatch):
     "Open sky, figures known: normalised errors squared lie within their 95 % band over seeds"
@@ -161,7 +162,6 @@ def test_the_sigmas_are_right_when_filter_and_truth_agree(grade, monkeypatch):
         assert low < np.sum(square) < high
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("grade", ["tactical", "mems"])
 def test_mistuned_software_is_nearly_right_in_open_sky(grade):
     "With its own figures and slow GNSS errors, 90 % of the epochs lie within the 95 % band"
@@ -199,7 +199,6 @@ def test_after_an_outage_the_error_is_back_at_centimetres(mems, real_time):
         assert (rms < [0.02, 0.02, 0.04]).all()  # m
 
 
-@pytest.mark.long
 def test_a_tactical_unit_drifts_clearly_less(mems, tactical):
     "A fibre-optic unit loses at most 0.7 of what a MEMS unit loses; in real time half"
     assert np.median(largest(tactical)) < 0.7 * np.median(largest(mems))
@@ -275,7 +274,6 @@ def test_walls_take_satellites_away():
     assert 0.03 < canyon_error < 0.5  # m
 
 
-@pytest.mark.long
 def test_sigmas_in_a_canyon_are_optimistic_within_a_factor_of_two():
     "Slow multipath deceives software that takes it for noise, but not beyond reason"
     scenario = PosScenario(canyons=((10.0, 50.0),))

@@ -208,6 +208,7 @@ def test_targets_do_not_overlap_and_stand_above_ground(name, seed):
     assert above.max() < 8.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_target_is_seen_by_every_pass(name, seed):

@@ -211,6 +211,7 @@ def opened(pages, tmp_path_factory):
     return json.loads(text), console
 
 
+@pytest.mark.long
 def test_the_pages_fit_phone_and_desk(opened):
     "No page is wider than its screen, letters are 12 px at least, nothing is requested"
     assert opened[1] == []
@@ -222,6 +223,7 @@ def test_the_pages_fit_phone_and_desk(opened):
         assert [one for one in found["requests"] if not one.startswith("data:")] == [], name
 
 
+@pytest.mark.long
 def test_the_first_screen_needs_no_scrolling(opened):
     "At 1280 x 800 verdict, certainty, shrinking, advice and smallest sizes all are in sight"
     for name, found in opened[0].items():
@@ -229,6 +231,7 @@ def test_the_first_screen_needs_no_scrolling(opened):
             assert 0 < found["bottom"] <= 800, name
 
 
+@pytest.mark.long
 def test_a_table_sorts_by_the_heading_that_is_pressed(opened):
     "Rising by the gap before"
     values = opened[0]["effect.html 1280"]["sorted"]
