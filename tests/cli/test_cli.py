@@ -431,6 +431,7 @@ def test_a_gate_that_cannot_be_read_stops_before_any_work(survey):
     assert not out.exists()
 
 
+@pytest.mark.long
 def test_points_without_a_pose_are_counted_and_the_rest_is_done(in_part):
     "Exit code 4; stderr says how many of how many, and which target was not used"
     process, out = in_part

@@ -490,6 +490,7 @@ def test_a_drive_that_is_known_to_millimetres_is_not_called_extrapolated():
     assert sum(stretch.seconds for stretch in support.weak) < 0.1 * 104.0  # s
 
 
+@pytest.mark.long
 def test_two_passes_by_a_target_are_two_observations():
     "practice_lever_arm: every target is seen in pass 1 and in pass 2"
     result = correct_shared("practice_lever_arm")

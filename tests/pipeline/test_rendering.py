@@ -13,6 +13,8 @@ from mlscorr.correction import Correction
 from mlscorr.pipeline.rendering import read_correction, render
 from tests.beds.places import EXAMPLES
 
+pytestmark = pytest.mark.long
+
 EXAMPLE = EXAMPLES / "render_before_after.py"
 
 
@@ -21,7 +23,6 @@ def survey(street):
     return mlscorr.read_survey(street)
 
 
-@pytest.mark.long
 def test_the_example_makes_its_picture(street, tmp_path):
     "The example draws a survey that it is given, and puts three pages together"
     picture, out = tmp_path / "picture.png", tmp_path / "pages"

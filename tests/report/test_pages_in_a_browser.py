@@ -9,6 +9,8 @@ import pytest
 
 from tests.beds.browser import browse, need_browser
 
+pytestmark = pytest.mark.long
+
 # two frames: a phone with WebGL, and a wide screen without it
 WRAPPER = """<!DOCTYPE html><meta charset="utf-8"><pre id="result">not run</pre>
 <script>

@@ -159,6 +159,7 @@ def test_the_examples_are_the_surveys_they_say_they_are():
     assert not scenarios["motorway"].imperfections
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
 def test_the_examples_can_be_simulated(path):
     "With ten lines a second: every pass is driven and recorded, and every scanner meets the scene"

@@ -11,6 +11,8 @@ from mlscorr.gap.close.rerun import _boards, _drawn, _meet, _views_of
 from mlscorr.gap.close.settings import SETTINGS
 from mlscorr.survey import PointCloud, Trajectory
 
+pytestmark = pytest.mark.long
+
 CENTRE = np.array([532_006.0, 3_374_010.0, 42.0])  # m, UTM; on a wall that faces the drive
 START = 413_200.0  # s
 SIZE = 0.6  # m

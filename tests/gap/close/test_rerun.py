@@ -10,6 +10,8 @@ from mlscorr.gap.close.rerun import rerun
 from mlscorr.gap.signatures.changes import Bench
 from tests.beds.gap_surveys import beams_of, read_once, rows_of
 
+pytestmark = pytest.mark.long
+
 SMALL = {  # effects of the size of what one looks for
     "time_offset": {"magnitude": 1e-3},
     "range_scale": {"magnitude": 5e-4},
@@ -148,7 +150,6 @@ def test_rows_of_other_beams_are_refused(case):
         run(case, rows=replace(rows, gps_time=rows.gps_time + 1.0))
 
 
-@pytest.mark.long
 def test_without_a_mounting_the_pose_can_still_be_wrong(case):
     "Clock and POS effects are simulated from the navigation centre; those of beams are refused"
     blind = replace(case[0], mounting=None, reference=None)
