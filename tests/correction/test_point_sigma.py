@@ -175,6 +175,7 @@ def test_real_files_carry_the_sigmas(name, tmp_path):
     assert_only_sigmas_added(target, tmp_path / f"plain-{name}", sigma)
 
 
+@pytest.mark.long
 def test_extra_bytes_that_nobody_described_stay_where_they_are(tmp_path):
     "Bytes behind the points without a description are kept, and described as such"
     path = write_street(tmp_path / "in.las", 6)

@@ -12,6 +12,8 @@ from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import Mounting
 from tests.beds.tied_passes import LENGTH, NOISE, ORIGIN, SPEED, START, drift, tied_passes
 
+pytestmark = pytest.mark.long
+
 SEED, NUMBER = 3, 600
 ARM = np.array([0.1, -0.6, 0.4])  # m
 LEFT, RIGHT = (Mounting(ARM, Rotation.from_euler("Z", a, degrees=True)) for a in (35, -35))

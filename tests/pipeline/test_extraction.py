@@ -20,8 +20,6 @@ from mlscorr.targets.regions import bright_regions
 from tests.beds.documents import undocumented
 from tests.beds.places import MLSCORR
 
-pytestmark = pytest.mark.long
-
 CORNER = np.array([532_000.0, 3_374_000.0, 42.0])
 START = 413_200.0
 KEYS = ["name", "pass", "gps_time", "kind", "size", "size_sigma", "observed", "covariance",
@@ -55,6 +53,7 @@ def distances(survey, rows):
     return np.linalg.norm(surveyed.position[:, None] - place, axis=2)
 
 
+@pytest.mark.long
 def test_extract_names_every_surveyed_target(street, extracted):
     "All five surveyed targets are found within 10 cm, matched by name, and exit code is 0"
     process, _ = extracted
@@ -70,6 +69,7 @@ def test_extract_names_every_surveyed_target(street, extracted):
     assert "5 of the 5 surveyed points" in process.stderr
 
 
+@pytest.mark.long
 def test_targets_json_csv_and_picture_hold_the_same_targets(extracted):
     "The files are those of the promise; JSON on stdout is the file's; the table has every row"
     process, out = extracted
@@ -93,6 +93,7 @@ def test_targets_json_csv_and_picture_hold_the_same_targets(extracted):
     assert (out / "targets.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_targets_are_found_without_control(street, blind):
     "With an empty control file, kinds and sizes are those of the street, to 3 cm, and no others"
     found = mlscorr.extract(mlscorr.read_survey(blind)).targets
@@ -199,6 +200,7 @@ def test_at_most_a_quarter_of_a_chunk_is_carried_on(monkeypatch):
     assert max(seen) <= (1 + SETTINGS.largest_carry) * size + 1
 
 
+@pytest.mark.long
 def test_targets_near_control_do_not_depend_on_how_many_points_are_held(street, monkeypatch):
     "Handed on a thousand points at a time, the street's targets are the same to the last digit"
     survey = mlscorr.read_survey(street)

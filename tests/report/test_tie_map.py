@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from mlscorr.report.style import svg
 from mlscorr.report.tie_map import tie_figure
@@ -39,6 +40,7 @@ def test_a_legend_names_what_is_drawn_and_nothing_else():
         assert len(labels) == 2 and labels[1].startswith(expected[0])
 
 
+@pytest.mark.long
 def test_a_hundred_thousand_ties_make_a_small_figure():
     "Dots are pixels: the bytes of the page don't grow with the survey"
     _, correction, _, residuals = tied_report()

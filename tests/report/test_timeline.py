@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import Support
@@ -11,6 +12,7 @@ from mlscorr.report.timeline import attitude_change, correction_figure
 from tests.beds.reports import START, drive, fabricate, page, words
 
 
+@pytest.mark.long
 def test_a_gap_breaks_the_curves_and_is_shaded(tmp_path):
     "No line suggests knowledge where the trajectory has none"
     trajectory = drive(gap=(20.0, 31.0))

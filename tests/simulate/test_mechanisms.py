@@ -64,6 +64,7 @@ def test_a_late_clock_moves_points_along_the_drive(seen):
     assert np.median(size[size > 0]) == pytest.approx(0.008, rel=0.3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("direction", DIRECTIONS)
 def test_is_linear_in_its_size_and_the_same_each_time(seen, direction):
     "Twice the size moves twice as far, in sentences of every direction"

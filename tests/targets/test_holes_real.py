@@ -80,6 +80,7 @@ def test_the_holes_form_one_square(holes):
     assert apart[4:] == pytest.approx([edge * np.sqrt(2)] * 2, abs=0.012)  # m
 
 
+@pytest.mark.long
 def test_holes_do_not_depend_on_the_axes(frames, size, holes):
     "The first frame turned by 70 degrees and moved to UTM gives the same centres to 3 mm"
     turn, origin = Rotation.from_euler("z", 70, degrees=True), np.array([523e3, 3378e3, 40.0])
