@@ -8,7 +8,7 @@ RUN := $(VENV)/bin
 demo: $(VENV)/ready
 	$(RUN)/mlscorr demo -o demo --overwrite
 
-# In under ten minutes on two cores; test-all, in half an hour, runs what is marked long as well
+# In about ten minutes on two cores; test-all, in half an hour, runs what is marked long as well
 test test-all: $(VENV)/ready
 	$(RUN)/ruff check .
 	$(RUN)/ruff format --check .
