@@ -68,50 +68,45 @@ class Plane:
         return replace(self, axes=_axes(other.axes[0] - (other.axes[0] @ normal) * normal, normal))
 
 
-def plane_through(origin: np.ndarray, normal: np.ndarray) -> Plane:
-    """Plane through a point: axes any, sigma 0, no inliers.
-
-    Parameters
-    ----------
-    origin : (3,) array
-        Units: m.
-    normal : (3,) array
-        Of length 1.
-    """
-    u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    return Plane(origin, _axes(u, normal), 0.0, np.empty(0, bool))
-
-
 def _axes(u, normal):
     u = u / np.linalg.norm(u)
     return np.array([u, np.cross(normal, u), normal])
 
 
 @njit(cache=True, nogil=True)
-def most_common(xyz: np.ndarray, origins: np.ndarray, normals: np.ndarray, tolerance: float) -> int:
-    """Number of the plane that most points support, nearer ones more.
+def most_common(xyz: np.ndarray, triples: np.ndarray, tolerance: float) -> np.ndarray:
+    """Which points lie on the plane that most of them support, nearer ones more.
 
     Parameters
     ----------
     xyz : (n, 3) array
         Units: m.
-    origins, normals : (k, 3) array
-        Of at least one plane. Units: m, 1.
+    triples : (k, 3) int array
+        Rows of three points through which a plane is tried.
     tolerance : float
         Units: m.
 
+    Returns
+    -------
+    (n,) bool array
+        None where no three span a plane.
+
     Source: MSAC (Torr and Zisserman 2000).
     """
-    best, largest = 0, -1.0
-    for k in range(len(normals)):
-        a, b, c = normals[k]
-        offset = a * origins[k, 0] + b * origins[k, 1] + c * origins[k, 2]
-        support = 0.0
+    origin, best, largest = xyz[0], np.zeros(3), -1.0
+    for i, j, k in triples:
+        normal = np.cross(xyz[j] - xyz[i], xyz[k] - xyz[i])
+        length = np.sqrt(np.sum(normal**2))
+        if length == 0.0:
+            continue
+        normal /= length
+        a, b, c = normal
+        offset, support = np.sum(normal * xyz[i]), 0.0
         for x, y, z in xyz:
             support += max(1.0 - ((a * x + b * y + c * z - offset) / tolerance) ** 2, 0.0)
         if support > largest:
-            best, largest = k, support
-    return best
+            origin, best, largest = xyz[i], normal, support
+    return (np.abs(np.sum((xyz - origin) * best, axis=1)) <= tolerance) & (largest >= 0.0)
 
 
 def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
@@ -134,32 +129,30 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
     """
     if len(xyz) < 3:
         raise ValueError(f"A plane needs 3 points, there are {len(xyz)}.")
-    middle = xyz.mean(axis=0)
-    local = xyz - middle
-    corners = local[(quasi_random(SETTINGS.plane_trials, 3) * len(local)).astype(int)]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1)
-    normals, corners = normals[length > 0], corners[length > 0]
-    normals /= length[length > 0, None]
-    inside = np.ones(len(local), bool)
-    if len(normals):
-        best = most_common(local, corners[:, 0], normals, tolerance)
-        inside = np.abs((local - corners[best, 0]) @ normals[best]) <= tolerance
+    triples = (quasi_random(SETTINGS.plane_trials, 3) * len(xyz)).astype(int)
+    return Plane(*_fit_plane(xyz, triples, tolerance))
+
+
+@njit(cache=True, nogil=True)
+def _fit_plane(xyz, triples, tolerance):
+    """Origin (3,), axes (3, 3), sigma and inliers (n,): a piece of cloud asks for hundreds."""
+    middle = xyz.sum(axis=0) / len(xyz)
+    local, square = xyz - middle, np.empty((3, 3))
+    inside = most_common(local, triples, tolerance)
+    if not inside.any():  # all on a line
+        inside[:] = True
     for _ in range(2):
-        centre, square, axes = _least_squares(local, inside)
-        sigma = np.sqrt(max(square[0], 0.0) / max(inside.sum() - 3, 1))
-        height = np.abs((local - centre) @ axes[:, 0])
+        points = local[inside]
+        centre = points.sum(axis=0) / len(points)
+        points -= centre
+        for i in range(3):  # not by BLAS, which sums otherwise with another number of threads
+            for j in range(3):
+                square[i, j] = np.sum(points[:, i] * points[:, j])
+        squares, axes = np.linalg.eigh(square)
+        sigma = np.sqrt(max(squares[0], 0.0) / max(len(points) - 3, 1))
+        height = np.abs(np.sum((local - centre) * axes[:, 0], axis=1))
         inside = height <= min(max(3 * sigma, 1e-3), tolerance)
-    return Plane(middle + centre, axes.T[::-1], float(sigma), inside)
-
-
-def _least_squares(xyz, inside):
-    """Centre of the points that are inside, squares about it along its axes, and these."""
-    points = xyz[inside]
-    centre = points.mean(axis=0)
-    points -= centre
-    # not by BLAS, which sums otherwise with another number of threads
-    return centre, *np.linalg.eigh(np.einsum("ni,nj->ij", points, points))
+    return middle + centre, axes.T[::-1].copy(), sigma, inside
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from mlscorr.targets.clusters import bright_components, components
 from mlscorr.targets.echoes import Echoes
-from mlscorr.targets.plane import Plane, fit_plane, most_common, plane_through
+from mlscorr.targets.plane import Plane, fit_plane, most_common
 from mlscorr.targets.regions import BrightRegion
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import diameter
@@ -141,10 +141,8 @@ def flat_patches(
     for _ in range(SETTINGS.patches):
         if len(left) < smallest:
             return
-        plane = _most_common_plane(echoes.xyz[left], size, echoes.tolerance, rng)
-        if plane is None:
-            return
-        on_plane = np.abs(plane.coordinates(echoes.xyz[left])[:, 2]) <= echoes.tolerance
+        triples = _near_triples(echoes.xyz[left], size, rng)
+        on_plane = most_common(echoes.xyz[left], triples, echoes.tolerance)
         if on_plane.sum() < smallest:
             return
         plane = fit_plane(echoes.xyz[left[on_plane]], echoes.tolerance)
@@ -159,19 +157,12 @@ def _steep(echoes, plane):
     return np.abs(sight @ plane.axes[2]) > SETTINGS.grazing * np.linalg.norm(sight, axis=1)
 
 
-def _most_common_plane(xyz, size, tolerance, rng):
-    """The plane through three near points that most points lie on, or None."""
+def _near_triples(xyz, size, rng):
+    """Rows (k, 3) of three points near each other."""
     seeds = rng.integers(len(xyz), size=SETTINGS.plane_trials)
     balls = cKDTree(xyz).query_ball_point(xyz[seeds], size / 2)
-    pairs = np.array([[ball[int(i * len(ball))] for i in rng.random(2)] for ball in balls])
-    normal = np.cross(xyz[pairs[:, 0]] - xyz[seeds], xyz[pairs[:, 1]] - xyz[seeds])
-    length = np.linalg.norm(normal, axis=1)
-    good = length > 1e-6
-    if not good.any():
-        return None
-    normal, origin = normal[good] / length[good, None], xyz[seeds[good]]
-    best = most_common(xyz, origin, normal, tolerance)
-    return plane_through(origin[best], normal[best])
+    pairs = [[ball[int(i * len(ball))] for i in rng.random(2)] for ball in balls]
+    return np.column_stack([seeds, pairs])
 
 
 def _bright_parts(echoes, rows, threshold, kind, size, guess):
@@ -193,12 +184,13 @@ def _flat_parts(echoes, rows, size):
     for _ in range(3):
         if len(rows) < SETTINGS.smallest_count:
             return
-        longest = np.linalg.norm(np.ptp(echoes.xyz[rows], axis=0))
+        xyz = echoes.xyz[rows]
+        longest = np.linalg.norm(np.ptp(xyz, axis=0))
         if longest + 2 * echoes.tolerance < size / 2:  # too small on whatever plane
             return
-        plane = fit_plane(echoes.xyz[rows], echoes.tolerance)
+        plane = fit_plane(xyz, echoes.tolerance)
         flat, whole = rows[plane.inliers], plane.inliers.mean() >= 0.7
-        points = plane.crossing(echoes.xyz[flat], echoes.sight(flat))
+        points = plane.crossing(xyz[plane.inliers], echoes.sight(flat))
         link = SETTINGS.link_shares[-1] * size
         parts = [np.arange(len(flat))] if whole else components(points, link)
         for part in parts:

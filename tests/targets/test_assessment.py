@@ -6,10 +6,10 @@ import pytest
 from mlscorr.targets.assessment import assess
 from mlscorr.targets.echoes import Echoes
 from mlscorr.targets.outline import Outline
-from mlscorr.targets.plane import plane_through
 from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.seeds import Seed
 from mlscorr.targets.shapes import BRIGHT, DARK
+from tests.beds.planes import plane_through
 
 SIZE = 0.6  # m
 BLUR = 0.002  # m

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from mlscorr.targets.echoes import Echoes, beams_at_plane, missed_points
-from mlscorr.targets.plane import plane_through
 from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
+from tests.beds.planes import plane_through
 
 FACE = plane_through(np.array([0.0, 5.0, 0.0]), np.array([0.0, -1.0, 0.0]))  # 5 m off
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.targets.plane import fit_plane, most_common, plane_through
+from mlscorr.targets.plane import fit_plane, most_common
+from tests.beds.planes import plane_through
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 42.0])  # m, UTM
 
@@ -45,11 +46,19 @@ def test_axes_are_turned_like_those_of_another_plane():
 
 
 def test_nearer_points_support_a_plane_more():
-    "Three points on a plane weigh more than three half the tolerance off another; far ones nothing"
-    beside = [[0.0, 0.0, 0.015], [1.0, 0.0, -0.015], [0.0, 1.0, 0.015]]
-    upon = [[5.0, 5.0, 1.0], [6.0, 5.0, 1.0], [5.0, 6.0, 1.0]]
+    "Two points on a plane weigh more than two half the tolerance off another; far ones nothing"
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    beside = [[0.5, 0.5, 0.015], [0.2, 0.7, -0.015]]
+    upon = [[0.5, 0.5, 1.0], [0.2, 0.7, 1.0]]
     far = np.random.default_rng(0).uniform(10.0, 14.0, (50, 3))
-    xyz = np.concatenate([beside, upon, far])
-    origins, up = np.array([[0.0, 0, 0], [0, 0, 1]]), np.tile([0.0, 0.0, 1.0], (2, 1))
-    assert most_common(xyz, origins, up, 0.03) == 1
-    assert most_common(xyz[:3], origins, up, 0.03) == 0
+    xyz = np.concatenate([corners, beside, np.add(corners, [0, 0, 1]), upon, far])
+    triples = np.array([[0, 1, 2], [5, 6, 7]])
+    assert np.flatnonzero(most_common(xyz, triples, 0.03)).tolist() == [5, 6, 7, 8, 9]
+    assert np.flatnonzero(most_common(xyz[:8], triples, 0.03)).tolist() == [0, 1, 2, 3, 4]
+
+
+def test_points_on_a_line_have_no_plane():
+    "Three of a line span no plane, so that none of its points lies on one"
+    line = np.arange(10.0)[:, None] * [1.0, 2.0, 0.5]
+    assert not most_common(line, np.array([[0, 1, 2], [3, 3, 5]]), 0.03).any()
+    assert fit_plane(line, 0.03).inliers.all()
