@@ -209,11 +209,16 @@ class Bench:
 
     @cached_property
     def _trajectory(self):
-        """The recorded trajectory, thinned as far as its gaps stay what they are."""
-        whole = self.survey.trajectory
+        """The recorded trajectory, thinned as far as its gaps stay what they are, and with the
+        epochs about each row, between which alone a jump may pass for a slope.
+        """
+        whole, last = self.survey.trajectory, len(self.survey.trajectory) - 1
         step = max(1, int(SETTINGS.epoch_step / np.median(np.diff(whole.gps_time))))
-        ends = np.searchsorted(whole.gps_time, whole.gaps)
-        rows = np.unique(np.r_[0 : len(whole) : step, ends.ravel(), len(whole) - 1])
+        ends = np.searchsorted(whole.gps_time, whole.gaps).ravel()
+        times = self.rows.gps_time, self.rows.gps_time_2[self.rows.two_times]
+        after = np.searchsorted(whole.gps_time, np.concatenate(times), side="right")
+        about = np.clip(np.concatenate([after - 1, after]), 0, last)
+        rows = np.unique(np.r_[0 : len(whole) : step, ends, about, last])
         session = None if whole.session is None else whole.session[rows]
         pose = whole.gps_time[rows], whole.position[rows], whole.attitude[rows]
         thin = Trajectory(*pose, session=session)
