@@ -9,16 +9,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from mlscorr.io import layouts
 from mlscorr.io.column_names import UNITS, find_meanings, is_foreign, section_of, unit_of
-from mlscorr.io.layouts import (
-    COMMENT_MARKS,
-    ENCODINGS,
-    SEPARATORS,
-    TableLayout,
-    head,
-    is_comment,
-    split,
-)
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX, read_sheets
@@ -35,7 +27,7 @@ def find_layout(
     lacking: Callable[[Collection[str]], list[str]],
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
-) -> TableLayout | None:
+) -> layouts.TableLayout | None:
     """The layout of a table of others.
 
     Parameters
@@ -106,7 +98,7 @@ def _numbered(positions):
 def _encodings(path):
     with open_file(path) as file:
         return ("utf-16",) if file.read(2) in (b"\xff\xfe", b"\xfe\xff") else tuple(
-            name for name in ENCODINGS if name != "utf-16"
+            name for name in layouts.ENCODINGS if name != "utf-16"
         )  # fmt: skip
 
 
@@ -121,12 +113,12 @@ def _candidates(path, encoding):
     """Pairs of a TableLayout without columns, and the first rows parted in its way."""
     if encoding is None:
         for sheet, rows in read_sheets(path):
-            yield TableLayout(path, (), 0, {}, sheet=sheet), rows[: SETTINGS.sampled_lines]
+            yield layouts.TableLayout(path, (), 0, {}, sheet=sheet), rows[: SETTINGS.sampled_lines]
         return
-    lines = head(path, encoding)
-    for separator in SEPARATORS if lines else ():
-        layout = TableLayout(path, (), 0, {}, separator, encoding=encoding)
-        yield layout, [(number, split(line, separator)) for number, line in lines]
+    lines = layouts.head(path, encoding)
+    for separator in layouts.SEPARATORS if lines else ():
+        layout = layouts.TableLayout(path, (), 0, {}, separator, encoding=encoding)
+        yield layout, [(number, layouts.split(line, separator)) for number, line in lines]
 
 
 def _layout_of(start, rows, names, lacking, chosen):
@@ -147,7 +139,7 @@ def _layout_of(start, rows, names, lacking, chosen):
         check_chosen(start.path, set(chosen) - set(meanings), chosen)
         columns = {name: positions[0] for name, positions in meanings.items()}
         layout = replace(start, header=tuple(cells), lines=number, columns=columns)
-        below = [row for row in rows[place + 1 :] if not is_comment(row[1])]
+        below = [row for row in rows[place + 1 :] if not layouts.is_comment(row[1])]
         units = [unit_of(cell) for cell in cells]
         if below and _holds_units(below[0][1], columns):
             layout = replace(layout, lines=below[0][0])
@@ -180,7 +172,7 @@ def check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str 
 
 def _unnamed_layout(start, rows, is_numbered, unnamed):
     """The layout of a table without a header: its first row, or the first with what was chosen."""
-    rows = [row for row in rows if not (row[1] and row[1][0].startswith(COMMENT_MARKS))]
+    rows = [row for row in rows if not (row[1] and row[1][0].startswith(layouts.COMMENT_MARKS))]
     for place, (number, cells) in enumerate(rows if is_numbered else rows[:1]):
         columns = unnamed(cells)
         if columns:
@@ -191,8 +183,8 @@ def _unnamed_layout(start, rows, is_numbered, unnamed):
 
 def _uncommented(cells):
     """Cells of a header that may stand behind a comment mark."""
-    if cells and cells[0].startswith(COMMENT_MARKS):
-        first = cells[0].lstrip("".join(COMMENT_MARKS)).strip()
+    if cells and cells[0].startswith(layouts.COMMENT_MARKS):
+        first = cells[0].lstrip("".join(layouts.COMMENT_MARKS)).strip()
         return [first, *cells[1:]] if first else cells[1:]
     return cells
 

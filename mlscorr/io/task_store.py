@@ -14,17 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from mlscorr.io import publishing
 from mlscorr.io.folders import remove
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.output import PART, fcntl
-from mlscorr.io.publishing import (
-    locked_in_store,
-    make_folder,
-    names_in,
-    publish,
-    remove_files,
-    scratch_folder,
-)
 from mlscorr.io.storage import is_remote, is_there
 
 SUFFIX = ".result"
@@ -121,7 +114,7 @@ class TaskStore:
 
     def is_begun(self) -> bool:
         """Whether a run began here, if only by its lock, after which it writes the plan."""
-        names = {*names_in(self.folder)}
+        names = {*publishing.names_in(self.folder)}
         return self.plan.name in names or {LOCK} <= names <= {LOCK, self.plan.name + PART}
 
     def is_locked(self) -> bool | None:
@@ -143,7 +136,7 @@ class TaskStore:
 
     def clear(self) -> None:
         """Remove all results; what else is in the folder stays."""
-        remove_files(self.folder, f"*/{'[0-9a-f]' * len(digest())}{SUFFIX}")
+        publishing.remove_files(self.folder, f"*/{'[0-9a-f]' * len(digest())}{SUFFIX}")
 
     def path(self, kind: str, key: str) -> Path:
         """Where a result stands, or would stand.
@@ -164,7 +157,7 @@ class TaskStore:
         ----------
         kind : str
         """
-        return {name.removesuffix(SUFFIX) for name in names_in(self.folder / kind)}
+        return {name.removesuffix(SUFFIX) for name in publishing.names_in(self.folder / kind)}
 
     def put(self, kind: str, key: str, value: object) -> None:
         """Keep a result; a checksum stands before it.
@@ -182,13 +175,13 @@ class TaskStore:
         """
         content = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
         path = self.path(kind, key)
-        make_folder(path.parent)
+        publishing.make_folder(path.parent)
         with self.part() as part:
             with open(part, "wb") as file:
                 file.write(hashlib.sha256(content).digest() + content)
                 file.flush()
                 os.fsync(file.fileno())
-            publish(part, path)
+            publishing.publish(part, path)
 
     def get(self, kind: str, key: str) -> Any:
         """A result.
@@ -230,7 +223,7 @@ class TaskStore:
             Of its name.
         """
         if is_remote(self.folder):
-            with scratch_folder() as folder:
+            with publishing.scratch_folder() as folder:
                 yield folder / f"part{suffix}"
             return
         folder = self.folder / f"part.{secrets.token_hex(8)}"
@@ -254,7 +247,7 @@ class TaskStore:
             Where another run is at work.
         """
         if is_remote(self.folder):
-            with locked_in_store(self.folder / LOCK):
+            with publishing.locked_in_store(self.folder / LOCK):
                 yield
             return
         self.folder.mkdir(parents=True, exist_ok=True)

@@ -17,6 +17,7 @@ from mlscorr.io.storage import as_path, is_folder, is_remote
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.io.trajectory_exports import check_exports
 from mlscorr.pipeline.clouds import WrittenClouds
+from mlscorr.pipeline.project import stages
 from mlscorr.pipeline.project.city import project_drives
 from mlscorr.pipeline.project.corrected import found_drive, motion_of
 from mlscorr.pipeline.project.document import (
@@ -29,16 +30,6 @@ from mlscorr.pipeline.project.engine import engine
 from mlscorr.pipeline.project.file_tasks import ReportInput
 from mlscorr.pipeline.project.progress import Progress, logged
 from mlscorr.pipeline.project.running import Run
-from mlscorr.pipeline.project.stages import (
-    PlannedDrive,
-    area_tasks,
-    check_control_near,
-    cloud_tasks,
-    finding_tasks,
-    planned_drive,
-    report_task,
-    tile_tasks,
-)
 from mlscorr.pipeline.project.tasks import VERSION
 from mlscorr.pipeline.tying import TieUse, without_control
 
@@ -174,23 +165,23 @@ class _Work:
                 write_project(part, result.document, result.tracks)
         return result
 
-    def _planned(self) -> list[PlannedDrive]:
+    def _planned(self) -> list[stages.PlannedDrive]:
         """The drives with the clouds that can be read."""
-        tasks = tile_tasks(self.project)
+        tasks = stages.tile_tasks(self.project)
         self.progress.begin("tiles", tasks)
         tiles = self.run.results(tasks)
         owned = [
             (drive, [own[drive.name] for own in tiles.values() if drive.name in own])
             for drive in self.project.drives
         ]
-        planned = [planned_drive(self.project, drive, own) for drive, own in owned if own]
+        planned = [stages.planned_drive(self.project, drive, own) for drive, own in owned if own]
         if not planned:
             raise ValueError(
                 f"None of the {len(tasks)} cloud files of {self.project.path} can be read. The "
                 f"first: {self.run.faults[0].fault}"
             )
         if self.ties != "only":
-            check_control_near(self.project, [drive.survey for drive in planned])
+            stages.check_control_near(self.project, [drive.survey for drive in planned])
         else:
             planned = [replace(d, survey=without_control(d.survey)) for d in planned]
         return planned
@@ -198,7 +189,7 @@ class _Work:
     def _estimated(self, planned, origin):
         """Keys of each drive's results in the store: (corrected, motion) by its name."""
         with_ties, store = self.ties != "off", self.run.store
-        tasks = {d.survey.name: finding_tasks(store, d, origin, with_ties) for d in planned}
+        tasks = {d.survey.name: stages.finding_tasks(store, d, origin, with_ties) for d in planned}
         every = [task for own in tasks.values() for task in own]
         self.progress.begin("findings", every)
         findings = self.run.results(every)
@@ -240,13 +231,13 @@ class _Work:
 
     def _areas(self, key, areas):
         """The results of each AreaInput."""
-        tasks = area_tasks(self.run.store, key, areas)
+        tasks = stages.area_tasks(self.run.store, key, areas)
         self.progress.begin("areas", tasks)
         return self.run.all_results(tasks)
 
     def _clouds(self, planned, keys):
         """WrittenClouds of each drive by its name."""
-        tasks = cloud_tasks(self.run.store, planned, keys, self.out, self.options.sigma)
+        tasks = stages.cloud_tasks(self.run.store, planned, keys, self.out, self.options.sigma)
         every = [task for task, _ in tasks]
         self.progress.begin("clouds", every)
         written = self.run.results(every)
@@ -260,7 +251,7 @@ class _Work:
     def _reports(self, planned, keys, clouds):
         """DriveResult and report.json of each drive."""
         tasks = [
-            report_task(
+            stages.report_task(
                 ReportInput(
                     self.run.store.folder,
                     keys[d.survey.name],

@@ -9,16 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from mlscorr.report.render.symbols import (
-    HALO,
-    MARK,
-    SYMBOLS,
-    compass,
-    free_corner,
-    legend,
-    letter,
-    scale_bar,
-)
+from mlscorr.report.render import symbols
 from mlscorr.report.render.view import View
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import STYLE, label
@@ -56,13 +47,13 @@ class Picture:
         """
         pair = [self.before, self.after]
         if decorated:
-            corner = free_corner(*pair)
+            corner = symbols.free_corner(*pair)
             height, width = self.before.shape[:2]
             for k in (0, 1):
                 figure = _blank(width, height)
                 axes = _panel(figure, self.view, k, pair[k], (0, 0))
-                scale_bar(axes, self.view.camera)
-                compass(axes, self.view.camera, corner)
+                symbols.scale_bar(axes, self.view.camera)
+                symbols.compass(axes, self.view.camera, corner)
                 pair[k] = _drawn(figure)
         both = _few_colours(np.concatenate(pair))  # the same colours in both
         width, half = both.width, both.height // 2
@@ -76,15 +67,15 @@ class Picture:
         size : (int, int)
             Width and height. Units: pixels.
         """
-        figure, corner = _blank(*size), free_corner(self.before, self.after)
+        figure, corner = _blank(*size), symbols.free_corner(self.before, self.after)
         corners = _panel_corners(self.view.camera.size, size)
         for k, words in enumerate(("Before the correction", "After the correction")):
             axes = _panel(figure, self.view, k, (self.before, self.after)[k], corners[k])
-            axes.set_title(words, fontsize=letter(axes, 1.0), color="#333333", loc="left")
-            scale_bar(axes, self.view.camera)
-            compass(axes, self.view.camera, corner)
+            axes.set_title(words, fontsize=symbols.letter(axes, 1.0), color="#333333", loc="left")
+            symbols.scale_bar(axes, self.view.camera)
+            symbols.compass(axes, self.view.camera, corner)
         _words(figure, self.view, corners[0][0] / size[0])
-        legend(figure, self.view, self.limits, (GAP, FOOT))
+        symbols.legend(figure, self.view, self.limits, (GAP, FOOT))
         return _png(_few_colours(_drawn(figure)))
 
 
@@ -152,31 +143,31 @@ def _panel(figure, view, k, pixels, corner):
 def _mark(axes, mark, camera):
     pixel = camera.project(mark.points)[0]
     if mark.kind == "surveyed":
-        axes.plot(*pixel.T, color=MARK, linewidth=2.2, path_effects=HALO)
+        axes.plot(*pixel.T, color=symbols.MARK, linewidth=2.2, path_effects=symbols.HALO)
         middle = pixel.mean(axis=0) if len(pixel) > 5 else pixel[:4].mean(axis=0)
-        axes.plot(*middle, marker="+", markersize=15, markeredgewidth=2, color=MARK)
+        axes.plot(*middle, marker="+", markersize=15, markeredgewidth=2, color=symbols.MARK)
     elif mark.kind == "offset":
         _arrow(axes, pixel, 2.4)
     elif mark.kind == "residual":
         _arrow(axes, pixel, 2.0)
     else:
-        axes.plot(*pixel.T, markersize=6, markeredgewidth=1.3, **SYMBOLS[mark.kind])
+        axes.plot(*pixel.T, markersize=6, markeredgewidth=1.3, **symbols.SYMBOLS[mark.kind])
 
 
 def _arrow(axes, pixel, width):
     if np.hypot(*(pixel[1] - pixel[0])) < 14.0:  # pixels: the head would be longer
-        axes.plot(*pixel.T, color=MARK, linewidth=width, path_effects=HALO)
+        axes.plot(*pixel.T, color=symbols.MARK, linewidth=width, path_effects=symbols.HALO)
         return
     arrow = {"arrowstyle": "-|>,head_width=0.28,head_length=0.55", "shrinkA": 0, "shrinkB": 0}
-    arrow |= {"color": MARK, "linewidth": width, "path_effects": HALO}
+    arrow |= {"color": symbols.MARK, "linewidth": width, "path_effects": symbols.HALO}
     axes.annotate("", xy=pixel[1], xytext=pixel[0], arrowprops=arrow)
 
 
 def _names(axes, marks, camera):
     """Names beside their symbols, left out where one would cover another."""
-    size, taken = letter(axes, 0.62), []
+    size, taken = symbols.letter(axes, 0.62), []
     for mark in marks:
-        if mark.kind not in SYMBOLS:
+        if mark.kind not in symbols.SYMBOLS:
             continue
         text = label(mark.text)
         x, y = camera.project(mark.points)[0][0]
@@ -184,11 +175,15 @@ def _names(axes, marks, camera):
         if any((box[:2] < b[2:]).all() and (b[:2] < box[2:]).all() for b in taken):
             continue
         taken.append(box)
-        axes.text(x + 7, y, text, fontsize=size, va="center", parse_math=False, path_effects=HALO)
+        axes.text(
+            x + 7, y, text, fontsize=size, va="center", parse_math=False, path_effects=symbols.HALO
+        )
 
 
 def _words(figure, view, left):
     """The title, and the note in the foot."""
-    figure.text(left, 0.982, view.title, va="top", fontsize=letter(figure, 1.55), parse_math=False)
+    figure.text(
+        left, 0.982, view.title, va="top", fontsize=symbols.letter(figure, 1.55), parse_math=False
+    )
     below = {"ha": "right", "va": "bottom", "color": "#444444", "parse_math": False}
-    figure.text(1 - left, 0.018, view.note, fontsize=letter(figure, 0.85), **below)
+    figure.text(1 - left, 0.018, view.note, fontsize=symbols.letter(figure, 0.85), **below)
