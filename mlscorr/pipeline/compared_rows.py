@@ -7,35 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.correction import Correction
 from mlscorr.effects import Effect
+from mlscorr.estimate import estimate_correction
+from mlscorr.gap import contrast, observe
 from mlscorr.gap.close import Beams, BeamSimulator, Surroundings, collect_beams
-from mlscorr.gap.contrast import (
-    Contrast,
-    DistributionDistance,
-    SampleCollector,
-    cloud_distances,
-    contrast_clouds,
-    contrast_returns,
-)
-from mlscorr.gap.observe import (
-    Absence,
-    Pairing,
-    PatchCollector,
-    Patches,
-    Rows,
-    SimulatedBeams,
-    SimulatedClouds,
-    build_rows,
-    find_absence,
-    rows_against,
-    spread_patches,
-    without_unpaired,
-)
 from mlscorr.gap.signatures import expected, without_effects
 from mlscorr.io.simulated_clouds import simulated_survey
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.planning import check_enough
-from mlscorr.survey import Survey, TargetObservations
+from mlscorr.survey import Matched, Survey, TargetObservations
 
 NEXT_RUN = (
     "Run mlscorr diagnose once more with --simulator simulator.toml of this folder: it has the "
@@ -72,13 +53,13 @@ class ComparedRows:
         What to run once the simulator has the cause, in a sentence.
     """
 
-    rows: Rows
+    rows: observe.Rows
     used: np.ndarray
     simulated: Callable | np.ndarray
-    absence: Absence
+    absence: observe.Absence
     notes: tuple[str, ...]
-    contrasts: tuple[Contrast, ...] = ()
-    distances: tuple[DistributionDistance, ...] = ()
+    contrasts: tuple[contrast.Contrast, ...] = ()
+    distances: tuple[contrast.DistributionDistance, ...] = ()
     next_run: str = NEXT_CLOUDS
 
 
@@ -115,7 +96,7 @@ def compare_with_belief(
     used = np.arange(len(rows)) < len(pairing.rows)
     observed = without_effects(rows, believed, effects)
     apart = rng.spawn(1)[0]  # how much is contrasted leaves the draws of the verdict alone
-    contrasts = contrast_returns(believed, patches, _loss(effects), apart)
+    contrasts = contrast.contrast_returns(believed, patches, _loss(effects), apart)
     compared = observed, used, simulator.added, absence, pairing.notes, contrasts
     return ComparedRows(*compared, next_run=NEXT_RUN)
 
@@ -151,20 +132,22 @@ def compare_with_clouds(
         For clouds that can't be read or paired, or too little to say anything.
     """
     opened = [simulated_survey(folder, believed) for folder in folders]
-    sampler = SampleCollector(believed)
+    sampler = contrast.SampleCollector(believed)
     finding, patches, _, notes = _read(believed, progress, sampler)
     samples = [sampler.sample(patches)]
-    absence = find_absence(believed, finding.matches)
+    absence = observe.find_absence(believed, finding.matches)
+    correction = _by_control(believed, finding.matches.matched)
     matched = _with_moved(finding, believed).matches.matched
-    patches = None if patches is None else spread_patches(patches)
+    patches = None if patches is None else observe.spread_patches(patches)
     compared = []
     for simulated in opened:
-        clouds, sample = _simulated_clouds(simulated, patches, progress)
+        clouds, sample = _simulated_clouds(simulated, patches, correction, progress)
         samples.append(sample)
-        rows, sentence = rows_against(believed, matched, finding.candidates, patches, clouds)
+        observed = matched, finding.candidates, patches
+        rows, sentence = observe.rows_against(believed, *observed, clouds, correction)
         compared.append(rows)
         notes = (*notes, sentence)
-    first, *following = without_unpaired(compared)
+    first, *following = observe.without_unpaired(compared)
     check_enough(survey, first, library, notes)
     if not first.residual.any():
         raise ValueError(
@@ -176,8 +159,8 @@ def compare_with_clouds(
     real, simulated_first = samples[:2]
     apart = rng.spawn(1)[0]
     channels = (
-        contrast_clouds(believed, real, simulated_first, apart),
-        cloud_distances(real, simulated_first, samples[2] if following else None, apart),
+        contrast.contrast_clouds(believed, real, simulated_first, apart),
+        contrast.cloud_distances(real, simulated_first, samples[2] if following else None, apart),
     )
     if following:
         change = first.residual - following[0].residual
@@ -189,10 +172,10 @@ def compare_with_clouds(
     return ComparedRows(first, used, to_first_order, absence, (*notes, LINEAR), *channels)
 
 
-def _simulated_clouds(simulated, patches, progress):
+def _simulated_clouds(simulated, patches, correction, progress):
     """SimulatedClouds and ChannelSample of a simulated survey, read once."""
-    collector, sampler = PatchCollector(simulated), SampleCollector(simulated)
-    beams = None if patches is None else SimulatedBeams(patches)
+    collector, sampler = observe.PatchCollector(simulated), contrast.SampleCollector(simulated)
+    beams = None if patches is None else observe.SimulatedBeams(patches, correction)
     others = [sampler] if beams is None else [sampler, beams]
     read = read_into(collector.add, *map(_chunks_alone, others))
     with warnings.catch_warnings(action="ignore"):  # of beams, which refuse the clouds
@@ -202,9 +185,9 @@ def _simulated_clouds(simulated, patches, progress):
             f"{simulated.path} was simulated with other beams than the survey's. "
             f"{finding.warnings[0]}"
         )
-    flat = collector.patches()
-    clouds = SimulatedClouds(simulated.name, finding.matches.matched, flat, beams)
-    return clouds, sampler.sample(flat)
+    flat, matched = collector.patches(), finding.matches.matched
+    given = matched, flat, beams, _by_control(simulated, matched)
+    return observe.SimulatedClouds(simulated.name, *given), sampler.sample(flat)
 
 
 def _chunks_alone(collector):
@@ -226,13 +209,13 @@ def _with_moved(finding: Finding, survey: Survey) -> Finding:
 
 def _read(
     believed, progress, sampler=None
-) -> tuple[Finding, Patches | None, Surroundings, tuple[str, ...]]:
+) -> tuple[Finding, observe.Patches | None, Surroundings, tuple[str, ...]]:
     """The Finding, Patches, Surroundings and notes.
 
     The clouds are read once: targets, patches, what lies about targets and, where there is a
     SampleCollector, its sample are taken from each chunk as it comes.
     """
-    collector, surroundings = PatchCollector(believed), Surroundings(believed)
+    collector, surroundings = observe.PatchCollector(believed), Surroundings(believed)
     others = [surroundings] if sampler is None else [surroundings, sampler]
     read = read_into(collector.add, *map(_chunks_alone, others))
     finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
@@ -241,16 +224,27 @@ def _read(
 
 def _observed(
     survey, believed, library, progress
-) -> tuple[Pairing, Rows, Beams, Absence, Patches | None]:
+) -> tuple[observe.Pairing, observe.Rows, Beams, observe.Absence, observe.Patches | None]:
     """The Pairing, all its rows, check points last, the Beams on which they stand, the Absence, the
     Patches.
     """
     finding, patches, surroundings, notes = _read(believed, progress)
-    absence = find_absence(believed, finding.matches)
+    absence = observe.find_absence(believed, finding.matches)
+    correction = _by_control(believed, finding.matches.matched)
     finding = _with_moved(finding, believed)
-    pairing = build_rows(believed, finding.matches.matched, finding.candidates, patches)
+    observed = finding.matches.matched, finding.candidates, patches
+    pairing = observe.build_rows(believed, *observed, correction=correction)
     check_enough(survey, pairing.rows, library, notes)
     pairing = replace(pairing, notes=(*notes, *pairing.notes))
-    rows = Rows.concatenate([pairing.rows, pairing.check])
+    rows = observe.Rows.concatenate([pairing.rows, pairing.check])
     beams = collect_beams(believed, rows, finding, patches, surroundings)
     return pairing, rows, beams, absence, patches
+
+
+def _by_control(survey: Survey, matched: TargetObservations) -> Correction | None:
+    """The Correction by control points alone; None where none was matched."""
+    control = matched[np.isin(np.array(matched.name, dtype=str), survey.control.name)]
+    if len(control) == 0:
+        return None
+    pairs = Matched.by_name(control, survey.control)
+    return estimate_correction(survey.trajectory, pairs, survey.pos).correction

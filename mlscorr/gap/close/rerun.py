@@ -261,7 +261,8 @@ def _surface(rows, survey, beams, on, view, run, dither, spread):
     xyz, kept = run.measure(met)
     normal, offset = beams.reference.mesh.normal, beams.reference.mesh.offset
     direction, largest = np.zeros((len(beams), 3)), np.zeros(len(beams))
-    direction[view], largest[view] = rows.direction[on], gate(survey, rows.gps_time[on])
+    direction[view] = rows.direction[on]
+    largest[view] = np.abs(rows.residual[on]) + gate(survey, rows.gps_time[on])
     towards = direction[beams.view]
     cosine = np.einsum("ni,ni->n", normal[triangle], towards)
     used = kept & (triangle >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))

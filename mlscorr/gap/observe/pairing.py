@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
+from mlscorr.correction import Correction
 from mlscorr.gap.observe.assemble import assemble, patch_pulses, sample_pulses
 from mlscorr.gap.observe.channels import return_rate, roughness
 from mlscorr.gap.observe.covariates import scanner_origin
@@ -50,6 +51,7 @@ def build_rows(
     candidates: Candidates,
     patches: Patches | None,
     limit: int = SETTINGS.patches,
+    correction: Correction | None = None,
 ) -> Pairing:
     """Compare a survey with what its simulator believes: targets, surfaces, channels.
 
@@ -67,6 +69,9 @@ def build_rows(
         Of its clouds, as find_patches gives them.
     limit : int
         Of the patches on surfaces, and as many in shared planes: the same choice each time.
+    correction : Correction, optional
+        By which patches find their like, where metres of drift put them before something else.
+        What is compared is as recorded.
 
     Raises
     ------
@@ -96,7 +101,7 @@ def build_rows(
     parts = [target_rows(survey, matched[~is_check], candidates)]
     check, notes = target_rows(survey, matched[is_check], candidates), [NO_INTENSITY]
     if patches is not None:
-        parts += _patch_rows(survey, patches, limit, notes)
+        parts += _patch_rows(survey, patches, limit, correction, notes)
     else:
         notes.append("The cloud holds no flat patch: surfaces and channels say nothing.")
     rows = Rows.concatenate(parts)
@@ -193,10 +198,10 @@ def _no_pulses():
     return SamplePulses(none.astype(int), none, none, place, place, none, place, none)
 
 
-def _patch_rows(survey, patches, limit, notes):
+def _patch_rows(survey, patches, limit, correction, notes):
     """Parts of the Rows that patches give; appends to the notes what they don't."""
     parts, rng = [], np.random.default_rng(0)
-    shared = shared_rows(survey, patches, rng, limit)
+    shared = shared_rows(survey, patches, rng, limit, correction)
     if shared is None:
         notes.append("No plane was seen twice: passes are not compared with each other.")
     else:
@@ -205,7 +210,7 @@ def _patch_rows(survey, patches, limit, notes):
         notes.append("No [scene] reference is given: surfaces are not compared with it.")
         patches, surface = patches[spread(_covered(survey, patches), limit, rng)], None
     else:
-        surface = on_reference(survey, patches)
+        surface = on_reference(survey, patches, correction)
         kept = spread(_covered(survey, patches[surface.patch]), limit, rng)
         patches, surface = patches[surface.patch[kept]], surface[kept]
     parts.append(patch_rows(survey, patches, surface))

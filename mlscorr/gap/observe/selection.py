@@ -1,10 +1,57 @@
 """Which differences count: those near enough, those that agree, and a choice of many."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from mlscorr.correction import Correction
+from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import SEARCH_RADIUS, Survey
+
+
+def moved_by(correction: Correction | None, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
+    """What a correction adds to points (n, 3); nothing without one. Units: m.
+
+    Parameters
+    ----------
+    correction : Correction or None
+    xyz, gps_time : (n, 3), (n,) array
+        Units: m, s.
+    """
+    return np.zeros(xyz.shape) if correction is None else correction.increments(xyz, gps_time)[0]
+
+
+def places(
+    survey: Survey, patches: Patches, correction: Correction | None
+) -> list[tuple[Survey, Patches]]:
+    """The survey and its patches as recorded, and where a correction puts them.
+
+    Parameters
+    ----------
+    survey : Survey
+    patches : Patches
+    correction : Correction or None
+    """
+    if correction is None:
+        return [(survey, patches)]
+    samples = patches.xyz.reshape(-1, 3)
+    moved = moved_by(correction, samples, patches.time.ravel()).reshape(patches.xyz.shape)
+    centre = patches.centre + moved_by(correction, patches.centre, patches.gps_time)
+    near = replace(patches, centre=centre, xyz=patches.xyz + moved)
+    return [(survey, patches), (replace(survey, trajectory=correction.corrected), near)]
+
+
+def support(residual: np.ndarray) -> float:
+    """How much speaks for the places that leave residuals (n,) in m: the nearer, the more.
+
+    Parameters
+    ----------
+    residual : (n,) array
+        Units: m.
+    """
+    return float(np.maximum(1.0 - (residual / SETTINGS.least_gate) ** 2, 0.0).sum())
 
 
 def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:

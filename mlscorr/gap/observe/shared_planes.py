@@ -3,16 +3,21 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mlscorr.correction import Correction
 from mlscorr.gap.observe.assemble import assemble, patch_pulses
 from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.rows import Rows, SamplePulses
-from mlscorr.gap.observe.selection import consistent, gate, spread
+from mlscorr.gap.observe.selection import consistent, gate, places, spread, support
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.survey import Survey
 
 
 def shared_rows(
-    survey: Survey, patches: Patches, rng: np.random.Generator, limit: int = SETTINGS.patches // 2
+    survey: Survey,
+    patches: Patches,
+    rng: np.random.Generator,
+    limit: int = SETTINGS.patches // 2,
+    correction: Correction | None = None,
 ) -> Rows | None:
     """Rows of the planes that were seen twice, or None where there are none.
 
@@ -25,12 +30,15 @@ def shared_rows(
     rng : numpy.random.Generator
         Chooses where there are more pairs than the limit.
     limit : int
+    correction : Correction, optional
+        By which two looks at one plane find each other, where more do than as recorded.
     """
-    first, second = (patches[rows] for rows in _pairs(patches))
-    normal, between, residual = compare_planes(first, second)
-    apart = np.linalg.norm(between, axis=1)
-    kept = np.flatnonzero(np.abs(residual) <= gate(survey, first.gps_time))
+    tried = [(there, *_pairs(near)) for there, near in places(survey, patches, correction)]
+    there, early, late, normal, between, residual = max(tried, key=lambda pair: support(pair[-1]))
+    first, second, apart = patches[early], patches[late], np.linalg.norm(between, axis=1)
+    kept = np.flatnonzero(np.abs(residual) <= gate(there, first.gps_time))
     kept = kept[consistent(first.gps_time[kept], normal[kept], residual[kept])]
+    residual = np.einsum("ni,ni->n", normal, first.centre - second.centre)
     if len(kept) == 0:
         return None
     columns = [first.gps_time[kept], second.gps_time[kept], *np.abs(normal[kept].T)]
@@ -75,8 +83,8 @@ def compare_planes(first: Patches, second: Patches) -> tuple[np.ndarray, np.ndar
 
 
 def _pairs(patches):
-    """Rows (n,), (n,) of two looks at one plane, the earlier one first; each is in one pair at
-    most with any other pass.
+    """Rows (n,), (n,) of two looks at one plane, the earlier one first, and compare_planes of
+    them; each is in one pair at most with any other pass.
     """
     pairs = cKDTree(patches.centre).query_pairs(
         SETTINGS.pair_distance * SETTINGS.cell, output_type="ndarray"
@@ -96,7 +104,7 @@ def _pairs(patches):
         key = a * (patches.pass_number.max(initial=0) + 1) + patches.pass_number[b]
         nearest = np.sort(np.unique(key, return_index=True)[1])
         early, late = early[nearest], late[nearest]
-    return early, late
+    return early, late, *compare_planes(patches[early], patches[late])
 
 
 def plane_noise(first: Patches, second: Patches, square: np.ndarray) -> np.ndarray:

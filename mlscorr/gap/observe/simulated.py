@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mlscorr.correction import Correction
 from mlscorr.gap.observe.channels import return_rate, roughness
 from mlscorr.gap.observe.pairing import patch_rows, target_rows
 from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.rows import Rows
-from mlscorr.gap.observe.selection import consistent, gate, spread
+from mlscorr.gap.observe.selection import consistent, gate, moved_by, places, spread
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.gap.observe.shared_planes import compare_planes, plane_noise
 from mlscorr.gap.observe.surfaces import OnReference
@@ -30,15 +31,18 @@ class SimulatedBeams:
     ----------
     patches : Patches
         Of the survey.
+    correction : Correction, optional
+        Of the survey: a simulator may have its error, or not.
     """
 
-    def __init__(self, patches: Patches):
+    def __init__(self, patches: Patches, correction: Correction | None = None):
         clouds = list(patches.cloud)
         time = np.concatenate([np.zeros(0), *(cloud.gps_time for cloud in clouds)])
         order = np.argsort(time, kind="stable")
         self._time = time[order]
         self._place = order
         self._observed = np.vstack([np.zeros((0, 3)), *(cloud.xyz for cloud in clouds)])
+        self._moved = moved_by(correction, self._observed, time)
         self.patch = np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds])
         self.xyz = np.full((len(time), 3), np.nan)
 
@@ -52,11 +56,15 @@ class SimulatedBeams:
         row = near[apart.argmin(axis=0), np.arange(len(chunk))]
         same = np.flatnonzero(apart.min(axis=0) <= SETTINGS.same_time)
         place, xyz = self._place[row[same]], chunk.xyz[same]
-        distance = np.linalg.norm(xyz - self._observed[place], axis=1)
-        known = np.linalg.norm(self.xyz[place] - self._observed[place], axis=1)
+        distance, known = self._distance(xyz, place), self._distance(self.xyz[place], place)
         closer = np.flatnonzero((distance <= SETTINGS.cell) & ~(distance >= known))
         closer = closer[np.argsort(-distance[closer], kind="stable")]  # the nearest comes last
         self.xyz[place[closer]] = xyz[closer]
+
+    def _distance(self, xyz, place):
+        """How far points (n, 3) lie from the observed, or the corrected one at a place."""
+        apart, moved = xyz - self._observed[place], self._moved[place]
+        return np.minimum(*(np.linalg.norm(each, axis=1) for each in (apart, apart - moved)))
 
     @property
     def apart(self) -> np.ndarray:
@@ -77,12 +85,15 @@ class SimulatedClouds:
     patches : Patches or None
     beams : SimulatedBeams or None
         None where the survey has no patches.
+    correction : Correction, optional
+        By the same control points: what error the simulator has in it.
     """
 
     name: str
     matched: TargetObservations
     patches: Patches | None
     beams: SimulatedBeams | None
+    correction: Correction | None = None
 
 
 def rows_against(
@@ -91,6 +102,7 @@ def rows_against(
     candidates: Candidates,
     patches: Patches | None,
     simulated: SimulatedClouds,
+    correction: Correction | None = None,
 ) -> tuple[Rows, str]:
     """Rows of observed minus simulated, NaN where nothing is paired, and a sentence on the pairs.
 
@@ -104,6 +116,8 @@ def rows_against(
     patches : Patches or None
         Of the survey, for which the SimulatedBeams were collected.
     simulated : SimulatedClouds
+    correction : Correction, optional
+        Of the survey, by which patches find their like. What is compared is as recorded.
 
     Raises
     ------
@@ -114,12 +128,15 @@ def rows_against(
     targets = int(np.isfinite(parts[0].residual).sum()) // 3
     by_beams = by_place = 0
     if patches is not None:
-        direction, residual, noise = _by_beams(survey, patches, simulated.beams)
+        corrected, near = places(survey, patches, correction)[-1]
+        moved = moved_by(simulated.correction, patches.centre, patches.gps_time)
+        near = replace(near, centre=near.centre - moved)
+        direction, residual, noise = _by_beams(corrected, patches, near, simulated.beams)
         known = np.isfinite(residual)
         by_beams, other = int(known.sum()), None
         if simulated.patches is not None:
-            other = _nearest(patches, simulated.patches)
-            also = _by_place(survey, patches, simulated.patches, other)
+            other = _nearest(near, simulated.patches)
+            also = _by_place(corrected, patches, near, simulated.patches, other)
             direction[~known], residual[~known], noise[~known] = (v[~known] for v in also)
             by_place = int(np.isfinite(residual).sum()) - by_beams
         surface = OnReference(np.arange(len(patches)), direction, residual, noise)
@@ -181,7 +198,7 @@ def _against_targets(survey, matched, candidates, simulated):
     return replace(rows, residual=residual, noise=noise)
 
 
-def _by_beams(survey, patches, beams):
+def _by_beams(survey, patches, near, beams):
     """Direction (p, 3), residual and its variance (p,) by pulses of the same times; else NaN."""
     normal, p = patches.normal, len(patches)
     along = np.einsum("ni,ni->n", beams.apart, normal[beams.patch])
@@ -198,14 +215,15 @@ def _by_beams(survey, patches, beams):
         if len(values) >= SETTINGS.facet_share * count:
             residual[i] = values.mean()
             noise[i] = values.var(ddof=1) / len(values) + SETTINGS.surface_sigma**2
-    return normal.copy(), _credible(survey, patches, normal, residual), noise
+    return normal.copy(), _credible(survey, patches, near, normal, residual), noise
 
 
-def _credible(survey, patches, direction, residual):
-    """Residuals (p,) with NaN for those of another surface."""
-    residual = np.where(np.abs(residual) <= gate(survey, patches.gps_time), residual, np.nan)
+def _credible(survey, patches, near, direction, residual):
+    """Residuals (p,) with NaN for those of another surface, as told where the patches belong."""
+    left = residual + np.einsum("pi,pi->p", direction, near.centre - patches.centre)
+    residual = np.where(np.abs(left) <= gate(survey, patches.gps_time), residual, np.nan)
     known = np.flatnonzero(np.isfinite(residual))
-    agree = consistent(patches.gps_time[known], direction[known], residual[known])
+    agree = consistent(patches.gps_time[known], direction[known], left[known])
     residual[known[~agree]] = np.nan
     return residual
 
@@ -225,13 +243,14 @@ def _nearest(patches, simulated):
     return other
 
 
-def _by_place(survey, patches, simulated, other):
+def _by_place(survey, patches, near, simulated, other):
     """As _by_beams, by patches of the same places."""
     pair = simulated[np.maximum(other, 0)]
-    normal, between, residual = compare_planes(patches, pair)
+    normal, between, _ = compare_planes(near, pair)
     noise = plane_noise(patches, pair, (between**2).sum(axis=1))
+    residual = np.einsum("pi,pi->p", normal, patches.centre - pair.centre)
     residual = np.where(other >= 0, residual, np.nan)
-    return normal, _credible(survey, patches, normal, residual), noise
+    return normal, _credible(survey, patches, near, normal, residual), noise
 
 
 def _against_channels(rows, survey, simulated, other):

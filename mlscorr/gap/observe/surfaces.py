@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mlscorr.correction import Correction
 from mlscorr.gap.observe.covariates import scanner_origin
 from mlscorr.gap.observe.patches import Patches
-from mlscorr.gap.observe.selection import consistent, gate
+from mlscorr.gap.observe.selection import consistent, gate, places, support
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.simulate.scenario import SceneScenario
 from mlscorr.simulate.scene import read_mesh
@@ -36,7 +37,9 @@ class OnReference(Columns):
     noise: np.ndarray
 
 
-def on_reference(survey: Survey, patches: Patches) -> OnReference:
+def on_reference(
+    survey: Survey, patches: Patches, correction: Correction | None = None
+) -> OnReference:
     """Compare patches with [scene] reference: OnReference.
 
     Each patch's beams are cast into the reference from where the scanner is believed to have
@@ -49,6 +52,9 @@ def on_reference(survey: Survey, patches: Patches) -> OnReference:
     survey : Survey
         With a reference.
     patches : Patches
+    correction : Correction, optional
+        By which patches find their like in the mesh, where more do than as recorded: control
+        points may be what is off.
 
     Raises
     ------
@@ -57,10 +63,13 @@ def on_reference(survey: Survey, patches: Patches) -> OnReference:
     """
     origin = np.round(patches.centre.mean(axis=0))
     mesh = read_mesh(SceneScenario(kind="mesh", file=survey.reference), origin)
-    direction, residual, met = _compare(survey, patches, mesh, origin)
+    both = places(survey, patches, correction)
+    tried = [(near, *_compare(there, near, mesh, origin)) for there, near in both]
+    near, direction, residual, met = max(tried, key=lambda place: support(place[2][place[3]]))
     if met.sum() < max(1, SETTINGS.overlap * len(patches)):
         raise ValueError(_elsewhere(survey, patches, mesh, origin))
     met[met] = consistent(patches.gps_time[met], direction[met], residual[met])
+    residual += np.einsum("pi,pi->p", direction, patches.centre - near.centre)
     noise = patches.variance / patches.points + SETTINGS.surface_sigma**2
     return OnReference(np.flatnonzero(met), direction[met], residual[met], noise[met])
 

@@ -1,5 +1,6 @@
 """A survey against the clouds that a simulator made of it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,9 @@ import pytest
 
 from mlscorr.gap.observe.simulated import SimulatedBeams
 from mlscorr.survey import PointCloud
+from tests.beds.displaced import correction_of
+from tests.beds.drives import START as DRIVE_START
+from tests.beds.drives import drive
 
 START = 413_200.0  # s
 
@@ -56,3 +60,16 @@ def test_other_times_and_places_are_no_pair(patches):
     beams.add(cloud(every.xyz, every.gps_time + 5e-6))
     beams.add(cloud(every.xyz + np.array([0.0, 1.5, 0.0]), every.gps_time))
     assert np.isnan(beams.apart).all()
+
+
+@pytest.mark.parametrize("has_error", [False, True])
+def test_beams_metres_off_are_paired_with_a_simulator_that_has_the_error_or_not(patches, has_error):
+    "2 m off by a correction, simulated points are 2 m, or nothing, from the recorded ones, to 1 nm"
+    every, shift = PointCloud.concatenate(patches.cloud), np.array([2.0, 0.0, 0.0])
+    trajectory = drive()
+    trajectory = replace(trajectory, gps_time=trajectory.gps_time + START - 5.0 - DRIVE_START)
+    survey = SimpleNamespace(trajectory=trajectory)
+    beams = SimulatedBeams(patches, correction_of(survey, shift))
+    beams.add(cloud(every.xyz - (not has_error) * shift, every.gps_time))
+    expected = np.tile((not has_error) * shift, (60, 1))
+    np.testing.assert_allclose(beams.apart, expected, atol=1e-9)
