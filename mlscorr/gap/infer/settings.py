@@ -78,8 +78,8 @@ class Settings:
     # log evidence from which on an event or a window is refined
     cell: float = 3.0
     # refined, an event fills a third of its cell of the bank
-    event_steps: tuple[float, ...] = (0.5, 0.25, 0.12)
-    # widths of an event, and half of its log width: a search by halves
+    event_steps: tuple[float, float] = (0.5, 0.125)
+    # widths of an event, and half of its log width: a search by halves from one to the other
     window_steps: tuple[float, ...] = (0.25, 0.12, 0.06)
     # lengths of a window: a search by halves
     window_lengths: tuple[float, ...] = (10.0, 20.0, 40.0, 80.0)

@@ -69,3 +69,15 @@ def test_a_jump_is_found_between_the_rows_next_to_it(with_surface, time, size):
     assert inference.verdict.label == "position_step"
     moment = next(p for p in inference.cause.parameters if p.name == "time")
     assert abs(moment.estimate - time) < 3 * moment.sigma < 3.0
+
+
+@pytest.mark.parametrize("seed", [32, 34, 35])
+def test_a_drift_of_metres_is_told_to_its_sigma(with_surface, seed):
+    "Time and width of a bump of 3 m, to three sigmas of less than 0.2 s; whole steps would miss it"
+    g, signs = with_surface
+    shape = {"magnitude": [3.0, 0.0, 0.0], "time": 31.7, "width": 8.0}
+    rows = surveyed(g, seed, make_effect("position_bump", **shape))
+    evidence = weigh_labels(rows, g.background, g.survey, signs, np.random.default_rng(1), 0)
+    event = evidence.refined["position_bump"]
+    for key in ("time", "width"):
+        assert abs(event.signature.fixed[key] - shape[key]) < 3 * event.sigma[key] < 0.6
