@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mlscorr.effects import Effect, known_effects
+from mlscorr.gap import contrast
 from mlscorr.gap.agreement import agreements
 from mlscorr.gap.close import Closure, FoundCause, cause_for_simulator, close_gap
-from mlscorr.gap.contrast import (
-    Contrast,
-    DistributionDistance,
-    innovation_distances,
-    replica_innovations,
-)
 from mlscorr.gap.document import gap_document
 from mlscorr.gap.infer import Costs, Inference, infer_causes
 from mlscorr.gap.observe import Absence, Rows, background
 from mlscorr.gap.plan import NextData, next_data
-from mlscorr.gap.signatures import Signature, as_believed, select, signatures, with_cause
+from mlscorr.gap.signatures import Signature, as_believed, curvature, select, signatures, with_cause
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent
@@ -108,9 +104,12 @@ def diagnose(
     signs, left_out = signatures(observed, believed, library, rng)
     part, signs_of_part = observed.select(used), select(signs, used)
     errors = background(part, believed)
-    inference = infer_causes(
-        part, errors, believed, signs_of_part, rng, absence=absence, costs=costs
-    )
+    infer = partial(infer_causes, survey=believed, signatures=signs_of_part, absence=absence)
+    inference = infer(part, errors, rng=rng, costs=costs)
+    curved = curvature(part, believed, inference.cause.parts)
+    if np.sum(curved**2 / part.noise) > 1:  # what is less is no sigma, of all rows together
+        part = replace(part, residual=part.residual - curved)
+        inference = infer(part, errors, rng=rng, costs=costs)
     step(2)
     cause, change = cause_for_simulator(part, signs_of_part, inference), compared.simulated
     case = FoundCause(observed, used, believed, signs, inference.evidence, cause)
@@ -128,8 +127,8 @@ def diagnose(
 
 def _of_innovations(rows, errors, inference, rng):
     """DistributionDistances of innovations from those of replicas, by channel of rows."""
-    where, replicas = inference.where, replica_innovations(rows, errors, inference, rng)
-    return innovation_distances(rows.channel[where.row], where.innovation, replicas, rng)
+    where, replicas = inference.where, contrast.replica_innovations(rows, errors, inference, rng)
+    return contrast.innovation_distances(rows.channel[where.row], where.innovation, replicas, rng)
 
 
 def _looks_again(absence):
@@ -160,8 +159,8 @@ class DiagnosedSurvey(Summary):
     absence: Absence = field(default_factory=Absence)
     signatures: tuple[Signature, ...] = ()
     costs: Costs = field(default_factory=Costs)
-    contrasts: tuple[Contrast, ...] = ()
-    distances: tuple[DistributionDistance, ...] = ()
+    contrasts: tuple[contrast.Contrast, ...] = ()
+    distances: tuple[contrast.DistributionDistance, ...] = ()
     next_run: str = ""
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 from mlscorr.effects import Effect
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.signatures.changes import Bench, Change
+from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.survey import Survey
 
 
@@ -46,3 +47,22 @@ def without_effects(rows: Rows, survey: Survey, effects: Sequence[Effect]) -> Ro
     noise = rows.noise + expected(rows, survey, common).variance
     residual = rows.residual - change.shift - np.log1p(change.growth)
     return replace(rows, residual=residual, noise=noise)
+
+
+def curvature(
+    rows: Rows, survey: Survey, parts: Iterable[tuple[Signature, np.ndarray]]
+) -> np.ndarray:
+    """What effects make of the rows beyond the first order (m,), in the unit of each.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    parts : iterable of (Signature, (p,) array)
+        With their sizes. Those of noise are left out.
+    """
+    bench, curved = Bench(rows, survey), np.zeros(len(rows))
+    for part, size in parts:
+        if not part.is_noise:  # truth is what was recorded, less the effect
+            curved -= bench.change(part.effect(-size)).shift + part.jacobian @ size
+    return curved
