@@ -7,13 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from mlscorr.io.survey_sections import (
-    CalibratedMountingSection,
-    CommonSections,
-    PointSource,
-    Scanners,
-    Trajectories,
-)
+from mlscorr.io import survey_sections
 from mlscorr.io.toml_file import TomlSection
 
 FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system
@@ -34,10 +28,12 @@ class DriveSection(TomlSection):
     name: Annotated[str, Field(min_length=1)] | None = None
     survey: str | None = None
     files: Annotated[list[str], Field(min_length=1)] | None = None
-    point_source_ids: Annotated[list[PointSource], Field(min_length=1)] | None = None
-    trajectory: Trajectories | None = None
-    mounting: CalibratedMountingSection | None = None
-    scanner: Scanners | None = None
+    point_source_ids: Annotated[list[survey_sections.PointSource], Field(min_length=1)] | None = (
+        None
+    )
+    trajectory: survey_sections.Trajectories | None = None
+    mounting: survey_sections.CalibratedMountingSection | None = None
+    scanner: survey_sections.Scanners | None = None
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
@@ -54,7 +50,7 @@ class DriveSection(TomlSection):
         return self
 
 
-class ProjectFile(CommonSections):
+class ProjectFile(survey_sections.CommonSections):
     """What stands in project.toml, in its own units (deg)."""
 
     cloud: TilesSection = TilesSection()

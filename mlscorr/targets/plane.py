@@ -65,12 +65,9 @@ class Plane:
             Nearly parallel.
         """
         normal = self.axes[2] * np.sign(self.axes[2] @ other.axes[2])
-        return replace(self, axes=_axes(other.axes[0] - (other.axes[0] @ normal) * normal, normal))
-
-
-def _axes(u, normal):
-    u = u / np.linalg.norm(u)
-    return np.array([u, np.cross(normal, u), normal])
+        u = other.axes[0] - (other.axes[0] @ normal) * normal
+        u /= np.linalg.norm(u)
+        return replace(self, axes=np.array([u, np.cross(normal, u), normal]))
 
 
 @njit(cache=True, nogil=True)
@@ -139,8 +136,7 @@ def _fit_plane(xyz, triples, tolerance):
     middle = xyz.sum(axis=0) / len(xyz)
     local, square = xyz - middle, np.empty((3, 3))
     inside = most_common(local, triples, tolerance)
-    if not inside.any():  # all on a line
-        inside[:] = True
+    inside |= not inside.any()  # all on a line
     for _ in range(2):
         points = local[inside]
         centre = points.sum(axis=0) / len(points)

@@ -14,18 +14,9 @@ from mlscorr.io.project_sections import SHARED_TILES
 from mlscorr.io.storage import resolved
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.pipeline.clouds import WrittenClouds
+from mlscorr.pipeline.project import file_tasks
 from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey
-from mlscorr.pipeline.project.file_tasks import (
-    ReportInput,
-    Tile,
-    TileOwner,
-    find,
-    read_tile,
-    report,
-    with_clouds,
-    write,
-)
 from mlscorr.pipeline.project.tasks import VERSION, Task
 from mlscorr.survey import CloudFile, ControlPoints, Survey
 from mlscorr.targets import search_radius
@@ -38,18 +29,18 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
     ----------
     project : ProjectParts
     """
-    tiles: dict[Path, tuple[Path, list[TileOwner]]] = {}
+    tiles: dict[Path, tuple[Path, list[file_tasks.TileOwner]]] = {}
     for drive in project.drives:
         parts, whole = drive.parts, drive.trajectory
         ends = whole.select([0, -1])
-        owner = TileOwner(drive.name, ends, parts.system, parts.settings.crs, drive.ids)
+        owner = file_tasks.TileOwner(drive.name, ends, parts.system, parts.settings.crs, drive.ids)
         for path in parts.files.clouds:
             tiles.setdefault(resolved(path), (path, []))[1].append(owner)
     tasks = []
     for path, own in tiles.values():
         key, folder = digest(VERSION, FileIdentity.of(path), path, own), _folder(own)
         name = task_name(folder, path)
-        tasks.append(Task("tiles", key, folder, name, 0, read_tile, (path, tuple(own))))
+        tasks.append(Task("tiles", key, folder, name, 0, file_tasks.read_tile, (path, tuple(own))))
     return tasks
 
 
@@ -98,10 +89,12 @@ class PlannedDrive:
         clouds = [file for file in survey.clouds if file.path not in lost]
         if len(clouds) == len(survey.clouds):
             return self
-        return replace(self, survey=with_clouds(survey, clouds))
+        return replace(self, survey=file_tasks.with_clouds(survey, clouds))
 
 
-def planned_drive(project: ProjectParts, drive: DriveParts, tiles: Sequence[Tile]) -> PlannedDrive:
+def planned_drive(
+    project: ProjectParts, drive: DriveParts, tiles: Sequence[file_tasks.Tile]
+) -> PlannedDrive:
     """A drive with the clouds that can be read, and with the surveyed points near them.
 
     Parameters
@@ -202,7 +195,7 @@ def finding_tasks(
         key = digest(core, *given, *where, origin, with_ties)
         near_points = file.points * _share_near(survey, near, box)
         named = key, survey.name, task_name(survey.name, file)
-        tasks.append(Task("findings", *named, file.points, find, inputs, near_points))
+        tasks.append(Task("findings", *named, file.points, file_tasks.find, inputs, near_points))
     return tasks
 
 
@@ -246,7 +239,9 @@ def cloud_tasks(
         key = digest(VERSION, used, parts, path.name, identity, with_sigma)
         points = sum(file.points for some in files for file in some)
         inputs = store.folder, used, path, identity, out / folder, with_sigma
-        task = Task("clouds", key, folder, task_name(folder, path), points, write, inputs)
+        task = Task(
+            "clouds", key, folder, task_name(folder, path), points, file_tasks.write, inputs
+        )
         tasks.append((task, [survey.name for survey in surveys]))
     return tasks
 
@@ -271,7 +266,7 @@ def area_tasks(store: TaskStore, key: str, areas: Iterable[AreaInput]) -> list[T
     return tasks
 
 
-def report_task(inputs: ReportInput, drive: PlannedDrive) -> Task:
+def report_task(inputs: file_tasks.ReportInput, drive: PlannedDrive) -> Task:
     """The task that reports on a drive.
 
     Parameters
@@ -282,4 +277,6 @@ def report_task(inputs: ReportInput, drive: PlannedDrive) -> Task:
     written: WrittenClouds = inputs.written
     key = digest(VERSION, inputs.corrected, written, inputs.page, inputs.trajectories)
     points = drive.survey.points if inputs.page else 0
-    return Task("reports", key, drive.survey.name, drive.survey.name, points, report, (inputs,))
+    return Task(
+        "reports", key, drive.survey.name, drive.survey.name, points, file_tasks.report, (inputs,)
+    )
