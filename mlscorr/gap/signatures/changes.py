@@ -217,8 +217,7 @@ class Bench:
         ends = np.searchsorted(whole.gps_time, whole.gaps).ravel()
         times = self.rows.gps_time, self.rows.gps_time_2[self.rows.two_times]
         after = np.searchsorted(whole.gps_time, np.concatenate(times), side="right")
-        about = np.clip(np.concatenate([after - 1, after]), 0, last)
-        rows = np.unique(np.r_[0 : len(whole) : step, ends, about, last])
+        rows = np.unique(np.r_[0:last:step, ends, after - 1, np.minimum(after, last), last])
         session = None if whole.session is None else whole.session[rows]
         pose = whole.gps_time[rows], whole.position[rows], whole.attitude[rows]
         thin = Trajectory(*pose, session=session)

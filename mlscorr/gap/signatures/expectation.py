@@ -1,6 +1,7 @@
 """What a simulator's effects make of the rows, and the rows without it."""
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -59,10 +60,11 @@ def curvature(
     rows : Rows
     survey : Survey
     parts : iterable of (Signature, (p,) array)
-        With their sizes. Those of noise are left out.
+        With their sizes. Random ones are left out.
     """
     bench, curved = Bench(rows, survey), np.zeros(len(rows))
-    for part, size in parts:
-        if not part.is_noise:  # truth is what was recorded, less the effect
+    for part, size in (pair for pair in parts if not pair[0].kind.random):
+        with suppress(ValueError):  # of an effect that has no other sign
+            # truth is what was recorded, less the effect
             curved -= bench.change(part.effect(-size)).shift + part.jacobian @ size
     return curved

@@ -40,3 +40,11 @@ def test_a_turn_of_degrees_is_told_beyond_the_first_order(clean):
     assert np.abs(linear - expected_shift).max() > 0.004  # m
     both = linear + curvature(rows, survey, [(turn, size)])
     np.testing.assert_allclose(both, expected_shift, atol=1e-6)
+
+
+def test_what_is_random_is_told_to_the_first_order(clean, patches):
+    "Lost returns move the return rate, and have nothing beyond: no pulse returns twice"
+    bench = Bench(patches, clean[0])
+    lost = signature(bench, effect_class("dropout"), {}, np.random.default_rng(0))
+    assert lost.jacobian.any()
+    assert not curvature(patches, clean[0], [(lost, np.array([0.3]))]).any()
