@@ -39,12 +39,14 @@ def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float
     rate = turned[single].mean()
     left = np.unwrap(np.mod(pulses.angle - rate * number, 2 * np.pi))
     zero, more = _line(number, left)
-    if np.std(left - zero - more * number) > max(0.5 * abs(rate), 1e-3):
+    uneven = np.std(left - zero - more * number) > max(0.5 * abs(rate), 1e-3)
+    if uneven or rate + more == 0:
         return none
-    every = np.arange(*np.ceil((np.array(span) - start - first) / step).astype(int))
-    angle = np.mod(zero + (rate + more) * every + np.pi, 2 * np.pi) - np.pi
     middle = np.angle(np.exp(1j * pulses.angle).mean())
     width = np.abs(np.mod(pulses.angle - middle + np.pi, 2 * np.pi) - np.pi).max() + opening
+    ends = np.ceil((np.array(span) - start - first) / step).astype(int)
+    every = _each_turn(zero - middle, rate + more, width, ends)
+    angle = np.mod(zero + (rate + more) * every + np.pi, 2 * np.pi) - np.pi
     beside = np.abs(np.mod(angle - middle + np.pi, 2 * np.pi) - np.pi) <= width
     lost = np.flatnonzero(beside & ~np.isin(every, number))
     n = len(lost)
@@ -56,6 +58,18 @@ def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float
         intensity=np.zeros(n),
         incidence=np.ones(n),
     )
+
+
+def _each_turn(zero, rate, width, ends):
+    """Numbers between ends whose angle, zero and so much more by each, is within a width of a whole
+    turn, or next to it: a scanner is turned away most of the time.
+    """
+    first, last = np.sort(zero + rate * ends) / (2 * np.pi)
+    turns = 2 * np.pi * np.arange(np.floor(first), np.ceil(last) + 1)
+    starts, stops = np.sort(np.sort((turns - zero + [[-width], [width]]) / rate, axis=0))
+    starts, stops = (np.clip(n, *ends).astype(int) for n in (np.floor(starts), stops + 2))
+    starts[1:] = np.maximum(starts[1:], stops[:-1])
+    return np.concatenate(list(map(np.arange, starts, stops)))
 
 
 def _line(x, y):
