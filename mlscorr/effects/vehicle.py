@@ -75,15 +75,11 @@ class PositionStep(Effect):
 
     stage: ClassVar = "pos"
     title: ClassVar = "GNSS jump"
-    meaning: ClassVar = (
-        "The recorded position jumps at one moment and stays off to the end of the pass."
-    )
+    meaning: ClassVar = "The recorded position jumps once, and stays off to the end of the pass."
     sentence: ClassVar = (
         "The recorded position jumps {size}{where}, and stays off to the end of the pass."
     )
-    remedy: ClassVar = (
-        "Process the trajectory again; mlscorr correct takes such a drift out of the cloud."
-    )
+    remedy: ClassVar = "Process the trajectory again; mlscorr correct takes such a drift out."
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
@@ -126,15 +122,11 @@ class PositionBump(Effect):
 
     stage: ClassVar = "pos"
     title: ClassVar = "Passing GNSS error"
-    meaning: ClassVar = (
-        "The recorded position is off for a while, as by multipath or a short outage."
-    )
+    meaning: ClassVar = "The recorded position is off for a while: multipath, or a short outage."
     sentence: ClassVar = (
         "The recorded position goes astray for a while{where}: {size} at the worst."
     )
-    remedy: ClassVar = (
-        "Look at GNSS at that time; mlscorr correct takes such a drift out of the cloud."
-    )
+    remedy: ClassVar = "Look at GNSS at that time; mlscorr correct takes such a drift out."
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(

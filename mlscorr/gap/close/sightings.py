@@ -60,15 +60,11 @@ class SightedTarget:
         board = board_of(sighting.fitted, np.zeros(3), bright, dark, speckle)
         others = np.flatnonzero(~own & ~(off < -SIMULATION.hiding_depth))
         beyond, behind = beyond.copy(), pulses.intensity.copy()
-        if own.any():
-            nearest = _nearest(place, own, others)
-            beyond[own] = np.nan if nearest is None else beyond[nearest]
-            behind[own] = 0.0 if nearest is None else behind[nearest]
+        beyond[own], behind[own] = np.nan, 0.0
+        if own.any() and len(others):
+            nearest = others[cKDTree(place[others]).query(place[own])[1]]
+            beyond[own], behind[own] = beyond[nearest], behind[nearest]
         return cls(pulses, board, beyond, behind)
-
-
-def _nearest(place, own, others):
-    return others[cKDTree(place[others]).query(place[own])[1]] if len(others) else None
 
 
 def sightings_of(rows: Rows, finding: Any) -> list[Sighting]:

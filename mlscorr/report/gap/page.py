@@ -2,22 +2,13 @@
 
 from mlscorr.effects.labels import family, lowered, title, titles
 from mlscorr.effects.wording import DASH, joined
+from mlscorr.report.gap import rows
 from mlscorr.report.gap.accuracy import accuracy_sentence
 from mlscorr.report.gap.channels import WORDS, channel_rows, channel_statements, distance_rows
 from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
 from mlscorr.report.gap.first_screen import accuracy, unjudged
 from mlscorr.report.gap.innovations import channel_style
 from mlscorr.report.gap.numbers import percent, signed
-from mlscorr.report.gap.rows import (
-    bin_rows,
-    cause_rows,
-    detectable_rows,
-    lone_rows,
-    meanings,
-    round_rows,
-    split_title,
-    worst_rows,
-)
 from mlscorr.report.gap.settings import SETTINGS
 from mlscorr.report.gap.shrinking import is_closed, shrunk, span
 from mlscorr.report.gap.verdict import (
@@ -71,7 +62,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
     separability, closure = document["separability"], document["closure"]
     answer, detectable = document["verdict"], separability["detectable"]
     is_clean = is_judged(document) and family(answer["label"]) == "none"
-    probable, unlikely = _by_probability(cause_rows(document))
+    probable, unlikely = _by_probability(rows.cause_rows(document))
     figures = _drawn(diagnosis_figures(document))
     is_empty = {key: key not in figures for key in ("where", "innovations", "evidence", "map")}
     is_empty["separability"] = not separability["correlation"]["names"]
@@ -86,18 +77,18 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "facts": facts(document),
         "others": [fact.document() for fact in others],
         "smallest": smallest(detectable) if is_clean else [],
-        "splits_in_words": joined(lowered(split_title(split)) for split in document["where"]),
-        "bin_rows": bin_rows(document),
+        "splits_in_words": joined(lowered(rows.split_title(split)) for split in document["where"]),
+        "bin_rows": rows.bin_rows(document),
         "shared": "what the cause moves" if is_named(document) else "the squared gap",
         "open_causes": _open_causes(answer),
         "in_set": joined(lowered(title(label)) for label in answer["set"]),
         "cause_rows": probable,
         "unlikely_rows": unlikely,
-        "meanings": meanings(document),
-        "smallest_rows": detectable_rows(detectable),
+        "meanings": rows.meanings(document),
+        "smallest_rows": rows.detectable_rows(detectable),
         "closed": shrunk(closure) if is_closed(document) else "",
-        "rounds": round_rows(ablation["rounds"]),
-        "alone": lone_rows(ablation["alone"]),
+        "rounds": rows.round_rows(ablation["rounds"]),
+        "alone": rows.lone_rows(ablation["alone"]),
         **_channels(document),
         "tested": lowered(title(closure["effect"] or "none")),
         "compared": bool(document["map"]["rows"]),
@@ -119,15 +110,15 @@ def plan_page(document: dict, name: str) -> Page:
     name : str
         Of the survey.
     """
-    rows = detectable_rows(document["detectable"])
-    worst = worst_rows(rows)
+    detectable = rows.detectable_rows(document["detectable"])
+    worst = rows.worst_rows(detectable)
     figures = _drawn(plan_figures(document))
     is_empty = {key: key not in figures for key in ("map", "accuracy")}
     is_empty["left"] = not document.get("left_out")
     content = {
         "figures": figures,
         "verdict": _plan_verdict(worst, document),
-        "detectable_rows": rows,
+        "detectable_rows": detectable,
         "smallest_rows": [],
         "open_causes": [lowered(titles(members)) for members in document["classes"]],
         "compared": False,
