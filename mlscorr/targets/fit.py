@@ -70,6 +70,11 @@ class FittedTarget(Centre):
     cloud: PointCloud
     view: TargetView
 
+    @property
+    def outline(self) -> Outline:
+        """As fitted."""
+        return self.view.outline
+
     def overlaps(self, other: "FittedTarget") -> bool:
         """Whether two fits are one target at one visit: less than half a target apart.
 
@@ -89,6 +94,7 @@ def fit_targets(
     rng: np.random.Generator,
     region: BrightRegion | None = None,
     origin: np.ndarray | None = None,
+    known: Sequence[FittedTarget] = (),
 ) -> list[FittedTarget]:
     """Fit targets of the given shapes in one piece of cloud of one pass and visit.
 
@@ -108,6 +114,8 @@ def fit_targets(
         The only one to look at.
     origin : (3,) array, optional
         What the places of the cloud are counted from; 0 by default. Units: m.
+    known : sequence of FittedTarget
+        Of this visit already: where a good fit is of them, none is made.
 
     Returns
     -------
@@ -126,6 +134,7 @@ def fit_targets(
     path = path.seen_from(origin)
     echoes = Echoes(cloud.xyz, cloud.gps_time, intensity, path, tolerance)
     blind = why_useless(intensity) is not None
+    near = [replace(target, position=target.position - origin) for target in known]
     rough: list[ShapeFit] = []
     for kind, size in shapes:
         if kind == "hole":
@@ -137,7 +146,7 @@ def fit_targets(
         else:
             seeds = bright_seeds(echoes, kind, size)
         for seed in seeds:
-            if not any(_is_settled(fit, seed, kind, size) for fit in rough):
+            if not any(_is_settled(fit, seed, kind, size) for fit in (*near, *rough)):
                 fit = rough_fit(echoes, seed, kind, size)
                 rough += [fit] if fit is not None else []
     fits = [exact_fit(echoes, fit, scanner) for fit in _best(rough)]

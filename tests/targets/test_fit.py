@@ -54,6 +54,26 @@ def test_every_kind_is_found_to_millimetres_and_nothing_else(look):
     assert 0.15 < np.mean(square) < 2.4  # 99.9 % of chi-squared of 18 over 18
 
 
+@pytest.mark.parametrize("look", ["disc", "hole", "board"])
+def test_a_target_that_is_known_is_not_fitted_again(look):
+    "Where it was fitted well; a poor fit, or one a metre off, keeps nothing from being fitted"
+    kind, repeats = TARGETS[look][0], []
+    for seen in views(look):
+        rest = (seen.path, [(kind, SIZE)], SCANNER)
+
+        def again(known, seen=seen, rest=rest):
+            return fit_targets(seen.cloud, *rest, np.random.default_rng(0), known=known)
+
+        for target in again([]):
+            repeats.append(len(again([target])))
+            outline = replace(target.outline, overlap=0.5)
+            poor = replace(target, view=replace(target.view, outline=outline))
+            away = replace(target, position=target.position + np.eye(3)[0])
+            assert [each.points for each in again([poor, away])] == [target.points]
+    assert len(repeats) >= len(views(look)) - 1
+    assert np.mean(repeats) < 0.5  # some that are partly hidden have their middle elsewhere
+
+
 @pytest.mark.parametrize("look", ["disc", "plate", "hole"])
 def test_sizes_are_estimated_where_they_are_unknown(look):
     "The centre to 2 cm as before, and the size to 5 %"
