@@ -8,6 +8,7 @@ plain GPS seconds are found under either flag.
 import warnings
 from dataclasses import dataclass
 from datetime import date, timedelta
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -95,6 +96,7 @@ def match_times(
             f"The points of {name} have gps_time 0 throughout: it was written without times. "
             "Export it anew with gps_time, which places points on the trajectory."
         )
+    _check_precision(name, times)
     span = trajectory.gps_time[[0, -1]]
     flagged = "standard" if is_standard else "week"
     candidates = _candidates(times, span)
@@ -115,6 +117,18 @@ def match_times(
             )
     _check_week_end(name, times, span, match)
     return match
+
+
+def _check_precision(name, times):
+    """Refuse times all of which single precision can hold, where its steps are coarse."""
+    rounded = times.astype(np.float32)
+    step = float(np.spacing(np.abs(rounded).max()))
+    if step > SETTINGS.single_time_step and (rounded == times).all():
+        raise ValueError(
+            f"The times of {name} [{times.min():.3f}, {times.max():.3f}] s were rounded to single "
+            f"precision, in steps of {step:.2g} s, in which a vehicle moves on: export gps_time in "
+            "double precision."
+        )
 
 
 def _check_week_end(name, times, span, match):
@@ -211,6 +225,15 @@ def _settle_equal(match, times):
     return TimeMatch(0.0, usual[0], usual[0], match.inside)
 
 
+def _other_systems(lag, earlier):
+    """Pairs (s, name) of what systems beside GPS time differ from it by, up to whole weeks."""
+    days = range(1, 7) if earlier <= DAY else ()  # else of another day, not seconds of the day
+    unix = (EPOCH - date(1970, 1, 1)).days * DAY - lag
+    differences = {lag: "UTC", unix: "Unix time", unix % WEEK: "Unix time"}
+    differences |= {day * DAY: "seconds of the day" for day in days}
+    return [(sign * s, system) for s, system in differences.items() for sign in (1, -1)]
+
+
 def _nothing_fits(name, times, span, candidates, setting):
     """A sentence with both spans, the likely cause and the way out."""
     shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
@@ -220,13 +243,15 @@ def _nothing_fits(name, times, span, candidates, setting):
         f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
     )
     share = f"Only {largest:.0%} of" if largest > 0 else "None of"
-    for later in (lag := utc_lag(span, times), -lag):
-        constants = [constant for constant, cloud, _ in candidates if setting in ("auto", cloud)]
-        if any(_inside(times, span, constant + later) == 1.0 for constant in constants):
+    constants = [constant for constant, cloud, _ in candidates if setting in ("auto", cloud)]
+    systems = _other_systems(utc_lag(span, times), min(times.max(), span[1]))
+    for constant, (later, system) in product(constants, systems):
+        if _inside(times, span, constant + later) == 1.0:
             return (
-                f"{share} {spans}, but all would with {later:+d} s: one of both may be in UTC, or "
-                "the trajectory covers a part of the cloud. Export both in GPS time and whole; if "
-                f"it is UTC, add {-later} to trajectory.time_constant (s) in survey.toml instead."
+                f"{share} {spans}, but all would with {later:+.0f} s: one of both may be in "
+                f"{system}, or the trajectory covers a part of the cloud. Export both in GPS time "
+                f"and whole; if it is {system}, add {-later:.0f} to trajectory.time_constant (s) "
+                "in survey.toml instead."
             )
     if largest > 0:
         return (

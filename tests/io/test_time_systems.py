@@ -1,5 +1,6 @@
 """The constant between the cloud's gps_time and the trajectory's."""
 
+import re
 import warnings
 
 import numpy as np
@@ -103,7 +104,7 @@ def test_utc_is_not_taken_for_gps_time():
 
 def test_a_week_that_ends_within_a_cloud_is_refused():
     "Half of the times start again at 0 while the trajectory's run on: cut there, each half fits"
-    running = np.linspace(604_770.0, 604_829.0, 60)  # s
+    running = np.linspace(604_770.3, 604_829.3, 60)  # s
     covering, times = trajectory(604_765.0, 604_835.0), running % 604_800.0
     sentence = r"GPS week ends within a.laz: 30 of 60.*with \+604800 s only.*cut it into two files"
     with pytest.raises(ValueError, match=sentence):
@@ -126,6 +127,35 @@ def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
         )
         with pytest.raises(ValueError, match=sentence):
             match_times("a.laz", OF_WEEK[:26], False, covering)
+
+
+@pytest.mark.parametrize(
+    ("cloud", "goal", "system"),
+    [
+        (OF_WEEK % 86400.0, OF_WEEK, "seconds of the day"),
+        (OF_WEEK, OF_WEEK % 86400.0, "seconds of the day"),
+        (SYSTEMS["gps"] + 315_964_800.0 - 18.0, OF_WEEK, "Unix time"),
+        (SYSTEMS["standard"], SYSTEMS["gps"] + 315_964_800.0 - 18.0, "Unix time"),
+    ],
+)
+def test_seconds_of_the_day_and_unix_time_are_named(cloud, goal, system):
+    "What the sentence says to add to the trajectory's times brings both together"
+    with pytest.raises(ValueError, match=f"all would with .* may be in {system}") as refusal:
+        match_times("a.laz", cloud, False, trajectory(goal[0] - 5, goal[-1] + 5))
+    added = float(re.search(r"add (-?\d+) to trajectory.time_constant", str(refusal.value))[1])
+    with warnings.catch_warnings(action="ignore"):  # Unix time contradicts either flag
+        match = match_times(
+            "a.laz", cloud, False, trajectory(goal[0] + added - 5, goal[-1] + added + 5)
+        )
+    assert match.inside == 1.0
+
+
+def test_times_in_single_precision_are_refused():
+    "Rounded to 1/32 s in seconds of week and to 32 s in standard time: no place on a trajectory"
+    for system, step in (("week", "0.031"), ("standard", "32")):
+        rounded = SYSTEMS[system].astype(np.float32).astype(float)
+        with pytest.raises(ValueError, match=rf"single precision, in steps of {step} s"):
+            match_times("a.laz", rounded, system == "standard", trajectory())
 
 
 def test_a_trajectory_that_covers_a_part_is_refused():
