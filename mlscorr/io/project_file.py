@@ -203,7 +203,8 @@ def _stated(path, settings, name, section):
                     "one list for all drives. Name it there."
                 )
             notes = (f"Control points are those of the project, not {own}.",)
-        whole = whole.model_copy(update={**given, "control": None, "name": name})
+        given |= {"control": None, "name": name, "crs": whole.crs or settings.crs}
+        whole = whole.model_copy(update=given)
     ids = _ids(path, name, section, whole)
     return StatedDrive(name, toml, whole, files_of(toml, whole, key), notes, ids)
 
@@ -264,13 +265,11 @@ def _check_tiles(path, settings, drives):
 def _check_crs_alike(path, settings, drives):
     """Refuse drives in two CRS."""
     crs = settings.crs or drives[0].settings.crs
-    stated = {drive.name: drive.settings.crs or settings.crs for drive in drives}
-    other = [name for name, own in stated.items() if own != crs]
-    if other:
+    if other := [drive for drive in drives if drive.settings.crs != crs]:
         raise ValueError(
             f"{len(other)} of {len(drives)} drives of {path} are in another CRS than the project, "
-            f"{crs} (first: {other[0]}, {stated[other[0]]}). Bring their clouds into one CRS, and "
-            "say it in their survey.toml: an SBET is projected into it by itself."
+            f"{crs} (first: {other[0].name}, {other[0].settings.crs}). Bring their clouds into one "
+            "CRS, and say it in their survey.toml: an SBET is projected into it by itself."
         )
 
 

@@ -52,6 +52,21 @@ def test_drives_are_read_by_their_files(city):
     assert not is_project(city / "survey.toml")
 
 
+def test_the_crs_of_a_project_is_that_of_a_drive_without(city):
+    "A survey.toml that says none is of the project's; its latitudes are projected into that"
+    lines = [line.split(",") for line in TRAJECTORY.splitlines()[1:]]
+    rows = [
+        ",".join((t, f"30.4900{t[-3]}{t[-1]}", "117.3334", *row[1:-1], "0")) for t, _, *row in lines
+    ]
+    way = "Time,Latitude,Longitude,Height,Roll,Pitch,Heading\n" + "\n".join([*rows, ""])
+    (city / "a" / "way.csv").write_text(way)
+    (city / "a" / "survey.toml").write_text(SURVEY.format(""))
+    drive = '[[drive]]\nsurvey = "a"\n'
+    project = read_project(write(city, 'crs = "EPSG:32650"', drive, DRIVE.format("b")))
+    assert project.drives[0].parts.settings.crs == "EPSG:32650"
+    assert abs(project.drives[0].trajectory.position[0, 0] - 532_000.0) < 100.0
+
+
 def test_a_project_may_have_any_name(city):
     "A TOML file with drives is one; a survey under another name, a cloud and nothing are none"
     project = write(city, DRIVE.format("a"), DRIVE.format("b"))
