@@ -21,6 +21,7 @@ Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table
 CLOUDS = (".las", ".laz", ".e57")
 MESHES = (".ply",)
 TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
+OTHER_WORKBOOKS = (".xls", ".ods")
 TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx")
 RECORDS = (".out", ".smrmsg", ".bin")
 RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json")
@@ -59,7 +60,7 @@ def sort_files(folder: Path) -> list[FileRole]:
     left_out: list[FileRole] = []
     places = list(_places(folder, left_out, SETTINGS.folder_depth))
     files = [path for place in places for path in sorted(place.iterdir()) if path.is_file()]
-    roles = [_role(path) for path in files if path.name[0] != "." and path.suffix != ".toml"]
+    roles = [_role(path) for path in files if path.name[0] not in ".~" and path.suffix != ".toml"]
     return roles + left_out
 
 
@@ -81,10 +82,9 @@ def _role(path) -> FileRole:
     suffix = path.suffix.lower()
     if suffix in CLOUDS:
         return _cloud(path)
-    if suffix in MESHES and not announced_faces(path):
-        return _cloud(path)
     if suffix in MESHES:
-        return FileRole(path, "reference", "a mesh")
+        is_mesh = announced_faces(path)
+        return FileRole(path, "reference", "a mesh") if is_mesh else _cloud(path)
     if suffix in TRAJECTORIES:
         return FileRole(path, "trajectory", f"its suffix is {path.suffix}")
     if suffix == POQ_SUFFIX:
@@ -93,6 +93,8 @@ def _role(path) -> FileRole:
         return FileRole(path, *_table(path))
     if suffix in RECORDS:
         return next(_records(path), FileRole(path, "none", "no whole records of SBET or smrmsg"))
+    if suffix in OTHER_WORKBOOKS:
+        return FileRole(path, "table", "a workbook that is read once it is saved as .xlsx")
     return FileRole(path, "none", "nothing that a survey.toml names")
 
 

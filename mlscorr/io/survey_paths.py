@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mlscorr.io.conversion import written_name
 from mlscorr.io.identity import find_copies
-from mlscorr.io.storage import beside, files_like, is_there, resolved
+from mlscorr.io.storage import beside, files_like, is_folder, is_there, resolved
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
 from mlscorr.io.trajectory_sessions import SessionFile
 from mlscorr.survey import CloudFile
@@ -197,7 +197,9 @@ def existing(path: Path, key: str, name: str) -> Path:
     """
     there = beside(path, name)
     if not is_there(there):
-        raise FileNotFoundError(f"{key} of {path} names {there}, which does not exist.")
+        way_out = f"is a folder: name files in it, as {name}/*.laz" if is_folder(there) else (
+            "does not exist")  # fmt: skip
+        raise FileNotFoundError(f"{key} of {path} names {there}, which {way_out}.")
     return there
 
 

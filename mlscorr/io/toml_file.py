@@ -54,8 +54,8 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
         document = tomllib.loads(read_bytes(path).decode(ENCODING))
     except UnicodeDecodeError:
         raise ValueError(
-            f"{path} is not a text file in UTF-8; a TOML file is expected. `mlscorr init FOLDER` "
-            "writes that of a survey."
+            f"{path} is not a text file in UTF-8; a TOML file is expected. Save it in UTF-8, or "
+            "let `mlscorr init FOLDER` write that of a survey."
         ) from None
     except tomllib.TOMLDecodeError as error:
         raise ValueError(
@@ -109,7 +109,9 @@ def _sentence(item, model):
     if item["type"] == "extra_forbidden":
         name = ".".join(part for part in item["loc"] if isinstance(part, str) and part.strip())
         keys = _keys(model)
-        near = nearest(name, keys)
+        near, tail = nearest(name, keys), name.rpartition(".")[2]
+        if "." in name and tail in keys and not _sections(model.model_fields[tail].annotation):
+            return f"{shown(key)} is an unknown key; {tail} stands above the first [section]."
         if near == name:
             section = name.split(".")[0]
             return f"{key} is a key of one of several: write [[{section}]], not [{section}]."

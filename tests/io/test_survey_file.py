@@ -173,6 +173,11 @@ def test_degrees_become_radians_and_the_mounting_a_rotation(folder):
         ("[control]", "[matching]\nsearch_radius = 0\n[control]", r"search_radius = 0 .*greater"),
         ("[control]", "[scanner]\nrange_noise = inf\n[control]", "finite number"),
         ('crs = "EPSG:32650"', "crs = 32650", "crs = 32650 .*string in quotation marks"),
+        (
+            "[control]",
+            '[control]\ncrs = "EPSG:32650"',
+            r"control\.crs .* crs stands above the first",
+        ),
         ("[control]", "[mounting]\nlever_arm = [100.5, 0.0, 0.0]\n[control]", "less than or equal"),
     ],
 )
@@ -262,6 +267,7 @@ def test_a_missing_survey_says_what_is_expected(tmp_path):
         ),
         ("control.csv", "points.csv", r"control\.file of .*points.csv, which does not exist"),
         ("pass-*.las", "drive-*.las", r"cloud\.files of .*no file is like .*drive-\*"),
+        ("pass-*.las", ".", r"cloud\.files of .*is a folder: name files in it, as \./\*\.laz"),
         ("pass-*.las", "pass-9.las", r"cloud\.files of .*pass-9.las, which does not exist"),
         ("[control]", '[scene]\nreference = "r.ply"\n[control]', r"scene\.reference of"),
         ('trajectory.csv"', 'trajectory.csv"\naccuracy = "s.out"', r"trajectory\.accuracy of"),

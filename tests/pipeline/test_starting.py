@@ -255,6 +255,12 @@ def test_a_folder_without_control_has_none(folder):
     assert "# [control]" in text
 
 
+def test_marks_of_an_open_workbook_are_left_alone(folder):
+    "Excel puts a file of 165 bytes beside a workbook that is open: it is no workbook itself"
+    (folder / "~$control.xlsx").write_bytes(bytes(165))
+    assert tomllib.loads(mlscorr.init(folder).text)["control"]["file"] == "control.csv"
+
+
 def test_a_copy_of_a_cloud_is_left_out_and_refused(folder):
     "A second file of the same points is no second pass: init leaves it out, check names both"
     (folder / "copy.las").write_bytes((folder / "pass-1.las").read_bytes())
@@ -381,11 +387,15 @@ AMBIGUOUS = {
     ),
     "seconds of the day": (
         write("trajectory.csv", HEADER + trajectory(START % 86_400.0)),
-        ["^((?!survey.toml|--set).)*both are of one drive. Nothing was written.$"],
+        ["^((?!--set).)*seconds of the day, add 345600 to .*instead. Nothing was written.$"],
     ),
     "sigmas unknown": (
         write("control.csv", "Pt,E,N,H,kind,size\nT01,532012.5,3373991.5,44,circle,0.6\n"),
         ["^((?!kind =|size =).)* --set 'control.sigma = .0.003, 0.004.'"],
+    ),
+    "a workbook of another office program": (
+        lambda folder: (folder / "control.csv").rename(folder / "control.ods"),
+        ["control.ods is neither .*read once it is saved as .xlsx"],
     ),
     "two heights": (
         write(
