@@ -66,10 +66,10 @@ TRAJECTORY_NAMES = PLACE_NAMES | {
     "roll": "rollwinkel roulis alabeo 横滚 横滚角 翻滚角",
     "pitch": "nick nickwinkel tangage cabeceo 俯仰 俯仰角",
     "heading": "hdg hdng azimuth azimut cap rumbo kurs 航向 航向角",
-    "yaw": "gierwinkel lacet guiñada 偏航 偏航角",
-    "sigma_easting": "sdeast sigmae sde stdeast",
-    "sigma_northing": "sdnorth sigman sdn stdnorth",
-    "sigma_height": "sdheight sigmah sdh stdheight sdup",
+    "yaw": "gier gierwinkel lacet guiñada 偏航 偏航角",
+    "sigma_easting": "sdeast eastsd sigmae sde stdeast",
+    "sigma_northing": "sdnorth northsd sigman sdn stdnorth",
+    "sigma_height": "sdheight heightsd sigmah sdh stdheight sdup",
     "sigma_roll": "rollsd sdroll stdroll",
     "sigma_pitch": "pitchsd sdpitch stdpitch",
     "sigma_heading": "hdngsd headingsd sdheading stdheading",
@@ -79,6 +79,7 @@ UNITS = {  # to m, deg and s
     **dict.fromkeys(("m", "meter", "metre", "meters", "metres", "mètres", "metros", "米"), 1.0),
     **dict.fromkeys(("s", "sec", "seconds", "秒", "deg", "degree", "degrees", "°", "度"), 1.0),
     **{"cm": 0.01, "mm": 0.001, "rad": 57.29577951308232, "gon": 0.9},
+    **{"arcmin": 1 / 60, "arcsec": 1 / 3600},
 }
 FOREIGN_UNITS = re.compile(r"(us|s|us-)?(ft|feet|foot)(us)?|in|inch|inches|yd|km|dms|hms")
 

@@ -18,6 +18,8 @@ from mlscorr.io.storage import as_path
 from mlscorr.io.text_files import shown
 
 WORDS = ("name", "kind", "role")  # columns that hold no numbers
+BRACKETED = re.compile(r"[(\[].*[)\]]")
+THOUSANDS = re.compile(r"[+-]?\d{1,3}(['’\s]\d{3})+([.,]\d*)?")
 NUMBER = re.compile(r"[+-]?\d+([.,]\d*)?(e[+-]?\d+)?", re.IGNORECASE)
 
 
@@ -128,14 +130,6 @@ def _layout_of(start, rows, names, lacking, chosen):
         meanings = find_meanings(cells, names, chosen)
         if lacking(meanings):
             continue
-        for name, positions in meanings.items():
-            if len(positions) > 1:
-                doubled = [shown(cells[i]) for i in positions]
-                raise ValueError(
-                    f"{start.path} has {len(doubled)} columns that may be the {name} "
-                    f'({", ".join(doubled)}): choose, as {name} = "{doubled[0]}" under '
-                    f"[{section_of(names)}.columns] in survey.toml."
-                )
         check_chosen(start.path, set(chosen) - set(meanings), chosen)
         columns = {name: positions[0] for name, positions in meanings.items()}
         layout = replace(start, header=tuple(cells), lines=number, columns=columns)
@@ -143,9 +137,37 @@ def _layout_of(start, rows, names, lacking, chosen):
         units = [unit_of(cell) for cell in cells]
         if below and _holds_units(below[0][1], columns):
             layout = replace(layout, lines=below[0][0])
-            units = [unit_of(f"({cell.strip('()[]')})") for cell in below.pop(0)[1]]
-        return _with_numbers(layout, units, [row for _, row in below])
+            texts = [cell.strip("()[] ").casefold() or None for cell in below.pop(0)[1]]
+            units = texts if len(texts) == len(cells) else []  # else of groups of columns, in words
+        layout, parted = _parted(layout, [row for _, row in below])
+        _check_doubled(layout, meanings, parted, section_of(names))
+        return _with_numbers(layout, units, parted)
     return None
+
+
+def _parted(layout, rows):
+    """The layout and its rows where these are parted otherwise than the names, as in POSPac's."""
+    is_whole = not rows or len(rows[0]) > 1
+    for separator in () if is_whole else layouts.SEPARATORS:
+        parted = [layouts.split(row[0], separator) for row in rows]
+        if len(parted[0]) == len(layout.header):
+            return replace(layout, separator=separator), parted
+    return layout, rows
+
+
+def _check_doubled(layout, meanings, rows, section):
+    """Refuse columns that may be the same, but for those of one name and the same values."""
+    for name, positions in meanings.items():
+        doubled = [shown(layout.header[i]) for i in positions]
+        cells = [{row[i] for i in positions if i < len(row)} for row in rows]
+        if len(set(doubled)) > 1 or (len(doubled) > 1 and max(map(len, cells), default=2) > 1):
+            way_out = f'choose, as {name} = "{doubled[0]}"'
+            if len(set(doubled)) < len(doubled):
+                way_out = f"number all that are needed, as {name} = {positions[0] + 1},"
+            raise ValueError(
+                f"{layout.path} has {len(doubled)} columns that may be the {name} "
+                f"({', '.join(doubled)}): {way_out} under [{section}.columns] in survey.toml."
+            )
 
 
 def check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str | int]) -> None:
@@ -190,9 +212,10 @@ def _uncommented(cells):
 
 
 def _holds_units(cells, columns):
-    """Whether the row below a header has units in place of values."""
+    """Whether the row below a header has units in place of values: known ones, or in brackets."""
     texts = [cells[i].strip("()[] ").casefold() for i in columns.values() if i < len(cells)]
-    return any(texts) and all(not text or text in UNITS or is_foreign(text) for text in texts)
+    are_units = all(not text or text in UNITS or is_foreign(text) for text in texts)
+    return any(texts) and (are_units or bool(BRACKETED.fullmatch(" ".join(cells).strip())))
 
 
 def _with_numbers(layout, units, rows):
@@ -210,6 +233,10 @@ def _with_numbers(layout, units, rows):
     places = [i for name, i in layout.columns.items() if name not in WORDS]
     cells = [row[i] for row in rows for i in places if i < len(row)]
     numbers = [cell for cell in cells if NUMBER.fullmatch(cell.replace(".", "").replace(",", ""))]
+    if marked := [cell for cell in cells if THOUSANDS.fullmatch(cell)]:
+        raise ValueError(
+            f"{path} has numbers with thousands marks ('{shown(marked[0])}'): omit them."
+        )
     commas, points = ([cell for cell in numbers if mark in cell] for mark in ",.")
     if commas and points:
         raise ValueError(
@@ -234,13 +261,6 @@ def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
     """
     path = as_path(path)
     encodings = (None,) if path.suffix.lower() == SUFFIX else _encodings(path)
-    longest: list[str] = []
-    for encoding in encodings:
-        rows = [cells for _, rows in _candidates(path, encoding) for _, cells in rows]
-        best = max(
-            rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[]
-        )
-        if find_meanings(best, names):
-            return best
-        longest = longest or best
-    return longest
+    tables = [rows for encoding in encodings for _, rows in _candidates(path, encoding)]
+    rows = [cells for table in tables for _, cells in table]
+    return max(rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[])

@@ -166,5 +166,5 @@ def not_text(path: Path) -> str:
     """
     return (
         f"{path} is not a text file in UTF-8. Save it anew as comma-separated values in UTF-8; "
-        "letters such as umlauts are the likely cause."
+        "letters such as umlauts are the likely cause, or a workbook that is not .xlsx."
     )

@@ -52,9 +52,11 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
         if layout.separator != " " and (exact or not layout.is_own) and 0 < width < len(cells):
             raise ValueError(_too_wide(line, len(cells), width))
         if len(cells) <= last or (exact and len(cells) != width):
+            cause = "the file may be cut off, a separator may be missing, or a name may hold one"
+            if "latitude" in layout.columns and len(cells) > width:
+                cause = "angles may be in degrees, minutes and seconds: export decimal degrees"
             raise ValueError(
-                f"{line} has {len(cells)} columns where {width or last + 1} belong: the file "
-                "may have been cut off, a separator may be missing, or a name may hold one "
+                f"{line} has {len(cells)} columns where {width or last + 1} belong: {cause} "
                 f"(columns are parted by {SEPARATORS[layout.separator]})."
             )
         yield line, cells
@@ -111,7 +113,9 @@ def read_numbers(
         warnings.filterwarnings("ignore", message=".*input contained no data")
         try:
             table = np.loadtxt(
-                _source(path) if layout.is_own else _plain_lines(layout),
+                (open_file(path, ENCODING) if is_remote(path) else path)
+                if layout.is_own
+                else _plain_lines(layout),
                 delimiter="," if layout.is_own else "\t",
                 skiprows=layout.lines if layout.is_own else 0,
                 usecols=columns,
@@ -124,11 +128,6 @@ def read_numbers(
     if not len(table):
         raise ValueError(f"{path} has a header but no epochs.")
     return table * [layout.factors.get(name, 1.0) for name in layout.columns]
-
-
-def _source(path):
-    """What numpy reads a text file from: its path, or lines of one in a store."""
-    return open_file(path, ENCODING) if is_remote(path) else path
 
 
 def _plain_lines(layout):

@@ -144,6 +144,7 @@ def read_layout(
             for (name, other), way_out in (hints or {}).items()
             if name in missing and other in meanings
         )
+        refusal = None if meanings else refusal  # names that are known are those of a table
         raise refusal or ValueError(missing_sentence(path, header, missing, used, names) + ways_out)
     return layout
 

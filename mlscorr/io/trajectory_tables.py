@@ -30,9 +30,10 @@ ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
 SESSION = ("session",)  # of the POS, in a trajectory that was joined of several
 GRID, TRUE = "clockwise from grid north", "clockwise from true north"
 TUM = ("gps_time", *AXES, *QUATERNION)
-INERTIAL_EXPLORER = ("hell", "hdngsd")  # names of columns that no other program writes
+TRUE_NORTH_USUAL = {"hell", "hdngsd", "eastsd"}  # columns of Inertial Explorer and POSPac alone
 HINTS = {
-    ("easting", "x"): " Say under [trajectory.columns] in survey.toml which of X and Y is easting.",
+    ("easting", "x"): " Say under [trajectory.columns] in survey.toml which of X and Y is easting, "
+    "or longitude where they are angles.",
     ("heading", "yaw"): (
         " Its yaw is a heading by convention only: say under [trajectory] in survey.toml how "
         f'it counts, as heading = "counterclockwise from east" or "{GRID}".'
@@ -79,7 +80,7 @@ def read_table(
         angles = (*ANGLES, "yaw", *ATTITUDE_SIGMAS)
         factors = {name: UNITS[section.angles] for name in angles if name in layout.columns}
         layout = replace(layout, factors=layout.factors | factors)
-    table = dict(zip(layout.columns, read_numbers(layout).T, strict=True))
+    table = _place_in_degrees(path, layout, read_numbers(layout).T, section.angles)
     if "qw" in layout.columns:
         table, axes = attitude_of_quaternions(path, table, section.axes)
         return table, f"{layout}; body axes {axes}."
@@ -147,14 +148,29 @@ def _used(layout: TableLayout) -> TableLayout:
     return replace(layout, columns={name: i for name, i in columns.items() if name not in needless})
 
 
+def _place_in_degrees(path, layout, values, angles):
+    """The table, with latitude and longitude in degrees where all angles are said to be radians."""
+    table = dict(zip(layout.columns, values, strict=True))
+    place = {name: table[name] for name in ("latitude", "longitude") if name in table}
+    if not place or not all(np.abs(degrees).max() <= np.pi for degrees in place.values()):
+        return table  # within 3.14 deg of 0, 0 there is no land
+    if angles != "rad":
+        raise ValueError(
+            f"{path} has latitudes and longitudes that seem to be radians: none exceeds pi. If so, "
+            'write angles = "rad" under [trajectory] in survey.toml, or the unit behind the names '
+            "of these columns alone, as Lat [rad]."
+        )
+    return table | {name: np.degrees(radians) for name, radians in place.items()}
+
+
 def _usual_heading(layout, section):
     """How headings count where survey.toml doesn't say: from true north beside a latitude."""
     if "latitude" in layout.columns:
         return TRUE
-    if not section.heading and set(map(plain, layout.header)) & set(INERTIAL_EXPLORER):
+    if not section.heading and set(map(plain, layout.header)) & TRUE_NORTH_USUAL:
         raise ValueError(
-            f"{layout.path} was exported by Inertial Explorer, whose headings count from true "
-            "north unless its profile takes the convergence off. Say which under [trajectory] in "
-            f'survey.toml: heading = "{TRUE}" or "{GRID}".'
+            f"{layout.path} was exported by Inertial Explorer, or by POSPac, whose headings count "
+            "from true north unless the export takes the convergence off. Say which under "
+            f'[trajectory] in survey.toml: heading = "{TRUE}" or "{GRID}".'
         )
     return GRID

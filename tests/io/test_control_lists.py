@@ -256,6 +256,7 @@ P1 = "P1;532012,49;3373991,48;44,48\n"
         ("P1 1001 1002 3\n", "column 2 and column 3 is easting"),
         ("P1,532012,49,3373991,48,44,48\n", "neither order lies"),
         ("Punkt;E;N;H\nP1;532.012,49;3.373.991,48;44,48\n", "commas .*'532.012,49'.* and .*points"),
+        ("Punkt;E;N;H\nP1;532'012,49;3'373'991,48;44,48\n", "thousands marks .'532'012,49'"),
         ("name,easting,northing,elev (ft)\n" + P1.replace(";", ","), "height in 'ft'"),
         ("time,temperature\n1,2\n", "no column name, .* holds no coordinates: is another file"),
         ("name,lat,lon,h\nP1,30.4,114.4,20\n", "Latitude and longitude must be projected first"),

@@ -72,6 +72,69 @@ def test_an_export_of_inertial_explorer_is_read(tmp_path):
         read(path, None, heading=TRUE)
 
 
+def test_an_export_of_pospac_is_read(tmp_path):
+    "Names by commas, rows by blanks, words on units between, and a height that stands there twice"
+    expected = drive(100)
+    table, place = table_of(expected), geographic(expected)
+    table[:, 6] += place[:, 2]
+    sigmas = np.column_stack([expected.position_sigma, np.degrees(expected.attitude_sigma)])
+    height, nothing = table[:, 3:4], np.zeros((100, 1))
+    rows = [table[:, :1], nothing, table[:, 1:4], place[:, 1::-1], height, table[:, 4:], sigmas]
+    names = (
+        "TIME, DISTANCE, EASTING, NORTHING, ELLIPSOID HEIGHT, LATITUDE, LONGITUDE, ELLIPSOID "
+        "HEIGHT, ROLL, PITCH, HEADING, EAST SD, NORTH SD, HEIGHT SD, ROLL SD, PITCH SD, HEADING SD"
+    )
+    units = "(time in Sec, distance in Meters, orientation angles and SD in Degrees)"
+    path = explorer(tmp_path / "export.txt", names, f"\n {units} \n", np.hstack(rows))
+    with pytest.raises(ValueError, match=f'POSPac, .* heading = "{TRUE}" or "{GRID}"'):
+        read(path)
+    file = read(path, heading=TRUE)
+    assert_same(file.trajectory, expected)
+    assert np.abs(file.trajectory.position_sigma - expected.position_sigma).max() < 1e-8
+    rows[4] = height + 1.0
+    explorer(path, names, units, np.hstack(rows))
+    with pytest.raises(
+        ValueError, match=r"2 columns that may be the height .*number all.*height = 5"
+    ):
+        read(path, heading=TRUE)
+
+
+def test_units_below_the_names_are_heeded(tmp_path):
+    "Sigmas in minutes of arc are read so; unknown units and degrees in three parts are named"
+    expected = drive(100)
+    minutes = 60.0 * np.degrees(expected.attitude_sigma)
+    table = np.hstack([table_of(expected), expected.position_sigma, minutes])
+    names = f"GPSTime  Easting  Northing  H-Ell  Roll  Pitch  Heading  {SIGMAS}"
+    units = "(sec) (m) (m) (m) (deg) (deg) (deg) (m) (m) (m) ({0}) ({0}) ({0})"
+    path = explorer(tmp_path / "ie.txt", names, units.format("arcmin"), table)
+    found = read(path, heading=GRID).trajectory.attitude_sigma
+    assert np.abs(found - expected.attitude_sigma).max() < 1e-9
+    explorer(path, names, units.format("turns"), table)
+    with pytest.raises(ValueError, match="sigma_roll in 'turns', where m, mm, deg"):
+        read(path, heading=GRID)
+    parts = np.hstack([table[:, :1], np.ones((100, 6)), table[:, 3:7]])
+    names = names.replace("Easting  Northing", "Latitude  Longitude").replace(SIGMAS, "")
+    explorer(path, names, "(sec) (+/-D M S) (+/-D M S) (m) (deg) (deg) (deg)", parts)
+    with pytest.raises(
+        ValueError, match=r"11 columns where 7 .*minutes and seconds: export decimal"
+    ):
+        read(path)
+
+
+def test_latitude_and_longitude_in_radians_are_not_taken_for_degrees(tmp_path):
+    "No land lies within pi degrees of 0, 0: radians are refused, and read with angles = 'rad'"
+    expected = drive(100, sigmas=False)
+    table, place = table_of(expected), geographic(expected)
+    table[:, 6] += place[:, 2]
+    table = np.column_stack([table[:, 0], np.radians(place[:, 1::-1]), table[:, 3:]])
+    table[:, 4:] = np.radians(table[:, 4:])
+    header = "Time,Lat,Lon,Height,Roll,Pitch,Heading"
+    np.savetxt(tmp_path / "t.txt", table, "%.12f", ",", header=header, comments="")
+    with pytest.raises(ValueError, match=r'longitudes that seem to be radians.* angles = "rad"'):
+        read(tmp_path / "t.txt")
+    assert_same(read(tmp_path / "t.txt", angles="rad").trajectory, expected, metres=2e-4)
+
+
 def test_latitude_and_longitude_are_projected(tmp_path):
     "Geographic positions in degrees come into the CRS, and their headings to grid north"
     expected = drive(100)
@@ -130,6 +193,16 @@ def test_columns_without_names_are_numbered(tmp_path):
     file = read(tmp_path / "t.txt", columns={name: i for i, name in enumerate(names, start=1)})
     assert_same(file.trajectory, expected)
     assert "heading = column 7 (blanks, decimal point)" in file.layout
+
+
+def test_what_a_table_in_other_letters_lacks_is_named(tmp_path):
+    "Windows-1252 is read, so its umlauts are not the fault: Gier is a yaw, and counts in some way"
+    table = table_of(drive(100, sigmas=False))
+    lines = ["Zeit;Ost;Nord;Höhe;Roll;Nick;Gier", *(";".join(map(str, row)) for row in table)]
+    (tmp_path / "t.txt").write_bytes("\n".join([*lines, ""]).encode("cp1252"))
+    with pytest.raises(ValueError, match=r"no column heading; it has .* Höhe, .*Its yaw is a hea"):
+        read(tmp_path / "t.txt")
+    assert len(read(tmp_path / "t.txt", heading=GRID).trajectory) == 100
 
 
 def test_a_column_in_utc_is_named_with_the_seconds_that_it_needs(tmp_path):
