@@ -268,5 +268,4 @@ def sentence_on(
     values = [f"{k} {shown(v) if isinstance(v, str) else f'{v:g} m'}" for k, v in given.items()]
     values += [f"but check for {shown(', '.join(patterns))}"] * bool(patterns)
     given_to_all = f"; of all points: {', '.join(values)}" if values else ""
-    unused = ", ".join(shown(layout.header[i]) for i in layout.unused)
-    return f"{layout}{axes}{given_to_all}{f'; not used: {unused}' if unused else ''}."
+    return f"{layout}{axes}{given_to_all}{layout.not_used}."

@@ -69,6 +69,12 @@ class TableLayout:
         used = self.columns.values()
         return [i for i, name in enumerate(self.header) if name and i not in used]
 
+    @property
+    def not_used(self) -> str:
+        """Words on the columns that aren't used; nothing without such."""
+        names = ", ".join(shown(self.header[i]) for i in self.unused)
+        return f"; not used: {names}" if names else ""
+
     def name_of(self, column: str) -> str:
         """What a column is called in the table, or its number from 1.
 

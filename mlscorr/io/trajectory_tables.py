@@ -83,7 +83,7 @@ def read_table(
     table = _place_in_degrees(path, layout, read_numbers(layout).T, section.angles)
     if "qw" in layout.columns:
         table, axes = attitude_of_quaternions(path, table, section.axes)
-        return table, f"{layout}; body axes {axes}."
+        return table, f"{layout}; body axes {axes}{layout.not_used}."
     if "yaw" in table:
         table["heading"] = table.pop("yaw")
     conventions = Conventions.of(section, _usual_heading(layout, section))
@@ -95,7 +95,7 @@ def read_table(
     where = (
         f"; latitude and longitude in the datum of {crs}" if "latitude" in layout.columns else ""
     )
-    return table, f"{layout}{where}; {conventions}{degrees}."
+    return table, f"{layout}{where}; {conventions}{degrees}{layout.not_used}."
 
 
 def read_terrascan(

@@ -207,9 +207,9 @@ def _looked(
     elif probe.doubt:
         faults.warn(probe.doubt)
     faults.warn(*problems.warnings, *datum_warnings(matched, survey.trajectory, survey.pos))
-    notes = [
-        f"{len(set(matched.name))} of {len(probe.points)} targets that were looked at are found."
-    ]
+    names, found = probe.points.name, set(matched.name)
+    missing = f", not {', '.join(lost)}" if (lost := [n for n in names if n not in found]) else ""
+    notes = [f"{len(found)} of {len(names)} targets that were looked at are found{missing}."]
     if len(matched):
         middle = ", ".join(
             f"{axis} {value:+.3f}"

@@ -91,6 +91,7 @@ def test_an_export_of_pospac_is_read(tmp_path):
     file = read(path, heading=TRUE)
     assert_same(file.trajectory, expected)
     assert np.abs(file.trajectory.position_sigma - expected.position_sigma).max() < 1e-8
+    assert "; not used: DISTANCE, LATITUDE, LONGITUDE, ELLIPSOID HEIGHT." in file.layout
     rows[4] = height + 1.0
     explorer(path, names, units, np.hstack(rows))
     with pytest.raises(

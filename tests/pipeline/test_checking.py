@@ -79,6 +79,16 @@ def test_a_good_survey_has_no_fault_and_is_counted(small):
     assert all(amount.source for amount in (*checked.read, *checked.written, *checked.needed))
 
 
+def test_a_target_that_is_not_where_it_should_be_is_named(survey):
+    "A height of 0, as lists of total stations have it where none was measured: its point by name"
+    path = survey / "control.csv"
+    header, first, *rows = path.read_text().splitlines()
+    cells = first.split(",")
+    path.write_text("\n".join([header, ",".join([*cells[:3], "0.0", *cells[4:]]), *rows, ""]))
+    notes = mlscorr.check(survey).notes
+    assert f"3 of 4 targets that were looked at are found, not {cells[0]}." in notes
+
+
 def test_faults_are_counted_as_the_sentences_count_them(survey):
     "A list with an unknown kind everywhere and one size in millimetres: two, and the end says so"
     text = (survey / "control.csv").read_text().replace("circle", "ball")
