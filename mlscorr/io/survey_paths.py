@@ -1,6 +1,7 @@
 """Where the files are that a survey.toml names."""
 
 import glob
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,8 +9,9 @@ from pathlib import Path
 
 from mlscorr.io.conversion import written_name
 from mlscorr.io.identity import find_copies
-from mlscorr.io.storage import beside, files_like, is_folder, is_there, resolved
+from mlscorr.io.storage import beside, files_like, is_folder, is_remote, is_there, resolved
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
+from mlscorr.io.text_files import nearest
 from mlscorr.io.trajectory_sessions import SessionFile
 from mlscorr.survey import CloudFile
 
@@ -197,10 +199,17 @@ def existing(path: Path, key: str, name: str) -> Path:
     """
     there = beside(path, name)
     if not is_there(there):
-        way_out = f"is a folder: name files in it, as {name}/*.laz" if is_folder(there) else (
-            "does not exist")  # fmt: skip
-        raise FileNotFoundError(f"{key} of {path} names {there}, which {way_out}.")
+        raise FileNotFoundError(f"{key} of {path} names {there}, which {_lack(there)}.")
     return there
+
+
+def _lack(there):
+    """Why there is no file of a name, and which one may be meant."""
+    if is_folder(there):
+        return "is a folder: name a file in it, or its clouds by a pattern, as FOLDER/*.laz"
+    is_listed = not is_remote(there) and there.parent.is_dir()
+    near = nearest(there.name, os.listdir(there.parent) if is_listed else ())
+    return f"does not exist; the nearest there is {near}" if near else "does not exist"
 
 
 def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> None:

@@ -207,9 +207,9 @@ def _looked(
     elif probe.doubt:
         faults.warn(probe.doubt)
     faults.warn(*problems.warnings, *datum_warnings(matched, survey.trajectory, survey.pos))
-    names, found = probe.points.name, set(matched.name)
-    missing = f", not {', '.join(lost)}" if (lost := [n for n in names if n not in found]) else ""
-    notes = [f"{len(found)} of {len(names)} targets that were looked at are found{missing}."]
+    names, targets = probe.points.name, set(matched.name)
+    missing = f", not {', '.join(lost)}" if (lost := [n for n in names if n not in targets]) else ""
+    notes = [f"{len(targets)} of {len(names)} targets that were looked at are found{missing}."]
     if len(matched):
         middle = ", ".join(
             f"{axis} {value:+.3f}"

@@ -263,11 +263,16 @@ def test_a_missing_survey_says_what_is_expected(tmp_path):
         (
             "trajectory.csv",
             "trajectori.csv",
-            r"trajectory\.file of .*trajectori.csv, which does not",
+            r"trajectory\.file of .*trajectori.csv, which does not exist; .* is trajectory.csv",
         ),
         ("control.csv", "points.csv", r"control\.file of .*points.csv, which does not exist"),
         ("pass-*.las", "drive-*.las", r"cloud\.files of .*no file is like .*drive-\*"),
-        ("pass-*.las", ".", r"cloud\.files of .*is a folder: name files in it, as \./\*\.laz"),
+        (
+            "control.csv",
+            "Control.csv ",
+            r"Control.csv , which .*; the nearest there is control.csv",
+        ),
+        ("pass-*.las", ".", r"cloud\.files of .*is a folder: .*clouds by a pattern"),
         ("pass-*.las", "pass-9.las", r"cloud\.files of .*pass-9.las, which does not exist"),
         ("[control]", '[scene]\nreference = "r.ply"\n[control]', r"scene\.reference of"),
         ('trajectory.csv"', 'trajectory.csv"\naccuracy = "s.out"', r"trajectory\.accuracy of"),
