@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.time_systems import DAY, WEEK
 from mlscorr.survey import Trajectory
 
 
@@ -28,6 +29,11 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
     """
     length = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     speed = length / np.diff(trajectory.gps_time)
+    if np.ptp(trajectory.gps_time) > WEEK and speed.max() < SETTINGS.moving:
+        raise ValueError(
+            f"{path} lasts {np.ptp(trajectory.gps_time) / DAY:.1f} days, and is never faster than "
+            f"{speed.max():.2g} m/s: its times may be in milli- or microseconds. Give seconds."
+        )
     is_fast = np.concatenate([[True], speed > SETTINGS.fastest, [True]])
     bad = is_fast[1:-1] & (is_fast[:-2] | is_fast[2:] | (length > SETTINGS.near))
     if bad.any():

@@ -213,7 +213,8 @@ def utc_lag(*times: np.ndarray) -> int:
     for some in times:
         if (system := usual_systems(some)[0]) != "week":
             seconds = float(some[0]) + ADJUSTMENT * (system == "standard")
-            return leap_seconds(EPOCH + timedelta(seconds=seconds))
+            days = np.clip(seconds / DAY, 0, 1e5)  # of garbage too, to the 23rd century
+            return leap_seconds(EPOCH + timedelta(days=days))
     return leap_seconds(date.max)
 
 
@@ -262,7 +263,7 @@ def _nothing_fits(name, times, span, candidates, setting):
         return (
             f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
             "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "
-            "them may be in UTC or local time. Check that both are of one drive."
+            "them may be in UTC, local time or milliseconds. Check that both are of one drive."
         )
     return (
         f'None of {spans}, taken as {NAMES[setting]}, which cloud.gps_time = "{setting}" in '

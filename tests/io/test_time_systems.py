@@ -158,6 +158,14 @@ def test_times_in_single_precision_are_refused():
             match_times("a.laz", rounded, system == "standard", trajectory())
 
 
+@pytest.mark.parametrize("factor", [1e3, 1e9, -1e9])
+def test_times_in_other_units_are_refused(factor):
+    "Unix time in milliseconds or nanoseconds is beyond all dates, and is refused all the same"
+    unix = SYSTEMS["gps"] + 315_964_782.0
+    with pytest.raises(ValueError, match=r"None of the sampled times .* or milliseconds"):
+        match_times("a.laz", factor * unix, False, trajectory())
+
+
 def test_a_trajectory_that_covers_a_part_is_refused():
     "With a third of the cloud covered, the file is said to be short, not the system wrong"
     with pytest.raises(ValueError, match="covers a part of the cloud"):

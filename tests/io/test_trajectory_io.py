@@ -174,6 +174,15 @@ def test_a_heading_against_the_course_is_warned_of(tmp_path):
         read_trajectory(csv_of(tmp_path / "t.csv", table))
 
 
+def test_milliseconds_are_no_seconds(tmp_path):
+    "Weeks at less than a metre a second: any cloud of the week would lie within them"
+    table = table_of(drive(1000, sigmas=False))
+    table[:, 0] *= 1e3
+    table[500:, 0] += 1e6  # as of a drive of 18 minutes
+    with pytest.raises(ValueError, match=r"lasts 12\.2 days, .* 0\.009 m/s: .*milli.*Give seconds"):
+        read_trajectory(csv_of(tmp_path / "t.csv", table))
+
+
 def test_a_vehicle_at_rest_has_no_course(tmp_path):
     "Centimetres of position noise at rest say nothing of the heading"
     table = table_of(drive())
