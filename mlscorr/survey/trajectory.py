@@ -64,11 +64,11 @@ class Trajectory(Summary):
                 )
         steps = np.diff(self.gps_time)
         if (steps <= 0).any():
-            first = int(np.argmax(steps <= 0))
             raise ValueError(
                 f"The trajectory's gps_time must increase: {int((steps == 0).sum())} epochs are "
                 f"duplicates and {int((steps < 0).sum())} go back in time (first after "
-                f"{self.gps_time[first]:.3f} s). Sort the file and remove repeated epochs."
+                f"{self.gps_time[np.argmax(steps <= 0)]:.3f} s). Sort the file and remove repeated "
+                "epochs; where seconds of week start again, cut it into two [[trajectory]]."
             )
 
     def __len__(self) -> int:
