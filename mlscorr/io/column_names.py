@@ -25,10 +25,10 @@ PLACE_NAMES = {
     "y": "y ycoord ycoordinate coordy ykoordinate ywert coordenaday y坐标",
     "latitude": "lat breite latitud 纬度",
     "longitude": "lon long lng länge longitud 经度",
-    "height": "h z elev elevation alt altitude hell ellipsoidalheight ellipsoidheight hortho "
-    "orthometricheight orthoheight hmsl höhe hoehe hnn hnhn rl zcoord zcoordinate coordz "
-    "zkoordinate zwert altura cota elevación elevacion coordenadaz 高程 高度 高 大地高 正常高 海拔 "
-    "h坐标 z坐标",
+    "height": "h ht z elev elevation alt altitude hell ellipsoidalheight ellipsoidheight hortho "
+    "orthometricheight orthoheight orthoht ellht ellipht hmsl höhe hoehe hnn hnhn rl zcoord "
+    "zcoordinate coordz zkoordinate zwert altura cota elevación elevacion coordenadaz "
+    "高程 高度 高 大地高 正常高 海拔 h坐标 z坐标",
 }
 CONTROL_NAMES = PLACE_NAMES | {
     "name": "id no nr n° num number point pointid pointname pointno pointnr pointnumber pt ptid "

@@ -68,6 +68,12 @@ LISTS = {  # what writes such a file: content, its letters, and what is understo
         "P2;532030;3373978,17;44,5\n",
         "utf-8", "name = N°, easting = Est, northing = Nord, height = Altitude",
     ),
+    "English, abbreviated heights, codes and dates": (
+        "Point Id,Easting,Northing,Ortho Ht,Code,Date/Time\n"
+        "P1,532012.49,3373991.48,44.48,TGT,05/12/2026 10:11:12\n"
+        "P2,532030.0,3373978.17,44.5,TGT,05/12/2026 10:14:02\n",
+        "utf-8", "name = Point Id, height = Ortho Ht",
+    ),
     "Spanish, Excel's Unicode text": (
         "Punto\tEste\tNorte\tCota\nP1\t532012,49\t3373991,48\t44,48\n"
         "P2\t532030\t3373978,17\t44,5\n",
