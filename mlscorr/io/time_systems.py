@@ -120,15 +120,19 @@ def match_times(
 
 
 def _check_precision(name, times):
-    """Refuse times all of which single precision can hold, where its steps are coarse."""
+    """Warn of times all of which single precision can hold; refuse them where it is too coarse."""
     rounded = times.astype(np.float32)
     step = float(np.spacing(np.abs(rounded).max()))
-    if step > SETTINGS.single_time_step and (rounded == times).all():
-        raise ValueError(
-            f"The times of {name} [{times.min():.3f}, {times.max():.3f}] s were rounded to single "
-            f"precision, in steps of {step:.2g} s, in which a vehicle moves on: export gps_time in "
-            "double precision."
-        )
+    if step <= SETTINGS.single_time_step or (rounded != times).any():
+        return
+    sentence = (
+        f"The times of {name} [{times.min():.3f}, {times.max():.3f}] s were rounded to single "
+        f"precision, in steps of {step:.2g} s, in which a vehicle moves on: export gps_time in "
+        "double precision."
+    )
+    if usual_systems(times) != ("week",):
+        raise ValueError(sentence)
+    warnings.warn(sentence, stacklevel=3)  # drift hardly changes within an eighth of a second
 
 
 def _check_week_end(name, times, span, match):
