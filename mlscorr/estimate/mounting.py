@@ -124,18 +124,11 @@ def calibration_by(
     parameters = posterior.modes[0][0]
     drift = Correction.by_pose_error(trajectory, *predict_pose_error(equations, posterior))
     return Calibration(
-        trajectory=trajectory,
-        recorded=tuple(recorded),
-        lsc=lsc,
-        ls=least_squares[1],
-        determined=determined,
-        screening=screening,
-        used=used,
-        guards=find_guards(equations, parameters, drift.corrected),
-        equations=equations,
-        drift=drift,
-        notes=notes,
-    )
+        trajectory=trajectory, recorded=tuple(recorded), lsc=lsc, ls=least_squares[1],
+        determined=determined, screening=screening, used=used,
+        guards=find_guards(equations, parameters, drift.corrected), equations=equations,
+        drift=drift, notes=notes,
+    )  # fmt: skip
 
 
 def control_fault(matched: Matched, number: int) -> str:

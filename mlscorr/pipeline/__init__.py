@@ -6,20 +6,14 @@ from typing import Any
 _OFFERED = {
     "applying": ("AppliedSurvey", "apply"),
     "calibration": ("CalibratedScanners", "CalibratedSurvey", "calibrate"),
-    "checking": ("CheckedSurvey", "check"),
-    "compared_survey": ("ComparedSurvey",),
-    "comparison": ("compare",),
-    "corrected_survey": ("CorrectedSurvey",),
-    "correction": ("correct",),
-    "diagnosis": ("DiagnosedSurvey", "diagnose"),
-    "extraction": ("ExtractedSurvey", "extract"),
-    "installation": ("Installation", "doctor"),
-    "planning": ("PlannedSurvey", "plan"),
-    "rendering": ("render",),
-    "simulation": ("demo", "simulate_survey"),
-    "starting": ("StartedSurvey", "init"),
+    "checking": ("CheckedSurvey", "check"), "compared_survey": ("ComparedSurvey",),
+    "comparison": ("compare",), "corrected_survey": ("CorrectedSurvey",),
+    "correction": ("correct",), "diagnosis": ("DiagnosedSurvey", "diagnose"),
+    "extraction": ("ExtractedSurvey", "extract"), "installation": ("Installation", "doctor"),
+    "planning": ("PlannedSurvey", "plan"), "rendering": ("render",),
+    "simulation": ("demo", "simulate_survey"), "starting": ("StartedSurvey", "init"),
     "ties": ("TiedSurvey", "find_ties"),
-}
+}  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -244,19 +244,14 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     mountings = tuple(recording.true_mounting(scanner) for scanner in scenario.scanner)
     targets = recording.surveyed_targets(scene.targets, centre, scenario.targets, control_rng)
     return SimulatedSurvey(
-        scenario=scenario,
-        scene=scene,
-        true_passes=true_passes,
+        scenario=scenario, scene=scene, true_passes=true_passes,
         passes=recording.split_passes(with_effects("pos", recorded), map(len, true_passes)),
         true_mountings=mountings,
         mountings=tuple(with_effects("mounting", mounting) for mounting in mountings),
         targets=with_effects("control", targets),
-        is_check=recording.spread_checks(len(targets), scenario.targets),
-        true_centre=centre,
-        effects=effects,
-        reference=reference,
+        is_check=recording.spread_checks(len(targets), scenario.targets), true_centre=centre,
+        effects=effects, reference=reference,
         streams=recording.streams_by_file(len(true_passes), len(mountings), scan_rng, effect_rng),
-        beam_streams=streams,
-        seed=seed if isinstance(seed, int) else None,
+        beam_streams=streams, seed=seed if isinstance(seed, int) else None,
         static_scan=static_scan(scene, static_rng) if scenario.scene.reference else None,
-    )
+    )  # fmt: skip

@@ -43,26 +43,15 @@ def assemble(
     second, partials_2 = np.isfinite(gps_time_2), np.zeros((m, 6))
     partials_2[second] = -_partials(survey, position[second], gps_time_2[second], direction[second])
     return Rows(
-        channel=np.broadcast_to(np.asarray(channel, dtype="U11"), m).copy(),
-        item=item,
-        survey_item=np.full(m, -1) if survey_item is None else survey_item,
-        gps_time=gps_time,
-        gps_time_2=gps_time_2,
-        position=position,
-        direction=direction,
-        residual=residual,
-        noise=noise,
-        survey=np.sum(survey_factor**2, axis=1),
-        survey_factor=survey_factor,
-        points=points,
-        believed=np.full(m, np.nan) if believed is None else believed,
-        partials=_partials(survey, position, gps_time, direction),
-        partials_2=partials_2,
+        channel=np.broadcast_to(np.asarray(channel, dtype="U11"), m).copy(), item=item,
+        survey_item=np.full(m, -1) if survey_item is None else survey_item, gps_time=gps_time,
+        gps_time_2=gps_time_2, position=position, direction=direction, residual=residual,
+        noise=noise, survey=np.sum(survey_factor**2, axis=1), survey_factor=survey_factor,
+        points=points, believed=np.full(m, np.nan) if believed is None else believed,
+        partials=_partials(survey, position, gps_time, direction), partials_2=partials_2,
         covariates=covariates(survey, gps_time, position, pulses, item, pass_number, direction),
-        pulses=pulses,
-        targets=survey.surveyed,
-        reference=reference_of(survey),
-    )
+        pulses=pulses, targets=survey.surveyed, reference=reference_of(survey),
+    )  # fmt: skip
 
 
 def _partials(survey, position, gps_time, direction):

@@ -72,19 +72,12 @@ def _part(joint, estimate, number, note):
     equations = _equations(estimate.equations, rows[estimate.used], trajectory, shift)
     guards = guards_of(trajectory.scanned_passes, equations.observed, estimate.guards)
     return DriveEstimate(
-        correction=correction,
-        equations=equations,
-        screening=screening,
-        used=estimate.used[rows],
-        left_out=estimate.left_out[rows],
-        log_likelihood=estimate.log_likelihood,
-        sigma0=estimate.sigma0,
-        guards=guards,
-        support=_held(estimate.support, trajectory, shift, chainage),
-        notes=estimate.notes,
-        ties=_ties(joint, estimate.ties, number),
-        untied=note or estimate.untied,
-    )
+        correction=correction, equations=equations, screening=screening, used=estimate.used[rows],
+        left_out=estimate.left_out[rows], log_likelihood=estimate.log_likelihood,
+        sigma0=estimate.sigma0, guards=guards,
+        support=_held(estimate.support, trajectory, shift, chainage), notes=estimate.notes,
+        ties=_ties(joint, estimate.ties, number), untied=note or estimate.untied,
+    )  # fmt: skip
 
 
 def _cut(correction, trajectory, shift):

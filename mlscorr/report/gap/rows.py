@@ -9,18 +9,12 @@ from mlscorr.report.gap.labels import sentences_of
 from mlscorr.report.gap.numbers import column, percent, plain, signed
 
 COVARIATES = {
-    "time": "Time since the start",
-    "location": "Way along the road",
-    "range": "Distance from the scanner",
-    "incidence": "Angle of incidence",
-    "scan_angle": "Scan angle",
-    "intensity": "Intensity, log10",
-    "speed": "Speed",
-    "turn_rate": "Turn rate, to the right",
-    "pass": "Pass",
-    "axis": "Axis",
+    "time": "Time since the start", "location": "Way along the road",
+    "range": "Distance from the scanner", "incidence": "Angle of incidence",
+    "scan_angle": "Scan angle", "intensity": "Intensity, log10", "speed": "Speed",
+    "turn_rate": "Turn rate, to the right", "pass": "Pass", "axis": "Axis",
     "channel": "What was compared",
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
