@@ -123,9 +123,7 @@ class PositionBump(Effect):
     stage: ClassVar = "pos"
     title: ClassVar = "Passing GNSS error"
     meaning: ClassVar = "The recorded position is off for a while: multipath, or a short outage."
-    sentence: ClassVar = (
-        "The recorded position goes astray for a while{where}: {size} at the worst."
-    )
+    sentence: ClassVar = "The recorded position goes astray for a while{where}: {size} at worst."
     remedy: ClassVar = "Look at GNSS at that time; mlscorr correct takes such a drift out."
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
@@ -170,9 +168,7 @@ class PositionNoise(Effect):
     stage: ClassVar = "pos"
     random: ClassVar = True
     title: ClassVar = "Noisy positions"
-    meaning: ClassVar = (
-        "The recorded position is noisier, or drifts more, than its stated sigmas say."
-    )
+    meaning: ClassVar = "The recorded position is noisier, or drifts more, than its sigmas say."
     sentence: ClassVar = "The positions of the POS are worse than their sigmas say: {size}."
     remedy: ClassVar = (
         "Run mlscorr correct, which takes the drift out of the cloud; tell it how well the POS "

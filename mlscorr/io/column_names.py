@@ -25,7 +25,7 @@ PLACE_NAMES = {
     "y": "y ycoord ycoordinate coordy ykoordinate ywert coordenaday y坐标",
     "latitude": "lat breite latitud 纬度",
     "longitude": "lon long lng länge longitud 经度",
-    "height": "h ht z elev elevation alt altitude hell ellipsoidalheight ellipsoidheight hortho "
+    "height": "h z elev elevation alt altitude hell ellipsoidalheight ellipsoidheight hortho "
     "orthometricheight orthoheight orthoht ellht ellipht hmsl höhe hoehe hnn hnhn rl zcoord "
     "zcoordinate coordz zkoordinate zwert altura cota elevación elevacion coordenadaz "
     "高程 高度 高 大地高 正常高 海拔 h坐标 z坐标",

@@ -234,9 +234,7 @@ def _with_numbers(layout, units, rows):
     cells = [row[i] for row in rows for i in places if i < len(row)]
     numbers = [cell for cell in cells if NUMBER.fullmatch(cell.replace(".", "").replace(",", ""))]
     if marked := [cell for cell in cells if THOUSANDS.fullmatch(cell)]:
-        raise ValueError(
-            f"{path} has numbers with thousands marks ('{shown(marked[0])}'): omit them."
-        )
+        raise ValueError(f"{path} has thousands marks ('{shown(marked[0])}'): omit them.")
     commas, points = ([cell for cell in numbers if mark in cell] for mark in ",.")
     if commas and points:
         raise ValueError(
