@@ -40,7 +40,8 @@ def find_steps(trajectory: Trajectory) -> Steps:
     """Steps of the recorded position against the speed before and after them.
 
     Over three equal spans the middle one's way is half of both others', but for half the jerk
-    times the span cubed. What is far above the largest differences of all other seconds is a step.
+    times the span cubed. What is far above the largest differences of all other seconds that the
+    vehicle drives in is a step.
 
     Parameters
     ----------
@@ -103,15 +104,16 @@ def _differences(gps_time, position, span):
     length = np.linalg.norm(size, axis=1)
     start = gps_time[span : span + len(size)]
     second = np.floor((start - gps_time[0]) / SECOND).astype(int)
+    # what stands tells of no motion
+    driven = second[np.linalg.norm(about, axis=1) > SETTINGS.smallest_step / SECOND]
     largest = np.zeros(second[-1] + 1)
     np.maximum.at(largest, second, length)
-    usual = np.median(largest[np.unique(second)])
+    usual = np.median(largest[np.unique(driven)]) if len(driven) else 0.0
     limit = max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual)
     rows = np.flatnonzero((length > limit) & (length == largest[second]))
     # what the spans wholly before and after show is no step: filters and resampling ring beside one
     beside = np.pad(length, 2 * span, constant_values=usual)
-    ringing = np.maximum(beside[rows], beside[rows + 4 * span])
-    sigma = np.maximum(ringing, usual)
+    sigma = beside[[rows, rows + 4 * span]].max(axis=0).clip(usual)
     return [
         (start[i], gps_time[i + 2 * span], *size[i], s) for i, s in zip(rows, sigma, strict=True)
     ]

@@ -60,6 +60,19 @@ def test_nothing_else_is_a_step(seed):
     assert len(find_steps(recorded(time, path + rng.normal(0.0, 0.005, path.shape)))) == 0
 
 
+def test_a_car_that_stands_longer_than_it_drives_makes_no_steps():
+    "After 400 s at rest, 300 s of starting, stopping and turning at 1 Hz show no fall-back but one"
+    time = np.arange(0.0, 700.0, 0.1)
+    driven = np.maximum(time - 400.0, 0.0)
+    speed, heading = 6.0 - 6.0 * np.cos(driven / 3.0), 0.8 * np.sin(driven / 5.0)
+    way = speed[:, None] * np.column_stack([np.sin(heading), np.cos(heading), 0.0 * heading])
+    path = CORNER + np.cumsum(way, axis=0) / 10.0
+    assert len(find_steps(recorded(time[::10], path[::10]))) == 0
+    steps = find_steps(recorded(time[::10], (path - 3.0 * outage(time, 500.0, 560.0))[::10]))
+    assert steps.after - START == pytest.approx([560.0])  # s
+    assert steps.size[0] == pytest.approx([3.6, -2.4, 1.2], abs=0.7)  # m
+
+
 def test_time_stamps_that_jitter_make_no_steps():
     "10 ms of jitter in the time stamps is no fall-back"
     time, path = city_drive(10.0)
