@@ -168,9 +168,9 @@ class Equations(Summary):
     def interval(self) -> float:
         """Mean interval of the control epochs without the trajectory's gaps between them. Units: s.
 
-        The whole trajectory's length where they are as good as one. Where there is none, or where
-        ties tell more of the time than how far apart targets stand, the believed correlation time
-        as the paper's rule has it.
+        All that was recorded where they are as good as one. Where there is none, or where ties tell
+        more of the time than how far apart targets stand, the believed correlation time as the
+        paper's rule has it.
         """
         if len(self.observed) == 0 or self.ties is not None:
             return self.pos.correlation_time / SETTINGS.start_ratio

@@ -143,7 +143,7 @@ class Trajectory(Summary):
     def control_interval(self, gps_time: np.ndarray) -> float:
         """Mean interval of control epochs without the gaps between them. Units: s.
 
-        The whole trajectory's length where they are one, or as good as one: less than a second was
+        The whole of what was recorded where they are one, or as good as one: less than a second was
         recorded from one to the next, as from the end of a pass to the start of another.
 
         Parameters
@@ -153,7 +153,7 @@ class Trajectory(Summary):
         """
         epochs = control_epochs(gps_time)
         interval = self.recorded_time(epochs[0], epochs[-1]) / max(len(epochs) - 1, 1)
-        return interval if interval >= SAME_EPOCH else float(np.ptp(self.gps_time))
+        return interval if interval >= SAME_EPOCH else self.recorded_time(*self.gps_time[[0, -1]])
 
     def select(self, rows: slice | ArrayLike) -> Trajectory:
         """Some of its epochs, in any order.
