@@ -1,7 +1,10 @@
 """Correct mobile laser scans with surveyed targets by least squares collocation."""
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from mlscorr.compiled_loops import choose_folder
 
 if TYPE_CHECKING:  # what editors and type checkers see of the names that are loaded when used
     from mlscorr import simulate
@@ -28,6 +31,9 @@ _READERS = {
     "read_simulator": "mlscorr.simulate.simulator_file",
     "read_survey": "mlscorr.io.survey_file",
 }
+
+_HOME = os.path.expanduser("~")
+choose_folder(__path__[0], _HOME, os.environ.get("XDG_CACHE_HOME", os.path.join(_HOME, ".cache")))
 
 
 def __getattr__(name: str) -> Any:

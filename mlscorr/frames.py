@@ -219,8 +219,7 @@ def pose_partials(trajectory: Trajectory, position: np.ndarray, gps_time: np.nda
         Units: s.
     """
     arm = position - trajectory.at(gps_time).position  # G, Eq. 8
-    identity = np.broadcast_to(np.eye(3), (len(arm), 3, 3))
-    return np.concatenate([identity, -skew(arm)], axis=2)
+    return np.concatenate([np.broadcast_to(np.eye(3), (len(arm), 3, 3)), -skew(arm)], axis=2)
 
 
 def mounting_partials(

@@ -166,8 +166,7 @@ def _points_on(observations, i, axes, tree, cloud, pass_number):
     on_plane = np.abs(local[:, 2]) < SETTINGS.plane_tolerance
     local, intensity = local[on_plane, :2], cloud.intensity[rows[on_plane]]
     core = np.linalg.norm(local, axis=1) < size / 3  # inside of any outline
-    bright = np.median(intensity[core]) if core.any() else 0.0
-    return local[intensity >= 0.5 * bright]
+    return local[intensity >= 0.5 * (np.median(intensity[core]) if core.any() else 0.0)]
 
 
 def _outline(kind, size, local):

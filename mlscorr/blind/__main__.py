@@ -18,8 +18,7 @@ def main() -> None:
     """Collect, and print figures."""
     given = study_arguments(__doc__, 5000, 10).parse_args()
     seeds = range(given.first, given.first + given.worlds)
-    mechanisms = outside_mechanisms()
-    records = collect(given.folder, seeds, given.cases, mechanisms, given.replicas)
+    records = collect(given.folder, seeds, given.cases, outside_mechanisms(), given.replicas)
     print_figures(records, [learned().probabilities(each.joint) for each in records])
     p = [learned().calibrated(r.p_value) for r in records if r.p_value is not None]
     if p:

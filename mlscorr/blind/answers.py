@@ -111,8 +111,7 @@ class AnsweredCase:
             return False
         if not by_class:
             return sorted(parts) == sorted(truth)
-        orders = (parts, parts[::-1])
-        return any(all(map(self._is_of_class, truth, order)) for order in orders)
+        return any(all(map(self._is_of_class, truth, order)) for order in (parts, parts[::-1]))
 
     def _is_of_class(self, truth, name):
         likeness = self.label["likeness"].get(truth, {})

@@ -68,6 +68,5 @@ def _whole(total, shares):
     """Whole numbers of a total in proportion to shares, by the largest remainders."""
     exact = total * np.array(list(shares.values())) / sum(shares.values())
     whole = exact.astype(int)
-    order = np.argsort(whole - exact, kind="stable")
-    whole[order[: total - whole.sum()]] += 1
+    whole[np.argsort(whole - exact, kind="stable")[: total - whole.sum()]] += 1
     return whole

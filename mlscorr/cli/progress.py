@@ -7,6 +7,7 @@ from time import monotonic
 
 from mlscorr.cli.terminal import is_quiet, say
 
+COMPILING = "Compiling loops: the first run of an installation takes minutes longer; they are kept."
 PATIENCE = 2.0  # s; quicker work shows nothing
 INTERVAL = 10.0  # s between the lines where stderr is no terminal
 
@@ -22,13 +23,35 @@ def progress_bars() -> Iterator[Progress]:
     progress : function
         progress(title, total) gives a function of the number of points just done.
     """
-    if is_quiet():
-        yield lambda *_: lambda _: None
-    elif sys.stderr.isatty():
-        with _bars() as progress:
-            yield progress
-    else:
-        yield _lines
+    with _compilation_said():
+        if is_quiet():
+            yield lambda *_: lambda _: None
+        elif sys.stderr.isatty():
+            with _bars() as progress:
+                yield progress
+        else:
+            yield _lines
+
+
+@contextmanager
+def _compilation_said():
+    """Say once why work takes longer, when loops have been compiled for a while."""
+    from numba.core.event import Listener, install_listener
+
+    class Compilation(Listener):
+        due, is_said = float("inf"), False
+
+        def on_start(self, _event):
+            self.due = min(self.due, monotonic() + PATIENCE)
+            if monotonic() >= self.due and not self.is_said:
+                self.is_said = True
+                say(COMPILING)
+
+        def on_end(self, _event):
+            pass
+
+    with install_listener("numba:compile", Compilation()):
+        yield
 
 
 @contextmanager

@@ -59,8 +59,7 @@ def locate(
                     break
             else:
                 i = min(np.searchsorted(epochs, time, side="right") - 1, last - 1)
-        in_gap = is_gap[i] and epochs[i] < time < epochs[i + 1]
-        index[p] = -1 if in_gap else i
+        index[p] = -1 if is_gap[i] and epochs[i] < time < epochs[i + 1] else i
     return index
 
 

@@ -169,8 +169,7 @@ class IncidenceBias(Effect):
     )
 
     def _error(self, value, reference, rng):
-        lateness = 1.0 / np.maximum(value.incidence, SETTINGS.grazing_cosine) - 1.0
-        return self.magnitude * lateness
+        return self.magnitude * (1.0 / np.maximum(value.incidence, SETTINGS.grazing_cosine) - 1.0)
 
 
 @dataclass(frozen=True)

@@ -203,8 +203,7 @@ def linearized(
     place = observed.position, matched.gps_time, matched.scanner
     position = georeferenced_anew(equations.trajectory, recorded, mountings, *place)
     moved = replace(matched, observations=replace(observed, position=position))
-    weak = _weak(recorded)
-    return mountings, mounting_equations(equations, moved, mountings, correction, weak)
+    return mountings, mounting_equations(equations, moved, mountings, correction, _weak(recorded))
 
 
 def _weak(mountings):

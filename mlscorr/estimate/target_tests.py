@@ -100,8 +100,7 @@ def _tests(equations, names, posterior, targets, visit=None):
     for chosen, weight in posterior.mixture:
         solved = equations.solve(chosen)
         for name in largest_first:
-            rows = equations.target_rows[name]
-            left_out[name].append((weight, *solved.leave_out(rows)))
+            left_out[name].append((weight, *solved.leave_out(equations.target_rows[name])))
         if visit is not None:
             visit(chosen, solved)
         del solved  # before the next one takes as much

@@ -33,8 +33,7 @@ def datum_warnings(control: Matched, trajectory: Trajectory, pos: Pos) -> tuple[
     if len(control) < 3:
         return ()
     sigma = stated_sigma(trajectory, pos, control.gps_time).position
-    vertical = _height(control.misclosure[:, 2], sigma[:, 2])
-    return (*vertical, *_plan(control, sigma[:, :2], pos))
+    return *_height(control.misclosure[:, 2], sigma[:, 2]), *_plan(control, sigma[:, :2], pos)
 
 
 def _height(misclosure, sigma):

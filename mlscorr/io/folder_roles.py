@@ -83,8 +83,7 @@ def _role(path) -> FileRole:
     if suffix in CLOUDS:
         return _cloud(path)
     if suffix in MESHES:
-        is_mesh = announced_faces(path)
-        return FileRole(path, "reference", "a mesh") if is_mesh else _cloud(path)
+        return FileRole(path, "reference", "a mesh") if announced_faces(path) else _cloud(path)
     if suffix in TRAJECTORIES:
         return FileRole(path, "trajectory", f"its suffix is {path.suffix}")
     if suffix == POQ_SUFFIX:

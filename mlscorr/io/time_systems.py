@@ -217,8 +217,8 @@ def utc_lag(*times: np.ndarray) -> int:
     for some in times:
         if (system := usual_systems(some)[0]) != "week":
             seconds = float(some[0]) + ADJUSTMENT * (system == "standard")
-            days = np.clip(seconds / DAY, 0, 1e5)  # of garbage too, to the 23rd century
-            return leap_seconds(EPOCH + timedelta(days=days))
+            # of garbage too, to the 23rd century
+            return leap_seconds(EPOCH + timedelta(days=np.clip(seconds / DAY, 0, 1e5)))
     return leap_seconds(date.max)
 
 

@@ -225,8 +225,7 @@ class CalibratedSurvey(CalibrationResult):
         return self.matched_control[self.calibration.used]
 
     def _statistics(self, role, correction):
-        points = self.matched_check if role == "check" else self.used
-        return score(points, correction).document()
+        return score(self.matched_check if role == "check" else self.used, correction).document()
 
     def _rows(self, correction):
         """Rows of every surveyed point and pass."""

@@ -84,9 +84,8 @@ class DiagnosedRounds:
         Exception
             As ``CorrectedSurvey.write`` does.
         """
-        return write_diagnosis(
-            out, self.document, self.rounds[0].survey, self.rounds[-1].improved, overwrite
-        )
+        survey, improved = self.rounds[0].survey, self.rounds[-1].improved
+        return write_diagnosis(out, self.document, survey, improved, overwrite)
 
 
 def diagnose_until_none(

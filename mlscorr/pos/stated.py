@@ -72,8 +72,7 @@ class StatedSigma:
     @cached_property
     def gnss(self) -> np.ndarray:
         """Sigma (n, 3) of a POS that GNSS holds: the stated one, else that of RTK. Units: m."""
-        held = self.held if self.history.is_stated else SETTINGS.gnss
-        return np.minimum(self.position, held)
+        return np.minimum(self.position, self.held if self.history.is_stated else SETTINGS.gnss)
 
     @cached_property
     def since(self) -> np.ndarray:

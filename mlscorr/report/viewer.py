@@ -110,8 +110,7 @@ def _target(row, origin):
 def _scaled(values):
     """Values (n,) between their percentiles as base64 of uint8."""
     low, high = percentiles(values)
-    share = np.clip((values - low) / max(high - low, 1e-9), 0, 1)
-    return _packed(np.round(255 * share), "u1")
+    return _packed(np.round(255 * np.clip((values - low) / max(high - low, 1e-9), 0, 1)), "u1")
 
 
 def _packed(values, kind="<f4"):

@@ -61,8 +61,7 @@ class CloudFile:
         """Of the file, with the ids of the points."""
         if self.point_source_ids is None:
             return self.path.name
-        ids = ", ".join(map(str, self.point_source_ids))
-        return f"{self.path.name} (point_source_id {ids})"
+        return f"{self.path.name} (point_source_id {', '.join(map(str, self.point_source_ids))})"
 
     def rows(self, point_source_id: np.ndarray) -> np.ndarray | slice:
         """Which points are among these: (n,) bool, or a slice of all.

@@ -182,5 +182,4 @@ def _midway(features, pairs, place):
     """Ways (n, 2, 3) from both places, along their planes or poles, to the middle between them."""
     way, axis = place.mean(axis=1, keepdims=True) - place, features.direction[pairs]
     along = np.einsum("nvi,nvi->nv", axis, way)[:, :, None] * axis
-    is_pole = features.kind[pairs[:, :1]] == "pole"
-    return np.where(is_pole[:, :, None], along, way - along)
+    return np.where((features.kind[pairs[:, :1]] == "pole")[:, :, None], along, way - along)

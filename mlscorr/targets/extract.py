@@ -46,17 +46,12 @@ def fit_near_control(
         some = cloud if radius == whole else cloud[ball.contains(cloud.xyz)]
         for segment, visit in split_visits(some, survey):
             path, generator = ScannerPath.of(survey, visit.gps_time), np.random.default_rng(seed)
-            known = [fit for _, fit in targets if _is_within(fit, visit)]
+            known = [f for _, f in targets if visit.gps_time[0] <= f.gps_time <= visit.gps_time[-1]]
             fits = fit_targets(
                 visit, path, [shape], survey.scanner, generator, origin=place, known=known
             )
             targets += [(segment, fit) for fit in fits]
     return _with_motion(targets, survey)
-
-
-def _is_within(target, visit):
-    """Whether a target was fitted in points of a visit."""
-    return visit.gps_time[0] <= target.gps_time <= visit.gps_time[-1]
 
 
 def _with_motion(targets, survey):

@@ -21,8 +21,7 @@ def why_useless(intensity: np.ndarray) -> str | None:
     """
     values = np.unique(intensity)
     if len(values) <= 1:
-        value = f"{values[0]:g}" if len(values) else "missing"
-        return f"The intensity of all points is {value}."
+        return f"The intensity of all points is {f'{values[0]:g}' if len(values) else 'missing'}."
     if len(values) < SETTINGS.smallest_levels:
         return f"The intensity takes only {len(values)} values."
     return None

@@ -159,8 +159,7 @@ def _next_trials(mean, covariance, free, number, count):
 
 def _log_prior(trials, size, middle, ring):
     """Log prior (c,) of trial outlines: uniform about the middle but for the size."""
-    play = SETTINGS.hidden_share * size.mean
-    within = (np.abs(trials[:, :2] - middle) <= play).all(axis=1)
+    within = (np.abs(trials[:, :2] - middle) <= SETTINGS.hidden_share * size.mean).all(axis=1)
     within &= (trials[:, 3] >= size.low) & (trials[:, 3] <= size.high)
     if ring:
         low, high = _ring_limits()

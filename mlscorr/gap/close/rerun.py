@@ -283,8 +283,7 @@ def _surface(rows, survey, beams, on, view, run, dither, spread):
 
     number, lost = count(used), count(np.isfinite(met.range) & ~kept)
     known = number >= np.maximum(1, SETTINGS.facet_share * (count(beams.view >= 0) - lost))
-    mean = count(np.where(used, away, 0.0)) / np.maximum(number, 1)
-    return np.where(known, mean, np.nan)
+    return np.where(known, count(np.where(used, away, 0.0)) / np.maximum(number, 1), np.nan)
 
 
 def _median(values, view, count):

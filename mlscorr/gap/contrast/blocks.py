@@ -118,5 +118,4 @@ def limit(blocks: np.ndarray, tests: int) -> np.ndarray:
         On which each sigma rests.
     tests : int
     """
-    tail = 0.5 * (1 - SETTINGS.confidence) / max(tests, 1)
-    return t.isf(tail, np.maximum(blocks - 1, 1.0))
+    return t.isf(0.5 * (1 - SETTINGS.confidence) / max(tests, 1), np.maximum(blocks - 1, 1.0))

@@ -35,8 +35,7 @@ def target_view(
     facing = _facing(normal, trajectory.at(row.gps_time).position[0] - row.observed)
     eye = _direction(facing, row.before)
     elevation = np.degrees(np.arcsin(eye[2]))
-    north_up = elevation > 89.0
-    azimuth = 0.0 if north_up else np.degrees(np.arctan2(-eye[0], -eye[1]))
+    azimuth = 0.0 if elevation > 89.0 else np.degrees(np.arctan2(-eye[0], -eye[1]))
     half = np.linalg.norm(row.before) / 2 + 1.1 * size
     outline = Mark("surveyed", row.surveyed + _outline(kind, size, facing))
     before, after = (

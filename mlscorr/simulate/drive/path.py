@@ -115,5 +115,4 @@ def u_turn_path(
     share = length / length[-1]
     right += lane - share * (right[-1] + 2 * lane)  # the smoothing leaves some centimetres
     along -= share * along[-1]
-    side = 1.0 if lateral >= 0 else -1.0
-    return along[::40], side * right[::40]
+    return along[::40], (1.0 if lateral >= 0 else -1.0) * right[::40]

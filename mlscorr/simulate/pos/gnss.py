@@ -172,8 +172,9 @@ def _solve(azimuth, elevation, visible, sigma, error):
     count = visible.sum(axis=1)
     dilution = np.full(len(count), np.inf)
     solvable = count >= 4
-    plain = np.einsum("kmi,km,kmj->kij", design, visible.astype(float), design)
-    dilution[solvable] = np.sqrt(np.trace(_inverse(plain[solvable])[:, :3, :3], axis1=1, axis2=2))
+    plain = np.einsum("kmi,km,kmj->kij", design, visible.astype(float), design)[solvable]
+    inverse = np.linalg.inv(plain + 1e-9 * np.eye(4))  # huge along a direction that is left open
+    dilution[solvable] = np.sqrt(np.trace(inverse[:, :3, :3], axis1=1, axis2=2))
     valid = dilution < RECEIVER.worst_dilution
 
     normal = np.einsum("kmi,km,kmj->kij", design[valid], weight[valid], design[valid])
@@ -191,8 +192,3 @@ def _solve(azimuth, elevation, visible, sigma, error):
     fixes[valid] = solution[:, :3]
     covariance[valid] = factor[:, None, None] ** 2 * cofactor[:, :3, :3]
     return Fixes(fixes, covariance, count, valid)
-
-
-def _inverse(matrices):
-    """Inverses of normal matrices (n, 4, 4), huge where the geometry leaves a direction open."""
-    return np.linalg.inv(matrices + 1e-9 * np.eye(4))

@@ -82,6 +82,5 @@ def smooth(
     state, covariance = filtered.state.copy(), filtered.covariance.copy()
     for k in range(len(transition) - 1, -1, -1):
         state[k] += gain[k] @ (state[k + 1] - predicted.state[k + 1])
-        difference = covariance[k + 1] - predicted.covariance[k + 1]
-        covariance[k] += gain[k] @ difference @ gain[k].T
+        covariance[k] += gain[k] @ (covariance[k + 1] - predicted.covariance[k + 1]) @ gain[k].T
     return StateEstimate(state, covariance)

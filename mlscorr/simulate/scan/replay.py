@@ -186,8 +186,7 @@ def without(
     effects, true = [effect for effect in effects if effect.stage == stage], recorded
     nothing: Any = {effect.name: None for effect in effects}
     for _ in range(2 if effects else 0):
-        changed = apply_effects(effects, stage, true, reference, nothing)
-        true = take_off(recorded, true, changed)
+        true = take_off(recorded, true, apply_effects(effects, stage, true, reference, nothing))
     return true
 
 
