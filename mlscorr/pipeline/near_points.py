@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.evaluate.beams import BeamCheck
+from mlscorr.io.project_file import ProjectParts
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.survey.summary import counted
@@ -73,22 +74,22 @@ class NearPoints:
             )
 
 
-def check_control(survey: Survey) -> None:
-    """Refuse a survey without control points.
+def check_control(survey: Survey | ProjectParts) -> None:
+    """Refuse a survey or project without control points.
 
     Parameters
     ----------
-    survey : Survey
+    survey : Survey or ProjectParts
 
     Raises
     ------
     ValueError
     """
-    if len(survey.surveyed) == 0:
+    if len(survey.control) == len(survey.check) == 0:
         raise ValueError(
             f"{survey.path} gives no control points: it has no section [control], or the file "
-            "named there is empty. A correction needs surveyed points; mlscorr extract lists the "
-            "targets of a cloud without them."
+            "named there is empty. A correction needs surveyed points, or passes that overlap with "
+            "--ties-only; mlscorr extract lists the targets of a cloud without them."
         )
     if len(survey.control) == 0:
         raise ValueError(

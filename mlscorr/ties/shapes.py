@@ -182,8 +182,7 @@ def _poles(moments, values, axes, noise, sight):
     """Those of cells that hold a pole and nothing else."""
     points, axis = moments[:, 0], axes[:, :, 2] * np.where(axes[:, 2, 2:] < 0, -1.0, 1.0)
     across = np.cross(axis, sight)
-    width = np.maximum(np.linalg.norm(across, axis=1), SETTINGS.grazing)
-    across /= width[:, None]
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), SETTINGS.grazing)
     beam = np.cross(across, axis)
     matrix = np.einsum("nik,nk,njk->nij", axes, values, axes)
     side, deep, between = _along(across, matrix), _along(beam, matrix), _along(beam, noise)

@@ -14,6 +14,7 @@ from mlscorr.io.project_sections import SHARED_TILES
 from mlscorr.io.storage import resolved
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.pipeline.clouds import WrittenClouds
+from mlscorr.pipeline.near_points import check_control
 from mlscorr.pipeline.project import file_tasks
 from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey
@@ -135,11 +136,11 @@ def check_control_near(project: ProjectParts, surveys: Sequence[Survey]) -> None
     ValueError
     """
     if surveys and not any(len(survey.control) for survey in surveys):
-        first = f" (first: {project.control.name[0]})" if len(project.control) else ""
+        check_control(project)
         raise ValueError(
-            f"None of the {len(project.control)} control points of {project.path}{first} lies near "
-            f"a cloud of its {len(surveys)} drives by the headers. Is the list under [control] "
-            "whole, and in the CRS of the clouds? --ties-only does without any."
+            f"None of the {len(project.control)} control points of {project.path} (first: "
+            f"{project.control.name[0]}) lies near a cloud of its {len(surveys)} drives by the "
+            "headers. Is the list whole, and in the CRS of the clouds? --ties-only needs none."
         )
 
 
