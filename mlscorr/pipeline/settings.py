@@ -30,7 +30,7 @@ class Settings:
     epoch_bytes: int = 137  # bytes, of a line of trajectory.csv with sigmas in a UTM zone
     # What a correction took beside the fits of its targets, docs/results.md
     decodings: float = 5.0  # times decoding the points once: reading, ties, copying, drawing
-    report_seconds: float = 10.0  # s; report.html and pictures
+    report_seconds: float = 20.0  # s; report.html and pictures
     report_megabytes: float = 6.0  # MB; of these
     memory: float = 0.8  # GB; chunks and libraries, whatever the size of the files
 
