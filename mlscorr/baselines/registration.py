@@ -78,15 +78,10 @@ def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Reg
     change = matrix[:3, :3] - np.eye(3)
     remaining = pairs.misclosure - matrix[:3, 3] - pairs.observed @ change.T
     registration = Registration(
-        pairs.origin,
-        matrix[:3, 3].copy(),
-        change,
-        variant=variant,
-        fitness=float(score.fitness),
-        inlier_rmse=float(score.inlier_rmse),
-        control_before=float(np.sqrt(np.mean(misclosure**2))),
+        pairs.origin, matrix[:3, 3].copy(), change, variant=variant, fitness=float(score.fitness),
+        inlier_rmse=float(score.inlier_rmse), control_before=float(np.sqrt(np.mean(misclosure**2))),
         control_after=float(np.sqrt(np.mean(np.sum(remaining**2, axis=1)))),
-    )
+    )  # fmt: skip
     _warn(registration)
     return registration
 

@@ -122,14 +122,10 @@ def _figure(name, values, statistic, minimum=None, maximum=None):
     interval = (value, value)
     if len(values) > 1:
         drawn = bootstrap(
-            (number,),
-            lambda index: statistic(values[index]),
-            confidence_level=INFERENCE.confidence,
-            n_resamples=1000,
-            method="percentile",
-            vectorized=False,
-            random_state=np.random.default_rng(0),
-        )
+            (number,), lambda index: statistic(values[index]),
+            confidence_level=INFERENCE.confidence, n_resamples=1000, method="percentile",
+            vectorized=False, random_state=np.random.default_rng(0),
+        )  # fmt: skip
         interval = drawn.confidence_interval
     return _row(name, len(values), value, interval, minimum, maximum)
 

@@ -80,16 +80,10 @@ def neighbours(number: int, size: int, parameters: int) -> Neighbours:
         Of signals, of states, and of the trend.
     """
     return Neighbours(
-        np.full(number, -np.inf),
-        np.full(number, np.inf),
-        np.zeros((number, 3, 3)),
-        np.zeros((number, 3, 3)),
-        np.zeros((number, 3, 3)),
-        np.zeros((number, 6)),
-        np.zeros(number),
-        np.zeros((2 * size, parameters + 1)),
-        np.zeros((2 * size, 2 * size)),
-    )
+        np.full(number, -np.inf), np.full(number, np.inf), np.zeros((number, 3, 3)),
+        np.zeros((number, 3, 3)), np.zeros((number, 3, 3)), np.zeros((number, 6)), np.zeros(number),
+        np.zeros((2 * size, parameters + 1)), np.zeros((2 * size, 2 * size)),
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

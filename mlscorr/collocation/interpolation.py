@@ -208,15 +208,10 @@ def predictor_by(
             part = slice(i, i + CHUNK)
             blocks = [np.zeros((len(gps_time[part]), r, 0)), *(m[part] for m in mixings)]
             epochs = Epochs(
-                np.ascontiguousarray(gps_time[part]),
-                np.ascontiguousarray(clocks[part]),
-                np.ascontiguousarray(design[part], dtype=float),
-                np.concatenate(blocks, axis=2),
-                trend,
-                root,
-                mean[part],
-                covariance[part],
-            )
+                np.ascontiguousarray(gps_time[part]), np.ascontiguousarray(clocks[part]),
+                np.ascontiguousarray(design[part], dtype=float), np.concatenate(blocks, axis=2),
+                trend, root, mean[part], covariance[part],
+            )  # fmt: skip
             fill(epochs)
         return (mean,) if trend_root is None else (mean, covariance)
 

@@ -239,12 +239,8 @@ def solve_trend(
     determinants -= 2 * np.log(believed.sum(axis=1)).sum()
     log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
     return Collocation(
-        solver=solver,
-        misclosure=misclosure,
-        design=design,
-        trend=trend,
-        trend_root=root,
+        solver=solver, misclosure=misclosure, design=design, trend=trend, trend_root=root,
         log_likelihood=float(log_likelihood),
         sigma0=float(np.sqrt(squares / redundancy)) if redundancy else float("nan"),
         believed=believed,
-    )
+    )  # fmt: skip

@@ -155,13 +155,9 @@ def move_integers(
             continue
         weight = (gps_time[p] + constant - epochs[i]) / (epochs[i + 1] - epochs[i])
         ex, ey, ez = _increment(
-            xs[p] * scale[0] + offset[0],
-            ys[p] * scale[1] + offset[1],
-            zs[p] * scale[2] + offset[2],
-            weight,
-            table[i],
-            table[i + 1],
-        )
+            xs[p] * scale[0] + offset[0], ys[p] * scale[1] + offset[1],
+            zs[p] * scale[2] + offset[2], weight, table[i], table[i + 1],
+        )  # fmt: skip
         x = xs[p] + np.rint(ex / scale[0])
         y = ys[p] + np.rint(ey / scale[1])
         z = zs[p] + np.rint(ez / scale[2])

@@ -129,15 +129,9 @@ class Correction(Summary):
         increments = np.zeros((len(gps_time), 3))
         inside = np.zeros(len(gps_time), dtype=bool)
         fill_increments(
-            np.ascontiguousarray(gps_time, dtype=float),
-            np.ascontiguousarray(xyz - self.origin),
-            self.recorded.gps_time,
-            self._step,
-            self.is_gap,
-            self.table,
-            increments,
-            inside,
-        )
+            np.ascontiguousarray(gps_time, dtype=float), np.ascontiguousarray(xyz - self.origin),
+            self.recorded.gps_time, self._step, self.is_gap, self.table, increments, inside,
+        )  # fmt: skip
         return increments, inside
 
     def apply(self, cloud: PointCloud) -> PointCloud:
@@ -181,16 +175,10 @@ class Correction(Summary):
         """
         require_times(len(xyz[0]), len(gps_time))
         outside, overflow = move_integers(
-            *xyz,
-            np.asarray(scale, dtype=float),
-            np.asarray(offset, dtype=float) - self.origin,
-            gps_time,
-            float(time_constant),
-            self.recorded.gps_time,
-            self._step,
-            self.is_gap,
+            *xyz, np.asarray(scale, dtype=float), np.asarray(offset, dtype=float) - self.origin,
+            gps_time, float(time_constant), self.recorded.gps_time, self._step, self.is_gap,
             self.table,
-        )
+        )  # fmt: skip
         if overflow:
             raise ValueError(
                 f"{overflow} corrected points do not fit the file's scale {scale} m and offset "

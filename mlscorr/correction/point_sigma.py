@@ -77,13 +77,9 @@ class PointSigma:
         elements = np.stack([covariance[:, i, j] for i, j in ELEMENTS], axis=1)
         table = np.hstack([place, place + arm, elements])
         return cls(
-            corrected.gps_time,
-            correction.is_gap,
-            correction.origin,
-            table.astype(np.float32),
-            float(scanner.range_noise),
-            float(scanner.angle_noise),
-        )
+            corrected.gps_time, correction.is_gap, correction.origin, table.astype(np.float32),
+            float(scanner.range_noise), float(scanner.angle_noise),
+        )  # fmt: skip
 
     def at(self, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
         """One sigma (n, 3) of corrected points (n, 3), NaN outside the trajectory. Units: m.

@@ -26,13 +26,9 @@ class BeamDivergence(Effect):
     sentence: ClassVar = "The laser beam is {size} wider than stated."
     remedy: ClassVar = "Ask the maker for the width of the scanner's beam."
     magnitude: float = quantity(
-        "mrad",
-        20.0,
-        "a footprint of 20 cm at 10 m is no laser scanner's",
-        typical=0.35,
-        source="RIEGL VQ-250 data sheet: 0.35 mrad",
-        least=0.0,
-    )
+        "mrad", 20.0, "a footprint of 20 cm at 10 m is no laser scanner's", typical=0.35,
+        source="RIEGL VQ-250 data sheet: 0.35 mrad", least=0.0,
+    )  # fmt: skip
 
     def _change(self, value, reference, rng):
         return value + 1e-3 * self.magnitude
@@ -83,12 +79,9 @@ class RangeBias(Effect):
     remedy: ClassVar = "Have the scanner's zero range checked on a base line."
     sides: ClassVar = ("long", "short")
     magnitude: float = quantity(
-        "m",
-        1.0,
-        "the manufacturer's calibration can't miss a metre",
-        typical=0.010,
+        "m", 1.0, "the manufacturer's calibration can't miss a metre", typical=0.010,
         source="RIEGL VQ-250 data sheet: accuracy 10 mm",
-    )
+    )  # fmt: skip
 
     def _error(self, value, reference, rng):
         return self.magnitude
@@ -161,12 +154,9 @@ class IncidenceBias(Effect):
     remedy: ClassVar = "Check ranges at grazing incidence against a known plane."
     sides: ClassVar = ("long", "short")
     magnitude: float = quantity(
-        "m",
-        0.1,
-        "it acts ninefold at grazing incidence, and would show to the eye",
-        typical=0.003,
+        "m", 0.1, "it acts ninefold at grazing incidence, and would show to the eye", typical=0.003,
         source="estimate: millimetres, as the noise that Soudarissanane et al. 2009 find at 60 deg",
-    )
+    )  # fmt: skip
 
     def _error(self, value, reference, rng):
         return self.magnitude * (1.0 / np.maximum(value.incidence, SETTINGS.grazing_cosine) - 1.0)
@@ -194,13 +184,9 @@ class RangeNoise(Effect):
         "checked."
     )
     magnitude: float = quantity(
-        "m",
-        1.0,
-        "no surveying scanner is as noisy",
-        typical=0.005,
-        source="RIEGL VQ-250 data sheet: precision 5 mm",
-        least=0.0,
-    )
+        "m", 1.0, "no surveying scanner is as noisy", typical=0.005,
+        source="RIEGL VQ-250 data sheet: precision 5 mm", least=0.0,
+    )  # fmt: skip
 
     def _error(self, value, reference, rng):
         return self.magnitude * rng.standard_normal(len(value))
@@ -223,13 +209,9 @@ class Dropout(Effect):
     sentence: ClassVar = "{size} of the pulses that should come back are lost."
     remedy: ClassVar = "Look for wet or dark surfaces, or a dirty window of the scanner."
     magnitude: float = quantity(
-        "ratio",
-        0.99,
-        "nothing to work with would be left",
-        typical=0.05,
-        source="estimate: dark or wet surfaces return nothing for one pulse in twenty",
-        least=0.0,
-    )
+        "ratio", 0.99, "nothing to work with would be left", typical=0.05,
+        source="estimate: dark or wet surfaces return nothing for one pulse in twenty", least=0.0,
+    )  # fmt: skip
 
     def _change(self, value, reference, rng):
         return replace(value, kept=value.kept & (rng.random(len(value)) >= self.magnitude))

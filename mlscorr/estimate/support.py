@@ -210,10 +210,6 @@ def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakSt
         if codes[first] != HELD and end - first > 1:
             rows = slice(first, end)
             yield WeakStretch(
-                float(time[first]),
-                float(time[end - 1]),
-                float(way[first : end - 1].sum()),
-                float(size[rows].max()),
-                REASONS[codes[first]],
-                float(way[:first].sum()),
-            )
+                float(time[first]), float(time[end - 1]), float(way[first : end - 1].sum()),
+                float(size[rows].max()), REASONS[codes[first]], float(way[:first].sum()),
+            )  # fmt: skip

@@ -98,15 +98,11 @@ class TieEquations:
         """
         views = np.arange(2 * len(self)).reshape(-1, 2)[rows].ravel()
         return replace(
-            self,
-            gps_time=self.gps_time[rows],
-            misclosure=self.misclosure[rows],
-            variance=self.variance[rows],
-            partials=self.partials[rows],
-            stated=self.stated.at(views),
-            weight=self.weight[rows],
+            self, gps_time=self.gps_time[rows], misclosure=self.misclosure[rows],
+            variance=self.variance[rows], partials=self.partials[rows],
+            stated=self.stated.at(views), weight=self.weight[rows],
             mounting=None if self.mounting is None else self.mounting[rows],
-        )
+        )  # fmt: skip
 
     def with_starts(self, starts: np.ndarray) -> TieEquations:
         """The same with drift that grows from other times on.

@@ -53,14 +53,9 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
         return replace(calibration, ties=residuals)
     used = calibration.used & ~np.isin(matched.name, [o.name for o in screening.outliers])
     changed = calibration_by(
-        calibration.trajectory,
-        calibration.recorded,
-        predictions.equations,
-        screening,
-        (correction, calibration.ls),
-        used,
-        calibration.notes,
-    )
+        calibration.trajectory, calibration.recorded, predictions.equations, screening,
+        (correction, calibration.ls), used, calibration.notes,
+    )  # fmt: skip
     residuals = TieResiduals.of(ties, is_used, changed.corrections_with_drift)
     return replace(changed, ties=residuals)
 

@@ -90,15 +90,11 @@ def open_ply(path: Path) -> CloudSource:
     used = {*map(vertices.names.get, AXES), time, intensity, *vertices.colours}
     colour = vertices.kind[vertices.colours[0]] if vertices.colours else np.dtype("u1")
     return CloudSource(
-        path,
-        vertices.points,
-        f"with times by {shown(time)}",
+        path, vertices.points, f"with times by {shown(time)}",
         tuple(shown(name) for name in names if name not in used),
-        float(np.iinfo(colour).max) if colour.kind in "iu" else 1.0,
-        None,
-        partial(_intensities, vertices, intensity),
-        partial(_blocks, vertices, time, intensity),
-    )
+        float(np.iinfo(colour).max) if colour.kind in "iu" else 1.0, None,
+        partial(_intensities, vertices, intensity), partial(_blocks, vertices, time, intensity),
+    )  # fmt: skip
 
 
 def _cut_off(path, there, announced):

@@ -129,19 +129,15 @@ def build_chain(
     ahead = pose.attitude.apply([0.0, 1.0, 0.0])[:, :2]
     odds = (1.0 - SETTINGS.visible_share) / SETTINGS.visible_share
     return Chain(
-        gps_time=observations.gps_time,
-        pass_number=observations.pass_number,
-        forward=ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12),
-        gain=gain,
+        gps_time=observations.gps_time, pass_number=observations.pass_number,
+        forward=ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12), gain=gain,
         noise=known + (SETTINGS.rough_share * gain) ** 2 + (unstated / 2) ** 2,
         otherwise=np.log(_lookalikes(observations, pose) * odds),
         rate=np.sqrt(3.0) / (share[:, 0, 0] * pos.correlation_time),
-        segment=stated.history.segment(stated.gps_time),
-        pairs=pairs,
+        segment=stated.history.segment(stated.gps_time), pairs=pairs,
         pair_variance=control.sigma[pairs.control] ** 2,
-        moved_share=np.full(len(pairs.control), SETTINGS.moved_share),
-        settings=settings_tuple(),
-    )
+        moved_share=np.full(len(pairs.control), SETTINGS.moved_share), settings=settings_tuple(),
+    )  # fmt: skip
 
 
 def _beliefs():

@@ -76,14 +76,10 @@ def compare(
         if correction is not None:
             corrections[method.name] = correction
     return ComparedSurvey(
-        survey=survey,
-        matched_control=control,
-        matched_check=check,
-        rows=tuple(rows),
-        corrections=corrections,
-        groups=len(groups),
+        survey=survey, matched_control=control, matched_check=check, rows=tuple(rows),
+        corrections=corrections, groups=len(groups),
         missing=unseen_rows(survey, finding.matches.refusals, candidates, finding.scanned),
-    )
+    )  # fmt: skip
 
 
 def _row(method, survey, control, check, candidates):

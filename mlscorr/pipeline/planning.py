@@ -57,15 +57,9 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
     noise = {sign.name: _NOISE for sign in signs if sign.is_noise}
     best = {addition.survey: addition for addition in sorted(data, key=lambda a: -(a.after or 0.0))}
     return PlannedSurvey(
-        survey,
-        tuple(library),
-        rows,
-        compared,
-        event_sizes(observed, signs),
-        tuple(best.values()),
-        left_out | noise,
-        _accuracy(survey, rows),
-    )
+        survey, tuple(library), rows, compared, event_sizes(observed, signs), tuple(best.values()),
+        left_out | noise, _accuracy(survey, rows),
+    )  # fmt: skip
 
 
 def _accuracy(survey, rows):
@@ -75,16 +69,10 @@ def _accuracy(survey, rows):
         return None
     points = survey.surveyed[rows.survey_item[first]]
     observed = TargetObservations(
-        points.name,
-        rows.covariates["pass"][first].astype(int),
-        rows.gps_time[first],
-        points.position,
-        rows.noise[first, None, None] * np.eye(3),
-        points.normal,
-        points.kind,
-        points.size,
-        rows.points[first],
-    )
+        points.name, rows.covariates["pass"][first].astype(int), rows.gps_time[first],
+        points.position, rows.noise[first, None, None] * np.eye(3), points.normal, points.kind,
+        points.size, rows.points[first],
+    )  # fmt: skip
     return predict_accuracy(survey.trajectory, Matched(observed, points), survey.pos)
 
 

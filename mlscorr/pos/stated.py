@@ -169,11 +169,6 @@ def stated_sigma(
     if trajectory.position_sigma is not None:
         largest = trajectory.position_sigma.max(axis=0)
     return StatedSigma(
-        gps_time=pose.gps_time,
-        position=position,
-        angles=angles,
-        rotation=pose.attitude,
-        largest=largest,
-        history=history,
-        starts=history.starts if starts is None else starts,
-    )
+        gps_time=pose.gps_time, position=position, angles=angles, rotation=pose.attitude,
+        largest=largest, history=history, starts=history.starts if starts is None else starts,
+    )  # fmt: skip

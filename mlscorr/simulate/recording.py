@@ -145,13 +145,9 @@ def surveyed_targets(
     horizontal, vertical = scenario.survey_sigma
     sigma = np.tile([horizontal, horizontal, vertical], (n, 1))
     return ControlPoints(
-        tuple(f"T{i + 1:02d}" for i in range(n)),
-        centre + sigma * rng.standard_normal((n, 3)),
-        sigma,
-        targets.kind,
-        np.full(n, scenario.size),
-        targets.normal,
-    )
+        tuple(f"T{i + 1:02d}" for i in range(n)), centre + sigma * rng.standard_normal((n, 3)),
+        sigma, targets.kind, np.full(n, scenario.size), targets.normal,
+    )  # fmt: skip
 
 
 def spread_checks(count: int, scenario: TargetScenario) -> np.ndarray:

@@ -155,16 +155,11 @@ class Ties(Columns):
             place = place + way
             gps_time = features.time_beside(pairs, way)
         return cls(
-            gps_time=gps_time,
-            place=place,
-            direction=direction,
+            gps_time=gps_time, place=place, direction=direction,
             misclosure=np.einsum("ni,ni->n", direction, place[:, 1] - place[:, 0]),
-            variance=variance,
-            kind=features.kind[pairs[:, 0]],
-            pass_number=features.pass_number[pairs],
-            scanner=features.scanner[pairs],
-            feature=pairs,
-        )
+            variance=variance, kind=features.kind[pairs[:, 0]],
+            pass_number=features.pass_number[pairs], scanner=features.scanner[pairs], feature=pairs,
+        )  # fmt: skip
 
     @property
     def sigma(self) -> np.ndarray:

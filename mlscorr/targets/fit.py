@@ -200,12 +200,8 @@ def _as_target(echoes, fit, origin):
     centre = vars(centre_of(echoes, plane, outline, met))
     size, sigma = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)
     return FittedTarget(
-        **centre | {"position": centre["position"] + origin},
-        kind=fit.kind,
-        size=float(size),
-        size_sigma=float(sigma),
-        points=len(met),
-        score=fit.assessment.score,
+        **centre | {"position": centre["position"] + origin}, kind=fit.kind, size=float(size),
+        size_sigma=float(sigma), points=len(met), score=fit.assessment.score,
         cloud=PointCloud(echoes.xyz[met] + origin, echoes.gps_time[met], intensity),
         view=TargetView(points, state, outline, plane.axes[:2]),
-    )
+    )  # fmt: skip

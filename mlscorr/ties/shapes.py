@@ -108,18 +108,12 @@ def find_shapes(
     shapes = Shapes.concatenate([planes, poles])
     kind = np.repeat(["plane", "pole"], [len(planes), len(poles)])
     return TieFeatures(
-        pass_number=group[rows],
-        scanner=group[rows],
-        kind=kind,
-        gps_time=time[rows],
-        centre=middle[rows] + (local[rows] + shapes.shift),
-        direction=shapes.direction,
-        variance=shapes.variance,
-        tilt=shapes.tilt,
-        extent=shapes.extent,
+        pass_number=group[rows], scanner=group[rows], kind=kind, gps_time=time[rows],
+        centre=middle[rows] + (local[rows] + shapes.shift), direction=shapes.direction,
+        variance=shapes.variance, tilt=shapes.tilt, extent=shapes.extent,
         points=count[rows].astype(int),
         sweep=_sweep(moments[rows], values[rows], axes[rows], kind == "pole"),
-    )
+    )  # fmt: skip
 
 
 def _sweep(moments, values, axes, is_pole):

@@ -159,21 +159,15 @@ def _beams(survey, rows, platform, origin, patches, targets):
         on = np.isin(item, rows.item[rows.channel == "surface"])[view]
         facet[on] = reference.cast(start[on], direction[on])
     return Beams(
-        pulses=pulses,
-        view=view,
-        item=item,
-        gps_time=rows.gps_time[row[np.searchsorted(known, item)]],
-        second=second,
+        pulses=pulses, view=view, item=item,
+        gps_time=rows.gps_time[row[np.searchsorted(known, item)]], second=second,
         target=np.append(np.full(len(patches), -1), np.arange(len(targets))).astype(int),
-        point=point,
-        normal=normal,
+        point=point, normal=normal,
         boards=scan.Boards.concatenate([about.board for _, about in targets]),
         beyond=np.concatenate([nothing, *(about.beyond for _, about in targets)]),
         behind=np.concatenate([nothing, *(about.behind for _, about in targets)]),
-        reference=reference,
-        facet=facet,
-        origin=origin,
-    )
+        reference=reference, facet=facet, origin=origin,
+    )  # fmt: skip
 
 
 def _joined(platform, origin, patches, targets):

@@ -120,12 +120,8 @@ def board_of(
         v, cos, sin = np.cross(normal, u), 1.0, 0.0
     edges = np.array([cos * u + sin * v, cos * v - sin * u])
     return Boards(
-        centre=(target.position - origin)[None],
-        axes=np.vstack([edges, np.cross(*edges)])[None],
-        form=np.array([FORMS.index(target.kind)]),
-        size=np.array([target.size]),
-        inner=np.array([outline.inner]),
-        bright=np.array([bright]),
-        dark=np.array([dark]),
+        centre=(target.position - origin)[None], axes=np.vstack([edges, np.cross(*edges)])[None],
+        form=np.array([FORMS.index(target.kind)]), size=np.array([target.size]),
+        inner=np.array([outline.inner]), bright=np.array([bright]), dark=np.array([dark]),
         speckle=np.array([speckle]),
-    )
+    )  # fmt: skip

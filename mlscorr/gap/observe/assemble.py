@@ -79,15 +79,10 @@ def sample_pulses(
     beam = xyz - scanner_origin(survey, gps_time)
     beam /= np.linalg.norm(beam, axis=1, keepdims=True)
     return SamplePulses(
-        item=item,
-        weight=weight,
-        gps_time=gps_time,
-        xyz=xyz,
-        scanner_xyz=to_scanner_or_nan(survey, xyz, gps_time),
-        intensity=intensity.astype(float),
-        normal=normal,
-        incidence=np.abs(np.einsum("ki,ki->k", beam, normal)),
-    )
+        item=item, weight=weight, gps_time=gps_time, xyz=xyz,
+        scanner_xyz=to_scanner_or_nan(survey, xyz, gps_time), intensity=intensity.astype(float),
+        normal=normal, incidence=np.abs(np.einsum("ki,ki->k", beam, normal)),
+    )  # fmt: skip
 
 
 def patch_pulses(
@@ -106,11 +101,7 @@ def patch_pulses(
     """
     p, samples = patches.time.shape
     return sample_pulses(
-        survey,
-        np.repeat(item, samples),
-        np.full(p * samples, sign / samples),
-        patches.xyz.reshape(-1, 3),
-        patches.time.ravel(),
-        patches.intensity.ravel(),
+        survey, np.repeat(item, samples), np.full(p * samples, sign / samples),
+        patches.xyz.reshape(-1, 3), patches.time.ravel(), patches.intensity.ravel(),
         np.repeat(patches.normal, samples, axis=0),
-    )
+    )  # fmt: skip

@@ -134,20 +134,13 @@ def target_rows(survey: Survey, matched: TargetObservations, candidates: Candida
     item, near = np.arange(len(matched)), _near(matched, candidates)
     pulses = [_target_pulses(survey, matched, i, candidates.cloud[near[i]]) for i in item]
     return assemble(
-        survey,
-        "target",
-        np.repeat(item, 3),
-        np.repeat(matched.gps_time, 3),
-        np.repeat(matched.position, 3, axis=0),
-        axes.reshape(-1, 3),
-        residual.ravel(),
-        variance.ravel(),
-        np.repeat(matched.points, 3),
-        SamplePulses.concatenate([_no_pulses(), *pulses]),
-        np.repeat(matched.pass_number, 3),
+        survey, "target", np.repeat(item, 3), np.repeat(matched.gps_time, 3),
+        np.repeat(matched.position, 3, axis=0), axes.reshape(-1, 3), residual.ravel(),
+        variance.ravel(), np.repeat(matched.points, 3),
+        SamplePulses.concatenate([_no_pulses(), *pulses]), np.repeat(matched.pass_number, 3),
         survey_item=np.repeat(survey.surveyed.rows(matched.name), 3),
         survey_factor=factor.reshape(-1, 3),
-    )
+    )  # fmt: skip
 
 
 def _axes(covariance):
@@ -253,16 +246,10 @@ def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = N
     first_noise = [] if surface is None else surface.noise
     points = [patches.points[on], patches.points[flat], patches.fired[counted]]
     return assemble(
-        survey,
-        channel,
-        item,
-        patches.gps_time[item],
-        patches.centre[item],
-        direction,
+        survey, channel, item, patches.gps_time[item], patches.centre[item], direction,
         np.concatenate([first, rough[flat], lost[counted]]),
         np.concatenate([first_noise, rough_noise[flat], lost_noise[counted]]),
-        np.concatenate(points),
-        patch_pulses(survey, patches, np.arange(p)),
+        np.concatenate(points), patch_pulses(survey, patches, np.arange(p)),
         patches.pass_number[item],
         believed=np.concatenate([np.full(len(on), np.nan), believed[flat], np.ones(len(counted))]),
-    )
+    )  # fmt: skip

@@ -243,15 +243,10 @@ def background(rows: Rows, survey: Survey) -> Background:
     partials = np.vstack([rows.partials[first], rows.partials_2[second]])
     sigma = stated_sigma(survey.trajectory, survey.pos, gps_time)
     return Background(
-        row,
-        gps_time,
-        partials[:, :3] * sigma.position,
-        np.einsum("li,lij->lj", partials[:, 3:], sigma.attitude),
-        survey.pos.correlation_time,
-        survey.pos.windows,
-        sigma.clock,
-        sigma.history.raised(gps_time),
-    )
+        row, gps_time, partials[:, :3] * sigma.position,
+        np.einsum("li,lij->lj", partials[:, 3:], sigma.attitude), survey.pos.correlation_time,
+        survey.pos.windows, sigma.clock, sigma.history.raised(gps_time),
+    )  # fmt: skip
 
 
 def reference_of(survey: Survey) -> Reference:

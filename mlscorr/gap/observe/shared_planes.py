@@ -48,19 +48,10 @@ def shared_rows(
     item = np.arange(len(kept))
     pulses = [patch_pulses(survey, first, item), patch_pulses(survey, second, item, -1.0)]
     return assemble(
-        survey,
-        "shared",
-        item,
-        first.gps_time,
-        (first.centre + second.centre) / 2,
-        normal,
-        residual,
-        plane_noise(first, second, apart**2),
-        np.minimum(first.points, second.points),
-        SamplePulses.concatenate(pulses),
-        first.pass_number,
-        gps_time_2=second.gps_time,
-    )
+        survey, "shared", item, first.gps_time, (first.centre + second.centre) / 2, normal,
+        residual, plane_noise(first, second, apart**2), np.minimum(first.points, second.points),
+        SamplePulses.concatenate(pulses), first.pass_number, gps_time_2=second.gps_time,
+    )  # fmt: skip
 
 
 def compare_planes(first: Patches, second: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -151,15 +151,10 @@ def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
     scanners = _scanners(surveys)
     mountings = {digest(survey.mounting) for survey in surveys}
     joint = replace(
-        surveys[0],
-        name=", ".join(names),
-        clouds=(),
-        trajectory=trajectory,
-        mounting=surveys[0].mounting if len(mountings) == 1 else None,
-        notes=tuple(notes),
-        inputs=(),
-        scanners=scanners,
-    )
+        surveys[0], name=", ".join(names), clouds=(), trajectory=trajectory,
+        mounting=surveys[0].mounting if len(mountings) == 1 else None, notes=tuple(notes),
+        inputs=(), scanners=scanners,
+    )  # fmt: skip
     return JointDrives(tuple(drives), shifts, joint)
 
 

@@ -45,15 +45,10 @@ def draw_pair(
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         np.savez(
-            folder / "job.npz",
-            before_xyz=canvases[0].points,
-            after_xyz=canvases[1].points,
-            before_rgb=colours[0][canvases[0].drawn],
-            after_rgb=colours[1][canvases[1].drawn],
-            point_size=point_size,
-            reference=str(reference or ""),
-            **vars(canvases[0].camera),
-        )
+            folder / "job.npz", before_xyz=canvases[0].points, after_xyz=canvases[1].points,
+            before_rgb=colours[0][canvases[0].drawn], after_rgb=colours[1][canvases[1].drawn],
+            point_size=point_size, reference=str(reference or ""), **vars(canvases[0].camera),
+        )  # fmt: skip
         _run(folder, timeout)
         return tuple(np.load(folder / f"{side}.npy")[..., :3] for side in ("before", "after"))
 

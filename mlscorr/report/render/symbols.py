@@ -86,16 +86,11 @@ def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
     for name, direction in arrows.items():
         color = "#777777" if name in ("E", "up") else "black"
         axes.annotate(
-            name,
-            xy=middle,
-            xytext=middle + 1.35 * arm * direction * [1, -1],
-            ha="center",
-            va="center",
-            color=color,
-            fontsize=letter(axes, 0.8),
+            name, xy=middle, xytext=middle + 1.35 * arm * direction * [1, -1], ha="center",
+            va="center", color=color, fontsize=letter(axes, 0.8),
             fontweight="normal" if name in ("E", "up") else "bold",
             arrowprops={**line, "color": color},
-        )
+        )  # fmt: skip
 
 
 def legend(
@@ -119,15 +114,11 @@ def legend(
     handles = list(_handles(view))
     if handles:
         figure.legend(
-            handles=handles,
-            loc="center left" if has_scale else "lower left",
+            handles=handles, loc="center left" if has_scale else "lower left",
             bbox_to_anchor=(0.5, foot / 2 + 0.012) if has_scale else (gap, 0.01),
-            ncols=len(handles),
-            frameon=False,
-            fontsize=letter(figure, 0.85),
-            handletextpad=0.5,
+            ncols=len(handles), frameon=False, fontsize=letter(figure, 0.85), handletextpad=0.5,
             columnspacing=1.4,
-        )
+        )  # fmt: skip
 
 
 def _colour_bar(figure, colour, limits, place):

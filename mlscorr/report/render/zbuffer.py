@@ -51,14 +51,9 @@ class Canvas:
         camera = self.camera
         _draw(
             np.ascontiguousarray(xyz, dtype=float),
-            np.ascontiguousarray(value, dtype=np.float32).view(np.uint32),
-            camera.focus,
-            camera.axes,
-            camera.scale,
-            camera.distance,
-            self.half_depth,
-            self.pixels,
-        )
+            np.ascontiguousarray(value, dtype=np.float32).view(np.uint32), camera.focus,
+            camera.axes, camera.scale, camera.distance, self.half_depth, self.pixels,
+        )  # fmt: skip
 
     @property
     def radius(self) -> float:

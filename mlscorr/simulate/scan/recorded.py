@@ -89,10 +89,6 @@ def recorded_pulses(
     away = np.sqrt(x**2 + y**2 + z**2)
     slant = np.einsum("ni,ni->n", sight, np.broadcast_to(normal, sight.shape)) / away
     return RecordedPulses(
-        gps_time=time,
-        angle=np.arctan2(y, x),
-        elevation=np.arcsin(np.clip(z / away, -1.0, 1.0)),
-        range=away,
-        intensity=cloud.intensity.astype(float),
-        incidence=np.abs(slant),
-    )
+        gps_time=time, angle=np.arctan2(y, x), elevation=np.arcsin(np.clip(z / away, -1.0, 1.0)),
+        range=away, intensity=cloud.intensity.astype(float), incidence=np.abs(slant),
+    )  # fmt: skip

@@ -200,14 +200,8 @@ def _measure(rays, hits, noise):
         return np.append(values, values[hits.pulse]) if len(hits.pulse) else values
 
     return Shots(
-        gps_time=all_rows(rays.gps_time),
-        angle=all_rows(noise.angle(rays.angle)),
-        elevation=all_rows(rays.elevation),
-        range=noise.range(hits),
-        intensity=noise.intensity(hits),
-        incidence=hits.incidence,
-        point=hits.point,
-        triangle=hits.triangle,
-        kept=noise.kept(hits),
-        pulse=hits.pulse,
-    )
+        gps_time=all_rows(rays.gps_time), angle=all_rows(noise.angle(rays.angle)),
+        elevation=all_rows(rays.elevation), range=noise.range(hits),
+        intensity=noise.intensity(hits), incidence=hits.incidence, point=hits.point,
+        triangle=hits.triangle, kept=noise.kept(hits), pulse=hits.pulse,
+    )  # fmt: skip
