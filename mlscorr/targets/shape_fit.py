@@ -108,8 +108,8 @@ def exact_fit(echoes: Echoes, fit: ShapeFit, scanner: Scanner) -> ShapeFit | Non
     if 2 * fit.on_target.sum() < SETTINGS.smallest_count:
         return None
     fit = _refined(echoes, fit)
-    if not fit.on_target.any():
-        return None
+    if not fit.on_target.any() or _sight(echoes, fit)[1] < SETTINGS.grazing:
+        return None  # or a line of points alone, whose plane may hold the beams
     seed, kind, ring = fit.seed, fit.kind, fit.outline.inner > 0
     points, state, rows = fit.beams
     blur, footprint = _blur(echoes, fit, scanner)
@@ -193,6 +193,13 @@ def _with_threshold(intensity, beams, bright, outside, seed):
     return beams, replace(seed, threshold=float(threshold))
 
 
+def _sight(echoes, fit):
+    """Distance (m) of what was seen on the target, and the cosine of the angle of incidence."""
+    sight = echoes.sight(fit.beams[2][fit.on_target]).mean(axis=0)
+    distance = np.linalg.norm(sight)
+    return distance, abs(sight @ fit.seed.plane.axes[2]) / distance
+
+
 def _blur(echoes, fit, scanner):
     """One sigma (m) of a beam's place across the outline, and that of the outline's size.
 
@@ -202,9 +209,7 @@ def _blur(echoes, fit, scanner):
     """
     _, state, rows = fit.beams
     on_target = fit.on_target
-    sight = echoes.sight(rows[on_target]).mean(axis=0)
-    distance = np.linalg.norm(sight)
-    cosine = abs(sight @ fit.seed.plane.axes[2]) / distance
+    distance, cosine = _sight(echoes, fit)
     slant = np.sqrt((1 + 1 / cosine**2) / 2)  # both ways in the plane, on average
     beam = distance * SETTINGS.divergence / 4 * slant
     intensity = echoes.intensity[rows[on_target & (state == BRIGHT)]].astype(float)

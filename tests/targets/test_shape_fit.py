@@ -128,3 +128,15 @@ def test_intensity_counts_by_its_ratios_alone():
     dim = replace(echoes, intensity=echoes.intensity / 256.0)
     fits = [exact_fit(e, best_rough(e, "circle"), SCANNER) for e in (echoes, dim)]
     np.testing.assert_allclose(fits[0].position, fits[1].position, atol=1e-6)
+
+
+def test_points_of_one_line_are_no_target():
+    "Bright points of a single scan line hold no plane that beams cross: nothing is fitted"
+    echoes = wall(lambda u, v: np.hypot(u, v) < 0.3, np.random.default_rng(3))
+    fit = best_rough(echoes, "circle")
+    points, state, rows = fit.beams
+    level = np.where(rows < 0, np.inf, np.abs(echoes.xyz[rows, 2]))
+    lost = (state == BRIGHT) & (level > level.min() + 1e-9)
+    line = replace(fit, beams=(points, np.where(lost, DARK, state), rows))
+    assert line.on_target.sum() > SETTINGS.smallest_count / 2
+    assert exact_fit(echoes, line, SCANNER) is None
