@@ -122,12 +122,16 @@ def _history(trajectory):
         return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, held)
     restarts = np.sort(np.append(restarts, _falls(trajectory, held, restarts)))
     excess = np.maximum(trajectory.position_sigma**2 - held**2, 0.0).sum(axis=1)
-    change = np.diff((excess > held @ held).astype(int), prepend=0)
+    is_raised = excess > held @ held
+    change = np.diff(is_raised.astype(int), prepend=0)
     rises, sinks = np.flatnonzero(change > 0), np.flatnonzero(change < 0)
     returns = _returns(trajectory, zip(rises, sinks, strict=False), restarts)
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
     first = np.append(time[rises], np.inf)[np.searchsorted(time[rises], edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
+    # where sigma(t) stays raised across an edge it doesn't rise: GNSS isn't back, or not fixed
+    across = np.searchsorted(time, [edges, edges + SETTINGS.fix_time]).clip(max=len(time) - 1)
+    starts = np.where(is_raised[across].all(axis=0), edges, starts)
     return DriftHistory(trajectory, steps, restarts, returns, starts, held)
 
 
@@ -168,4 +172,5 @@ def held_sigma(trajectory: Trajectory) -> np.ndarray:
     if sigma is None:
         return np.zeros(3)
     held = np.percentile(sigma, SETTINGS.held_percentile, axis=0)
-    return np.where(sigma.max(axis=0) <= SETTINGS.steady_ratio * held, 0.0, held)
+    is_steady = (sigma.max(axis=0) <= SETTINGS.steady_ratio * held).all()
+    return np.zeros(3) if is_steady else held

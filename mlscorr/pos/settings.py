@@ -14,6 +14,7 @@ class Settings:
     outage: float = 60.0  # s; for which data sheets of GNSS/INS state how far the position drifts
     smallest_step: float = 0.1  # m; two fixed RTK solutions of 2 cm per axis differ by less
     step_ratio: float = 10.0  # to the median of driven seconds' largest steps: updates, jerks
+    largest_jerk: float = 5.0  # m/s^3, of braking in town (ISO 15622); a step is beyond it
     step_duration: float = 0.4  # s; over which filters and resampling spread a fall-back
     whole_step: float = 0.9  # of the largest size; a span that shows less cuts the step
     fix_time: float = 10.0  # s; in which receivers fix ambiguities again, by their data sheets

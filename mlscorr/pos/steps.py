@@ -8,8 +8,6 @@ from mlscorr.pos.settings import SETTINGS
 from mlscorr.survey import Trajectory
 from mlscorr.survey.columns import Columns
 
-SECOND = 1.0  # s
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Steps(Columns):
@@ -40,8 +38,8 @@ def find_steps(trajectory: Trajectory) -> Steps:
     """Steps of the recorded position against the speed before and after them.
 
     Over three equal spans the middle one's way is half of both others', but for half the jerk
-    times the span cubed. What is far above the largest differences of all other seconds that the
-    vehicle drives in is a step.
+    times the span cubed. What is more than that, and far above the largest differences of all other
+    seconds that the vehicle drives in, is a step.
 
     Parameters
     ----------
@@ -90,7 +88,7 @@ def _length(row):
 
 def _is_near(row, other):
     """Whether two rows are within a second of each other."""
-    return row[0] < other[1] + SECOND and row[1] > other[0] - SECOND
+    return row[0] < other[1] + 1.0 and row[1] > other[0] - 1.0
 
 
 def _differences(gps_time, position, span):
@@ -103,13 +101,14 @@ def _differences(gps_time, position, span):
     size = ways[span:-span] - times[span:-span, None] * about
     length = np.linalg.norm(size, axis=1)
     start = gps_time[span : span + len(size)]
-    second = np.floor((start - gps_time[0]) / SECOND).astype(int)
+    second = np.floor(start - gps_time[0]).astype(int)
     # what stands tells of no motion
-    driven = second[np.linalg.norm(about, axis=1) > SETTINGS.smallest_step / SECOND]
+    driven = second[np.linalg.norm(about, axis=1) > SETTINGS.smallest_step]  # in a second
     largest = np.zeros(second[-1] + 1)
     np.maximum.at(largest, second, length)
     usual = np.median(largest[np.unique(driven)]) if len(driven) else 0.0
-    limit = max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual)
+    jerk = SETTINGS.largest_jerk / 2 * times[span : span + len(size)] ** 3
+    limit = np.maximum(jerk, max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual))
     rows = np.flatnonzero((length > limit) & (length == largest[second]))
     # what the spans wholly before and after show is no step: filters and resampling ring beside one
     beside = np.pad(length, 2 * span, constant_values=usual)

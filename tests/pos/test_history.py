@@ -90,3 +90,22 @@ def test_a_history_is_worked_out_once_for_a_trajectory():
     history = drift_history(trajectory)
     assert drift_history(trajectory) is history
     assert drift_history(drive()) is not history
+
+
+def test_drift_goes_on_where_sigma_falls_and_stays_raised():
+    "From an outage back to a float solution of 0.5 m for 40 s: what is fixed last starts never"
+    floated = (TIME >= 120.0) & (TIME < 160.0)
+    history = drift_history(drive(0.02 + grown(3.0) + 0.48 * floated))
+    assert history.restarts == pytest.approx([START + 120.0, START + 160.0], abs=0.11)
+    assert history.starts[1] == pytest.approx(history.restarts[0])
+    assert np.isinf(history.starts[2])
+
+
+def test_heights_that_vary_less_are_held_like_the_rest():
+    "Sigma of the plan grows tenfold in an outage, of the height by half: all three are held"
+    sigma = np.column_stack([0.02 + grown(0.2), 0.02 + grown(0.2), 0.04 + grown(0.02)])
+    trajectory = Trajectory(START + TIME, CORNER + np.outer(TIME, [0.0, 10.0, 0.0]),
+                            Rotation.identity(len(TIME)), sigma)  # fmt: skip
+    stated = stated_sigma(trajectory, Pos())
+    assert stated.held == pytest.approx([0.02, 0.02, 0.04])  # m
+    assert stated.gnss[0] == pytest.approx([0.02, 0.02, 0.04])

@@ -85,3 +85,17 @@ def test_passes_are_looked_at_apart():
     time, path = city_drive(10.0)
     apart = np.where(time > 150.0, time + 500.0, time)
     assert len(find_steps(recorded(apart, path + np.where(time > 150.0, 300.0, 0.0)[:, None]))) == 0
+
+
+@pytest.mark.parametrize("rate", [1.0, 2.0, 10.0])
+def test_braking_and_turning_is_no_step_at_any_rate(rate):
+    "Each minute from 10 to 5 m/s in 4 s, a quarter turn in 6 s, and on: jerks of 1.5 m/s^3"
+    fine = np.arange(0.0, 400.0, 0.005)
+    within = fine % 60.0
+    speed = 10.0 - 5.0 * np.clip(np.minimum((within - 15.0) / 4.0, (31.0 - within) / 4.0), 0.0, 1.0)
+    turning = np.clip((within - 20.0) / 6.0, 0.0, 1.0)
+    heading = np.pi / 2 * (fine // 60.0 + turning - np.sin(2 * np.pi * turning) / (2 * np.pi))
+    way = speed[:, None] * np.column_stack([np.sin(heading), np.cos(heading), 0.0 * heading])
+    every = slice(None, None, round(200.0 / rate))
+    path = CORNER + 0.005 * np.cumsum(way, axis=0)
+    assert len(find_steps(recorded(fine[every], path[every]))) == 0
