@@ -86,7 +86,7 @@ def collocate(
     own = np.ascontiguousarray(noise.separate[order], dtype=float)
     filtered = filter_covariance(layout, layout.size, _steps(clocks), mixing, own)
     if np.isnan(filtered[2]).any():
-        raise ValueError(NOT_POSITIVE.format(n * r))
+        raise np.linalg.LinAlgError(NOT_POSITIVE.format(n * r))
     solver = MarkovSolver(order, gps_time, clocks, layout, mixing, *filtered, noise.common)
     design = design.reshape(n * r, design.shape[2])
     return solve_trend(solver, np.reshape(misclosure, -1), design, believed)

@@ -32,4 +32,4 @@ def polynomial_design(
     if not extrapolate:
         argument = np.clip(argument, -1, 1)
     basis = np.polynomial.legendre.legvander(argument, order)
-    return np.einsum("qi,jk->qjik", basis, np.eye(3)).reshape(len(basis), 3, -1)
+    return np.einsum("qi,jk->qjik", basis, np.eye(3)).reshape(len(basis), 3, 3 * (order + 1))

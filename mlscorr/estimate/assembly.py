@@ -30,23 +30,13 @@ def position_equations(
     prior : function of Equations
     """
     position, times = matched.observations.position, matched.gps_time
-    stated, noise = stated_sigma(trajectory, pos, times), _noise(matched)
-    steps = stated.history.steps
-    inside = (times[:, None] >= steps.before) & (times[:, None] <= steps.after)
-    for row, step in np.argwhere(inside):
-        noise.own[row] += np.outer(steps.size[step], steps.size[step])
+    stated = stated_sigma(trajectory, pos, times)
     return Equations(
-        names=np.array(matched.name),
-        gps_time=times,
-        misclosure=matched.misclosure,
-        noise=noise,
-        partials=pose_partials(trajectory, position, times),
-        stated=stated,
-        order=order,
-        prior=prior,
-        trajectory=trajectory,
-        pos=pos,
-    )
+        names=np.array(matched.name), gps_time=times, misclosure=matched.misclosure,
+        noise=_noise(matched, stated.history.steps),
+        partials=pose_partials(trajectory, position, times), stated=stated, order=order,
+        prior=prior, trajectory=trajectory, pos=pos,
+    )  # fmt: skip
 
 
 def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
@@ -98,18 +88,14 @@ def mounting_equations(
         equations,
         gps_time=times,
         misclosure=matched.misclosure,
-        noise=_noise(matched),
+        noise=_noise(matched, equations.stated.history.steps),
         partials=pose_partials(equations.trajectory, position, times),
         order=NO_TREND,
     )
     columns = partials_by_scanner(
-        mounting_partials,
-        equations.trajectory,
-        dict(enumerate(mountings)),
-        position,
-        times,
+        mounting_partials, equations.trajectory, dict(enumerate(mountings)), position, times,
         matched.scanner,
-    )
+    )  # fmt: skip
     return with_mountings(bare, columns, -corrected, weak)
 
 
@@ -155,8 +141,12 @@ def _stated(equations, gps_time):
     return replace(stated, history=equations.stated.history)
 
 
-def _noise(matched):
-    """Extraction, and the survey error, which all passes of a target share  (Eq. 19)."""
-    number = matched.point_number
+def _noise(matched, steps):
+    """Extraction, the step inside which it was seen, and the survey error, which all passes of a
+    target share  (Eq. 19).
+    """
+    number, times = matched.point_number, matched.gps_time[:, None]
     shared = matched.surveyed.sigma[np.unique(number, return_index=True)[1]]
-    return Noise(matched.observations.covariance, number, shared)
+    inside = ((times >= steps.before) & (times <= steps.after)).astype(float)
+    stepped = np.einsum("ns,si,sj->nij", inside, steps.size, steps.size)
+    return Noise(matched.observations.covariance + stepped, number, shared)

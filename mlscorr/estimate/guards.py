@@ -15,7 +15,6 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.frames import angle_sigma
-from mlscorr.pos import stated_sigma
 from mlscorr.survey import Trajectory, control_epochs
 from mlscorr.survey.summary import counted
 
@@ -134,7 +133,7 @@ def _variance_ratio(equations, parameters, corrected):
         return np.ones(6)
     last = len(trajectory) - 1
     rows = np.clip(np.searchsorted(corrected.gps_time, equations.observed), 0, last)
-    stated = stated_sigma(trajectory, equations.pos, trajectory.gps_time[rows])
+    stated = equations.stated_epochs.at(rows)
     partials = np.broadcast_to(np.eye(6), (len(rows), 6, 6))
     trend = parameters.trend_sigma * equations.pose_design(trajectory.gps_time[rows])
     parts = trend, *(signal.mixing for signal in pose_signals(stated, parameters, partials))

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
 from mlscorr.estimate.assembly import position_equations, with_fallbacks, with_mountings
-from mlscorr.estimate.equations import NO_TREND, Equations
+from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_warnings
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import prior_sigma
@@ -75,7 +75,7 @@ class Estimate(Summary):
 
     @property
     def order(self) -> int:
-        """Order of the trend; NO_TREND where no control point held one."""
+        """Order of the trend; without control points a shift, within what the POS states."""
         return self.equations.order
 
     @property
@@ -175,7 +175,7 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
     """
     pos = Pos() if pos is None else pos
     filled, notes = filled_sigmas(trajectory)
-    equations = position_equations(filled, Matched.none(), pos, NO_TREND, position_prior)
+    equations = position_equations(filled, Matched.none(), pos, 0, position_prior)
     equations = with_fallbacks(equations, equations.stated.history.steps)
     screening = Screening.believed(equations)
     return _estimate(trajectory, (), GridPredictions(equations), screening, notes)
@@ -258,23 +258,18 @@ def _estimate(trajectory, names, predictions, screening, notes):
     pose_error = predict_pose_error(kept, posterior, predictions, solved)
     correction = Correction.by_pose_error(trajectory, *pose_error)
     return Estimate(
-        correction=correction,
-        equations=kept,
-        screening=screening,
-        used=used,
-        left_out=left_out,
-        log_likelihood=solved.log_likelihood,
-        sigma0=solved.sigma0,
+        correction=correction, equations=kept, screening=screening, used=used, left_out=left_out,
+        log_likelihood=solved.log_likelihood, sigma0=solved.sigma0,
         guards=find_guards(kept, parameters, correction.corrected),
-        support=find_support(kept, solved, parameters, correction.corrected),
-        notes=notes,
-    )
+        support=find_support(kept, solved, parameters, correction.corrected), notes=notes,
+    )  # fmt: skip
 
 
 def _screened(trajectory, matched, pos, order):
     """Equations, their Screening, and the windows of drift that runs of rejected targets show."""
-    windows: tuple = ()
+    windows, more = (), ()
     for _ in range(SETTINGS.rounds):
+        windows += more
         raised = with_windows(trajectory, windows) if windows else trajectory
         equations = position_equations(raised, matched, pos, order, position_prior)
         equations = equations.with_order(affordable_order(order, equations))
@@ -283,5 +278,4 @@ def _screened(trajectory, matched, pos, order):
         more = find_windows(equations, screening)
         if not more:
             break
-        windows += more
     return equations, screening, windows

@@ -84,9 +84,12 @@ def _prior(equations, time, attitude_follows):
         "walk_scale": SETTINGS.walk_scale,
         "trend_sigma": SETTINGS.trend_sigma,
     }
+    is_held = len(equations.names) > 0
+    if not is_held:  # nothing tells of what all passes share, of which the POS states this
+        start["trend_sigma"] = float(np.sqrt(np.mean(equations.stated_epochs.gnss**2)))
     is_split = bool(np.any(equations.stated.gnss))
     fixed = (() if is_split else SPLIT) + (("attitude_time",) if attitude_follows else ())
-    fixed += ("trend_sigma",) if equations.order == NO_TREND else ()
+    fixed += ("trend_sigma",) if equations.order == NO_TREND or not is_held else ()
     free = [name for name in NAMES if name not in fixed]
     return Prior(
         np.log([start.get(name, 1.0) for name in NAMES]),

@@ -86,8 +86,8 @@ class TieResiduals:
             return ()
         return (
             f"None of the {len(self.ties)} ties between passes was used: more than half of them "
-            "contradict the others. Did the street change between the passes, or is the mounting "
-            "wrong (mlscorr calibrate)?",
+            "contradict the others, or all of them several control points. Did the street change "
+            "between the passes, or is the mounting wrong (mlscorr calibrate)?",
         )
 
 
@@ -150,17 +150,20 @@ def screen_with_ties(
     ties : TieEquations
     """
     parameters, kept, rejected = screening.posterior.modes[0][0], equations, []
+    untied = GridPredictions(equations), screening, np.zeros(len(ties), dtype=bool)
     while True:
         tied = add_ties(kept, parameters, ties)
         if tied.used.mean() < SETTINGS.tie_majority:
-            return GridPredictions(equations), screening, np.zeros(len(ties), dtype=bool)
+            return untied
         predictions = GridPredictions(tied.equations)
         tests = all_tests(tied.equations, tied.posterior, predictions.add)
         doubtful = sorted((t for t in tests if t.excess > 1.0), key=lambda t: -t.excess)
-        if not doubtful or not may_go(kept, {doubtful[0].name}):
+        if not doubtful or not may_go(equations, {t.name for t in (*rejected, doubtful[0])}):
             break
         rejected.append(doubtful[0])
         kept = kept.without({doubtful[0].name})
+    if rejected and doubtful:  # points that agree with each other aren't wrong in such numbers
+        return untied
     changed = replace(
         screening,
         posterior=tied.posterior,

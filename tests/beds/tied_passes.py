@@ -40,7 +40,7 @@ def drift(time, seed):
 def tied_passes(
     seed, control=(3.0, 16.0, 30.0, 44.0, 57.0), number=300, wrong=0.0, apart=0.5, shared=0.0
 ):
-    """TiedPasses: control points at times of the first pass, ties of facades, road and cross
+    """TiedPasses: control points at times of both passes, ties of facades, road and cross
     walls, a share of which is wrong by up to a distance apart; those of a second share an error.
     """
     rng = np.random.default_rng(seed)
@@ -62,7 +62,8 @@ def tied_passes(
 
 def _matched(times, trajectory, seed, rng):
     n = len(times)
-    place = ORIGIN + np.column_stack([SPEED * times, np.full(n, 8.0), np.full(n, 3.0)])
+    along = SPEED * np.minimum(times, 2 * LENGTH + PAUSE - times)  # there, or back
+    place = ORIGIN + np.column_stack([along, np.full(n, 8.0), np.full(n, 3.0)])
     seen = place - drift(times, seed) + NOISE * rng.standard_normal((n, 3))
     names, normal = tuple(f"T{i}" for i in range(n)), [0.0, -1.0, 0.0]
     observed = observed_discs(names, START + times, seen, NOISE, normal)

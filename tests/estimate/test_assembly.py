@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.assembly import mounting_equations, position_equations, with_fallbacks
+from mlscorr.estimate.assembly import _noise, mounting_equations, position_equations, with_fallbacks
 from mlscorr.estimate.prior import mounting_prior, position_prior
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.pos import Steps
@@ -146,3 +146,17 @@ def test_a_site_without_targets_leaves_the_mounting_as_it_was():
     solved = mounting_equations(position, matched, [MOUNTING], corrected, WEAK).solve(None)
     np.testing.assert_allclose(solved.trend, -corrected, atol=1e-3)
     np.testing.assert_allclose(np.sqrt(np.diag(solved.trend_covariance)), WEAK, rtol=1e-2)
+
+
+def test_what_was_observed_stays_as_it_was():
+    "A target seen inside a step has the step in its noise; the observations' own covariance stays"
+    case = smooth_case(5, n=6)
+    covariance = case.matched.observations.covariance.copy()
+    time = case.observations.gps_time[2:3]
+    equations = case.equations()
+    steps = Steps(time - 0.1, time + 0.1, np.array([[0.5, 0.0, 0.0]]), np.array([0.01]))
+    stepped = _noise(case.matched, steps).own
+    assert stepped[2, 0, 0] - covariance[2, 0, 0] == pytest.approx(0.25)  # m^2
+    np.testing.assert_array_equal(np.delete(stepped, 2, axis=0), np.delete(covariance, 2, axis=0))
+    np.testing.assert_array_equal(case.matched.observations.covariance, covariance)
+    np.testing.assert_array_equal(equations.noise.own, covariance)
