@@ -11,7 +11,7 @@ import lazrs
 import numpy as np
 
 from mlscorr.io.copc import ENTRY, INFO
-from mlscorr.io.las_checks import EVLR_HEADER
+from mlscorr.io.las_checks import EVLR_HEADER, evlrs
 from mlscorr.io.las_layout import COPC, HIERARCHY, LASZIP, LASZIP_RECORD, VLR_HEADER, LasLayout
 from mlscorr.io.las_output import Blocks
 from mlscorr.io.octree import Octree
@@ -92,7 +92,7 @@ class CopcWriter:
     def _write_evlrs(self, file):
         """Append the EVLRs of a file with a new hierarchy; returns start and size of its page."""
         start, kept = self._output.tell(), 0
-        for position, size in _evlrs(self._layout, file):
+        for position, size in evlrs(self._layout, file):
             file.seek(position)
             if not file.read(EVLR_HEADER.size).startswith(COPC[0], 2):
                 kept += 1
@@ -131,13 +131,3 @@ def _batches(nodes) -> Iterator[list[tuple[Key, np.ndarray]]]:
             batch, points = [], 0
     if batch:
         yield batch
-
-
-def _evlrs(layout, file) -> Iterator[tuple[int, int]]:
-    """Position and size of each EVLR. Units: bytes."""
-    position, count = layout.field("QI", 235)
-    for _ in range(count):
-        file.seek(position)
-        size = EVLR_HEADER.size + EVLR_HEADER.unpack(file.read(EVLR_HEADER.size))[2]
-        yield position, size
-        position += size

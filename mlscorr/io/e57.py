@@ -55,15 +55,11 @@ def open_e57(path: Path) -> CloudSource:
         starts = {scan.starts for scan in scans}
     times = "and their acquisitionStart" if True in starts else ""
     return CloudSource(
-        path,
-        sum(scan.points for scan in scans),
+        path, sum(scan.points for scan in scans),
         f"of {len(scans)} scan{'s' * (len(scans) > 1)}, times by timeStamp {times}".strip(),
-        tuple(dropped),
-        max(limits),
-        metadata or None,
-        partial(_intensities, path),
+        tuple(dropped), max(limits), metadata or None, partial(_intensities, path),
         partial(_blocks, path),
-    )
+    )  # fmt: skip
 
 
 @contextmanager
@@ -122,8 +118,10 @@ class _Scan:
 
     @property
     def colour_limit(self):
-        """The largest value of a colour."""
-        return max(self._value("colorLimits", f"{name}Maximum") for name in COLOURS) or 255.0
+        """The largest value of a colour: that of the limits, or of the field where it has one."""
+        largest = max(self._value("colorLimits", f"{name}Maximum") for name in COLOURS)
+        field = max((float(self._prototype[name].maximum()) for name in self.colours), default=0.0)
+        return largest or (field if 0.0 < field <= np.iinfo(np.uint16).max else 255.0)
 
     @cached_property
     def singles(self):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from laspy.vlrs.known import ExtraBytesStruct, ExtraBytesVlr
 
+from mlscorr.io.las_checks import variable_records
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.settings import SETTINGS
 
@@ -32,7 +33,7 @@ def add_sigma_fields(layout: LasLayout) -> LasLayout:
         When the points have these fields already, or fewer bytes than described.
     """
     owner = (ExtraBytesVlr.official_user_id().encode(), ExtraBytesVlr.official_record_ids()[0])
-    described = b"".join(layout.vlr_data(*owner))
+    described = b"".join(variable_records(layout, *owner))
     size = ExtraBytesStruct.size()
     described = described[: len(described) // size * size]
     fields = [

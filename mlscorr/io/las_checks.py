@@ -1,7 +1,9 @@
 """LAS and LAZ files, checked against their bytes before their points are read."""
 
 import struct
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import lazrs
 import numpy as np
@@ -244,3 +246,38 @@ def _check_tail(layout, file, points_end):
             raise ValueError(
                 _cut_off(path, f"{number} of its {count} EVLRs fit into its {size} bytes")
             )
+
+
+def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
+    """Position and size of each EVLR. Units: bytes.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    file : binary file
+    """
+    position, count = layout.field("QI", 235) if layout.version >= (1, 4) else (0, 0)
+    for _ in range(count):
+        file.seek(position)
+        size = EVLR_HEADER.size + EVLR_HEADER.unpack(file.read(EVLR_HEADER.size))[2]
+        yield position, size
+        position += size
+
+
+def variable_records(layout: LasLayout, user: bytes, record: int) -> list[bytes]:
+    """Data of the VLRs and EVLRs of a user and a record.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    user : bytes
+    record : int
+    """
+    data = list(layout.vlr_data(user, record))
+    with open_file(layout.path, is_scattered=True) as file:
+        for position, size in evlrs(layout, file):
+            file.seek(position)
+            owner = EVLR_HEADER.unpack(file.read(EVLR_HEADER.size))
+            if (owner[0].split(b"\0")[0], owner[1]) == (user, record):
+                data.append(file.read(size - EVLR_HEADER.size))
+    return data

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mlscorr.io.las_checks import variable_records
 from mlscorr.io.las_layout import LasLayout
+from mlscorr.io.projection import crs_name
 from mlscorr.io.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -36,7 +38,8 @@ def stated_crs(layout: LasLayout) -> CRS | None:
     from pyproj.exceptions import CRSError
 
     words = [
-        data.split(b"\0")[0].decode("utf-8", "replace") for data in layout.vlr_data(OWNER, WKT)
+        data.split(b"\0")[0].decode("utf-8", "replace")
+        for data in variable_records(layout, OWNER, WKT)
     ]
     code = _code(_geo_keys(layout))
     for text in filter(None, [*words, code] if layout.states_wkt else [code, *words]):
@@ -64,31 +67,6 @@ def _code(keys):
     if plan == 0:
         return ""
     return f"EPSG:{plan}+{heights}" if heights else f"EPSG:{plan}"
-
-
-def crs_name(crs: CRS) -> str:
-    """A CRS in words: its code, where it has one, and its name.
-
-    Parameters
-    ----------
-    crs : pyproj.CRS
-    """
-    code = crs_code(crs)
-    return f"{code} ({crs.name})" if code else crs.name
-
-
-def crs_code(crs: CRS) -> str | None:
-    """The code of a CRS as survey.toml takes it, None where it has none.
-
-    Parameters
-    ----------
-    crs : pyproj.CRS
-    """
-    parts = crs.sub_crs_list if crs.is_compound else [crs]
-    codes = [part.to_authority(min_confidence=70) for part in parts]
-    if codes[0] is None or None in codes:
-        return None
-    return f"{codes[0][0]}:" + "+".join(code for _, code in codes)
 
 
 def crs_conflict(layout: LasLayout, crs: str) -> str:

@@ -127,6 +127,8 @@ def head(path: Path, encoding: str = ENCODING) -> list[tuple[int, str]]:
                     break
                 if line.strip(" \t\r\n-=_"):
                     lines.append((number, line))
+            while 0 < len(line) < longest and file.read(SETTINGS.copied_bytes):
+                pass  # a letter beyond ASCII may come late
     except UnicodeError:
         return []
     return lines

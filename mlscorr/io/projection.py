@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mlscorr.survey import Trajectory
-
 if TYPE_CHECKING:
-    from pyproj import CRS
+    from pyproj import CRS, Proj
 
 
 def check_crs(crs: str) -> CRS:
@@ -35,93 +32,21 @@ def check_crs(crs: str) -> CRS:
     axes = crs.axis_info
     if not crs.is_projected:
         raise ValueError(
-            f"crs {_short(crs)} ({crs.name}) is {crs.type_name}; a projected CRS is needed, "
+            f"crs {crs_name(crs)} is {crs.type_name}; a projected CRS is needed, "
             "such as the UTM zone of the survey."
         )
-    if any(axis.unit_name != "metre" for axis in axes):
-        raise ValueError(
-            f"crs {_short(crs)} ({crs.name}) is in {axes[0].unit_name}, not in metres."
-        )
+    for axis in axes:
+        if axis.unit_name != "metre":
+            raise ValueError(
+                f"crs {crs_name(crs)} has its {axis.name} in {axis.unit_name}, not in "
+                "metres. Bring clouds, trajectory and control into a CRS in metres."
+            )
     if {axis.direction for axis in axes[:2]} != {"east", "north"}:
         raise ValueError(
-            f"crs {_short(crs)} ({crs.name}) counts {axes[0].direction} and {axes[1].direction}; "
+            f"crs {crs_name(crs)} counts {axes[0].direction} and {axes[1].direction}; "
             "axes must point east and north."
         )
     return crs
-
-
-def check_area(crs: CRS, trajectory: Trajectory) -> None:
-    """Warn where a trajectory lies outside the area that a CRS was made for.
-
-    Parameters
-    ----------
-    crs : pyproj.CRS
-    trajectory : Trajectory
-
-    Warns
-    -----
-    UserWarning
-    """
-    from pyproj import Transformer
-
-    to_degrees = Transformer.from_crs(crs.to_2d(), crs.geodetic_crs.to_2d(), always_xy=True)
-    east, north = np.median(trajectory.position[:, :2], axis=0)
-    longitude, latitude = to_degrees.transform(east, north)
-    area, margin = crs.area_of_use, 1.0  # deg, by which zones are used beyond their edges
-    if area is None or (
-        area.west - margin <= longitude <= area.east + margin
-        and area.south - margin <= latitude <= area.north + margin
-    ):
-        return
-    warnings.warn(
-        f"The trajectory (E {east:.0f}, N {north:.0f} m) lies at longitude {longitude:.2f}, "
-        f"latitude {latitude:.2f} deg by {_short(crs)} ({crs.name}), which was made for "
-        f"{area.west:g} to {area.east:g} and {area.south:g} to {area.north:g} deg: crs in "
-        "survey.toml may be of another zone, or easting and northing exchanged.",
-        stacklevel=3,
-    )
-
-
-def describe_projection(crs: str) -> tuple[str, str, str]:
-    """Sentences on what a geographic trajectory's way into a CRS assumes.
-
-    Parameters
-    ----------
-    crs : str
-
-    Returns
-    -------
-    tuple of str
-    """
-    projected: Any = check_crs(crs)
-    vertical = projected.sub_crs_list[1].name if projected.is_compound else None
-    return (
-        f"The trajectory's latitude and longitude are taken as {projected.geodetic_crs.name}, "
-        f"the datum of {projected.name}; nothing in an SBET says otherwise.",
-        f"The trajectory's ellipsoidal heights were transformed to {vertical}."
-        if vertical
-        else "The trajectory's ellipsoidal heights were kept.",
-        "Headings were turned from the platform to grid north: minus wander angle, "
-        "minus meridian convergence.",
-    )
-
-
-def crs_notes(crs: str | None, trajectory: Trajectory, is_sbet: bool) -> list[str]:
-    """Sentences on the CRS; warns where the trajectory lies outside its area.
-
-    Parameters
-    ----------
-    crs : str or None
-    trajectory : Trajectory
-    is_sbet : bool
-        Whether its file is an SBET, with latitudes and longitudes.
-    """
-    if crs is None:
-        return ["No CRS was given."]
-    projected = check_crs(crs)
-    check_area(projected, trajectory)
-    notes = [f"Coordinates are in {crs} ({projected.name})."]
-    return notes + list(describe_projection(crs) if is_sbet else ())
 
 
 @lru_cache
@@ -135,9 +60,40 @@ def _parse_crs(crs):
         raise ValueError(f"crs '{crs}' is unknown; give it like \"EPSG:32650\".") from None
 
 
-def _short(crs):
-    authority = crs.to_authority()
-    return ":".join(authority) if authority else crs.to_string()
+def crs_name(crs: CRS) -> str:
+    """A CRS in words: its code, where it has one, and its name.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS
+    """
+    code = crs_code(crs)
+    return f"{code} ({crs.name})" if code else crs.name
+
+
+def crs_code(crs: CRS) -> str | None:
+    """The code of a CRS as survey.toml takes it, None where it has none.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS
+    """
+    parts = crs.sub_crs_list if crs.is_compound else [crs]
+    codes = [part.to_authority(min_confidence=70) for part in parts]
+    if codes[0] is None or None in codes:
+        return None
+    return f"{codes[0][0]}:" + "+".join(code for _, code in codes)
+
+
+def _by_greenwich(crs):
+    """The CRS that is meant, which counts longitudes from Greenwich as trajectories do."""
+    crs = check_crs(crs)
+    if crs.prime_meridian.longitude != 0:
+        raise ValueError(
+            f"{crs_name(crs)} counts longitudes from {crs.prime_meridian.name}: give "
+            "latitudes, longitudes and true headings with a CRS that counts from Greenwich."
+        )
+    return crs
 
 
 def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -164,16 +120,16 @@ def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nda
     """
     from pyproj.exceptions import ProjError
 
-    crs = check_crs(crs)
+    crs = _by_greenwich(crs)
     longitude, latitude = np.degrees(record["longitude"]), np.degrees(record["latitude"])
     try:
         easting, northing, height = _exact(crs.geodetic_crs.to_3d(), crs).transform(
             longitude, latitude, record["height"], errcheck=True
         )
-        factors = _map(crs).get_factors(longitude, latitude, errcheck=True)
+        factors = map_of(crs).get_factors(longitude, latitude, errcheck=True)
     except ProjError as error:
         raise ValueError(
-            f"the trajectory can't be brought into {_short(crs)} ({crs.name}): {error} "
+            f"the trajectory can't be brought into {crs_name(crs)}: {error} "
             "A geoid grid may be missing (projsync --file NAME installs it), or give the "
             "horizontal CRS alone to keep ellipsoidal heights."
         ) from None
@@ -181,8 +137,8 @@ def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nda
     outside = ~np.isfinite(position).all(axis=1)
     if outside.any():
         raise ValueError(
-            f"{outside.sum()} of {len(outside)} positions can't be expressed in {_short(crs)} "
-            f"({crs.name}; first: {latitude[outside][0]:.4f}, {longitude[outside][0]:.4f} deg)."
+            f"{outside.sum()} of {len(outside)} positions can't be expressed in {crs_name(crs)} "
+            f"(first: {latitude[outside][0]:.4f}, {longitude[outside][0]:.4f} deg)."
         )
     return position, np.radians(factors.meridian_convergence)
 
@@ -197,7 +153,7 @@ def convergence_at(crs: str, easting: np.ndarray, northing: np.ndarray) -> np.nd
     easting, northing : (n,) array
         Units: m.
     """
-    plane = _map(check_crs(crs))
+    plane = map_of(_by_greenwich(crs))
     return np.radians(
         plane.get_factors(*plane(easting, northing, inverse=True)).meridian_convergence
     )
@@ -227,7 +183,7 @@ def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray]
     """
     from pyproj.exceptions import ProjError
 
-    projected = check_crs(crs)
+    projected = _by_greenwich(crs)
     try:
         transformer = _exact(projected, projected.geodetic_crs.to_3d())
         easting, northing, height = position.T
@@ -249,8 +205,13 @@ def _exact(source, target):
     )
 
 
-def _map(crs):
-    """The horizontal part of a projected CRS."""
+def map_of(crs: CRS) -> Proj:
+    """The horizontal part of a projected CRS.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS
+    """
     from pyproj import Proj
 
     return Proj(crs.sub_crs_list[0] if crs.is_compound else crs)

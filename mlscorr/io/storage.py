@@ -177,7 +177,10 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
         As is_there.
     """
     if not is_url(pattern) and not is_remote(folder):
-        return sorted(folder / m for m in glob.glob(pattern, root_dir=folder, recursive=True))
+        stem, end = posixpath.splitext(pattern)  # endings in capitals are as good
+        names = {pattern, stem + end.lower(), stem + end.upper()}
+        matches = (glob.glob(name, root_dir=folder, recursive=True) for name in names)
+        return sorted({folder / name for some in matches for name in some})
     path: Any = as_path(pattern) if is_url(pattern) else resolved(folder / pattern)
     if path.protocol in WEB:
         raise ValueError(

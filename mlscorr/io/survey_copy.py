@@ -7,6 +7,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 import tomlkit
+from tomlkit.items import InlineTable
 
 from mlscorr.io.conversion import written_name
 from mlscorr.io.opening import read_bytes
@@ -106,6 +107,8 @@ def _set_mounting(section, mounting, note):
     section["lever_arm"], section["boresight"] = mounting_values(mounting)
     if mounting.covariance is not None:
         _set_covariance(section, mounting.covariance)
+        if isinstance(section, InlineTable):  # in which TOML has no comments
+            return
         trivia = section["lever_arm_sigma"].trivia  # has the comment on sigmas that were there
         trivia.comment_ws, trivia.comment = ("  ", f"# {note}") if note else ("", "")
 

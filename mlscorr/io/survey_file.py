@@ -7,11 +7,12 @@ from pathlib import Path
 
 from mlscorr.io.control import read_surveyed
 from mlscorr.io.conversion import converted, is_foreign
+from mlscorr.io.crs_checks import crs_notes
 from mlscorr.io.inputs import input_file
 from mlscorr.io.las import read_chunks, spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
-from mlscorr.io.projection import check_crs, crs_notes
+from mlscorr.io.projection import check_crs
 from mlscorr.io.session_points import check_belongings
 from mlscorr.io.storage import as_path, is_folder, is_there
 from mlscorr.io.survey_paths import SurveyPaths, files_of
@@ -129,25 +130,16 @@ class SurveyParts:
         if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
             notes.append(UNKNOWN_POS)
         return Survey(
-            name=settings.name or path.absolute().parent.name,
-            path=path,
-            crs=settings.crs,
-            clouds=clouds_of(scanners, cloud_files),
-            trajectory=trajectory,
-            mounting=scanners[0].mounting if is_one else None,
-            control=self.control,
-            check=self.check,
-            scanner=scanners[0].scanner if is_one else Scanner(),
-            pos=settings.pos.pos(),
-            reference=self.files.reference,
-            search_radius=settings.matching.search_radius,
-            use_ties=settings.ties.use == "auto",
-            notes=tuple(notes),
-            layouts=tuple(layouts),
-            inputs=self.inputs,
+            name=settings.name or path.absolute().parent.name, path=path, crs=settings.crs,
+            clouds=clouds_of(scanners, cloud_files), trajectory=trajectory,
+            mounting=scanners[0].mounting if is_one else None, control=self.control,
+            check=self.check, scanner=scanners[0].scanner if is_one else Scanner(),
+            pos=settings.pos.pos(), reference=self.files.reference,
+            search_radius=settings.matching.search_radius, use_ties=settings.ties.use == "auto",
+            notes=tuple(notes), layouts=tuple(layouts), inputs=self.inputs,
             scanners=() if is_one else scanners,
             corrected_by=tuple(n for part in settings.trajectories for n in part.corrected_by),
-        )
+        )  # fmt: skip
 
 
 def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> SurveyParts:
@@ -282,6 +274,13 @@ def cloud_file(
     """
     layout = read_layout(path)
     file = CloudFile(path, layout.points, layout.time_offset, "", ids)
+    if layout.scale.max() > 0.002:  # m, half of what a scanner's ranges are good for
+        warnings.warn(
+            f"The coordinates of {path.name} are in steps of {layout.scale.max():g} m: neither "
+            "targets nor corrected points are better than that. Export the cloud in steps of "
+            "0.001 m.",
+            stacklevel=2,
+        )
     records = spread_records(layout)[1]
     times = records["gps_time"][file.rows(records["point_source_id"])] + layout.time_offset
     if not len(times) and (chunk := next(read_chunks(file), None)) is not None:  # too few of them

@@ -235,7 +235,7 @@ def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> 
     for kind, values in kinds.items():
         value, count = Counter(values).most_common(1)[0]
         if count > 1:
-            raise ValueError(f"{key} of {path} {kind} {value} ({count} times).")
+            raise ValueError(f"{key} of {path} {kind} {value} ({count} times). Rename one.")
     for copy, first in find_copies(clouds).items():
         raise ValueError(
             f"{key} of {path} names {copy}, which is a copy of {first}: all of its points "

@@ -12,9 +12,10 @@ from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.io.conversion import read_in_part
 from mlscorr.io.las import spread_records
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
+from mlscorr.io.las_crs import cloud_box, crs_conflict, stated_crs
 from mlscorr.io.nearness import far_cloud
 from mlscorr.io.preparation import glance
+from mlscorr.io.projection import crs_code, crs_name
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline import needs
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
@@ -106,6 +107,8 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
         faults.add("data", sentence)
     layouts = [read_layout(path) for path in survey.cloud_paths]
     passes, outside = _placed_times(survey)
+    if not passes:
+        faults.add("data", "No point of any cloud was measured while the trajectory was.")
     uncovered, is_beside = _uncovered(survey, layouts)
     faults.warn(*outside, *_crs_hints(survey, layouts), *uncovered)
     for layout in layouts:

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mlscorr.io.control import ControlList, holds_points, read_control
+from mlscorr.io.crs_checks import check_area
 from mlscorr.io.folder_roles import FileRole
-from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
+from mlscorr.io.las_crs import cloud_box, crs_conflict, stated_crs
 from mlscorr.io.nearness import check_together, far_cloud
-from mlscorr.io.projection import check_area, check_crs
+from mlscorr.io.projection import check_crs, crs_code, crs_name
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.pipeline.drives import Cloud, Drive, ambiguous
 from mlscorr.survey import Trajectory

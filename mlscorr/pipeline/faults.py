@@ -8,10 +8,11 @@ from typing import Any, Literal
 
 from mlscorr.io.control import holds_points, read_control
 from mlscorr.io.control_faults import ListError
+from mlscorr.io.crs_checks import crs_notes
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
 from mlscorr.io.nearness import check_together
-from mlscorr.io.projection import check_crs, crs_notes
+from mlscorr.io.projection import check_crs
 from mlscorr.io.session_points import check_belongings
 from mlscorr.io.survey_file import cloud_file, stated_pos, survey_toml
 from mlscorr.io.survey_paths import (

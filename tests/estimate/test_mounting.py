@@ -548,3 +548,14 @@ def test_no_target_makes_a_mounting_worse_than_it_is_without_any(count):
     assert np.allclose(estimate.covariance, estimate.covariance.T)
     assert (np.linalg.eigvalsh(estimate.covariance) > 0.0).all()
     assert (estimate.sigma0 == 1.0) == (count < 2)
+
+
+def test_a_mounting_in_one_line_stays_readable(tmp_path):
+    "An inline table has no room for a comment: sigmas are written without one"
+    old, new = tmp_path / "survey.toml", tmp_path / "new.toml"
+    head, _, _ = SURVEY.partition("[mounting]")
+    line = "mounting = { lever_arm = [0.1, -0.6, 0.4], boresight = [90.0, 0.0, 35.0] }"
+    old.write_text(f"{line}\n{head}")
+    mounting = replace(RECORDED, covariance=1e-6 * np.eye(6))
+    write_survey_copy(old, new, tmp_path, [mounting], notes=["as the POS states"])
+    assert tomllib.loads(new.read_text())["mounting"]["lever_arm_sigma"] == [0.001] * 3

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.projection import check_area, check_crs
+from mlscorr.io.crs_checks import check_area, check_scale, crs_notes
+from mlscorr.io.projection import check_crs, convergence_at
 from mlscorr.io.sbet import read_sbet
 from mlscorr.survey import Trajectory
 
@@ -51,3 +52,37 @@ def test_places_outside_the_area_of_a_crs_are_told():
     for place in ((-700e3, 3374e3), (3374e3, 532e3)):
         with pytest.warns(UserWarning, match="made for 114 to 120 .* another zone, or easting"):
             check_area(crs, drive(*place))
+    check_area(check_crs("EPSG:27572"), drive(600e3, 2428e3))  # counts from Paris, in gon
+
+
+def test_a_map_that_is_not_true_to_scale_is_told():
+    "Mercator's map of the world stretches by 1 / cos(latitude), 1.161 at 30.5 deg; UTM not"
+    check_scale(check_crs("EPSG:32650"), drive(200e3, 3374e3))
+    with pytest.warns(UserWarning, match=r"A metre on the ground is 1\.161 m on the map of EPSG"):
+        check_scale(check_crs("EPSG:3857"), drive(12_750e3, 3570e3))
+
+
+def test_longitudes_from_another_meridian_are_refused():
+    "On the meridian of Paris grid north is true north; PROJ's factors would say 1.7 deg"
+    with pytest.raises(ValueError, match=r"counts longitudes from Paris: give latitudes"):
+        convergence_at("EPSG:27572", np.array([600e3]), np.array([2428e3]))
+
+
+def test_eastings_with_the_zone_in_front_are_refused():
+    "UTM 50 with 50 000 000 in front lies nowhere on its map, which is no matter of degrees"
+    with pytest.raises(ValueError, match=r"lies nowhere on the map of EPSG:32650.* zone's number"):
+        check_area(check_crs("EPSG:32650"), drive(50_532e3, 3374e3))
+
+
+def test_latitudes_of_another_datum_are_told_by_how_much():
+    "Bessel's and GNSS's latitudes are 190 m apart in Germany; ETRS89 and WGS 84 are one here"
+    crs_notes("EPSG:25832", drive(566e3, 5930e3), True)
+    with pytest.warns(UserWarning, match=r"as DHDN, .* lie [+-]\d\d m east and [+-]1\d\d m north"):
+        crs_notes("EPSG:31467", drive(3566e3, 5932e3), True)
+    crs_notes("EPSG:31467", drive(3566e3, 5932e3), False)  # of a table of eastings
+
+
+def test_heights_in_feet_are_named():
+    "A compound CRS whose map is in metres and whose heights aren't: the heights are what is wrong"
+    with pytest.raises(ValueError, match=r"height in US survey foot, not in metres\. Bring"):
+        check_crs("EPSG:32650+6360")

@@ -366,3 +366,14 @@ def test_no_name_is_suggested_that_is_not_alike(tmp_path):
     (tmp_path / "a.toml").write_text('file = "x"\nqqq = 1\n')
     with pytest.raises(ValueError, match="qqq is an unknown key; known are file, kind, size, si"):
         read_toml(tmp_path / "a.toml", ControlSection, "it")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "gb18030"])
+def test_letters_that_come_late_are_read_too(encoding, tmp_path):
+    "The only letter beyond ASCII stands in line 300 of 400"
+    name = "\u95e8" if encoding == "gb18030" else "T\u00fcr"
+    lines = [f"P{i},{532_000 + i}.49,3373991.48,44.48" for i in range(400)]
+    lines[299] = lines[299].replace("P299", name)
+    content = "\n".join(["name,easting,northing,height", *lines, ""])
+    points = read(tmp_path, content, None, encoding)[0]
+    assert len(points) == 400 and points.name[299] == name

@@ -328,3 +328,16 @@ def test_a_cloud_and_its_copy_in_another_format_are_named(street, tmp_path):
         mlscorr.init(folder)
     document = mlscorr.init(folder, given={"cloud": {"files": ["*.laz"]}})
     assert '"*.laz"' in document.text
+
+
+@pytest.mark.parametrize(("largest", "expected"), [(255, 65_535), (65_535, 65_535)])
+def test_colours_without_limits_are_scaled_by_their_field(largest, expected, tmp_path):
+    "Half of the largest value is half of LAS's, whether a colour has 8 bits or 16"
+    colour = np.linspace(0, largest, 101).round().astype(int)
+    fields = {f"cartesian{axis}": 1.0 + np.arange(101.0) for axis in "XYZ"}
+    fields |= {"timeStamp": 413_200.0 + np.arange(101.0), "intensity": np.ones(101)}
+    fields |= {f"color{name}": colour for name in ("Red", "Green", "Blue")}
+    path = write_e57(tmp_path / "a.e57", [{"fields": fields}])
+    las = laspy.read(converted(path).path)
+    assert las.red.max() == expected
+    assert las.red[50] == pytest.approx(expected / 2, rel=0.01)

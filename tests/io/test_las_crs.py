@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_crs import cloud_box, crs_code, crs_conflict, crs_name, stated_crs
+from mlscorr.io.las_crs import cloud_box, crs_conflict, stated_crs
+from mlscorr.io.projection import crs_code, crs_name
 from tests.beds.las_crs import add_crs
 from tests.beds.shared import shared
 
@@ -70,3 +71,17 @@ def test_a_code_in_metres_with_a_unit_in_feet_is_in_feet():
     layout = read_layout(shared("data/las_samples/mvk-thin.las"))
     assert crs_code(stated_crs(layout)) == "EPSG:26995"
     assert "in US survey feet" in crs_conflict(layout, "EPSG:26995")
+
+
+def test_a_crs_behind_the_points_is_seen(tmp_path):
+    "LAS 1.4 may hold the WKT in an EVLR: it states the same as in a VLR"
+    path = tmp_path / "a.las"
+    written(path, "EPSG:2263")
+    las = laspy.read(path)
+    (vlr,) = las.header.vlrs.extract("WktCoordinateSystemVlr")
+    las.evlrs = laspy.vlrs.vlrlist.VLRList([vlr])
+    las.write(path)
+    layout = read_layout(path)
+    assert not list(layout.vlr_data(b"LASF_Projection", 2112))
+    assert crs_code(stated_crs(layout)) == "EPSG:2263"
+    assert "US survey foot" in crs_conflict(layout, "EPSG:32618")

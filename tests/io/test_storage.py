@@ -254,3 +254,10 @@ def test_a_disk_needs_no_fsspec():
         "print({'fsspec', 'upath', 's3fs'} & set(sys.modules))"
     )
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "set()"
+
+
+def test_endings_in_capitals_are_as_good(tmp_path):
+    "A pattern of .laz means .LAZ too, and each file once"
+    for name in ("a.laz", "b.LAZ", "c.las"):
+        (tmp_path / name).touch()
+    assert [path.name for path in files_like(tmp_path, "*.laz")] == ["a.laz", "b.LAZ"]

@@ -548,7 +548,9 @@ def test_an_sbet_survey_says_what_was_assumed(folder):
     toml(folder, "EPSG:32650", "EPSG:32611")
     toml(folder, "pass-*.las", "points.las")
     toml(folder, "trajectory.csv", "sbet.out")
-    survey = read_survey(exchange(folder, lambda e, n: (e - 212_000, n + 807_000)))
+    exchange(folder, lambda e, n: (e - 212_000, n + 807_000))
+    with pytest.warns(UserWarning, match="points.las are in steps of 0.01 m"):
+        survey = read_survey(folder)
     assert "taken as WGS 84, the datum of WGS 84 / UTM zone 11N" in survey.notes[1]
     assert "ellipsoidal heights were kept" in survey.notes[2]
     assert "meridian convergence" in survey.notes[3]

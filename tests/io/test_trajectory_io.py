@@ -7,7 +7,7 @@ from pyproj import Geod
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles, georeference, to_scanner
-from mlscorr.io.projection import describe_projection
+from mlscorr.io.crs_checks import describe_projection
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS, read_sbet
 from mlscorr.io.trajectory import read_trajectory, write_trajectory_csv
 from mlscorr.survey import Mounting, Trajectory
