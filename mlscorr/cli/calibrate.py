@@ -42,6 +42,9 @@ def calibrate(
     say(f"Survey:      {out / 'survey.toml'}, with the calibrated mounting")
     if not clouds:
         say("Its clouds are still as the recorded mounting put them; --clouds writes them anew.")
+    if untouched := sum(file["untouched"] for file in content["files"]):
+        say(f"{untouched} points outside the trajectory were left as they were.")
+        raise typer.Exit(terminal.Exit.IN_PART)
 
 
 def _tell_estimates(content):

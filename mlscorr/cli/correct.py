@@ -95,11 +95,11 @@ def correct(
         report = result.write(
             out, overwrite, progress, sigma, page=not no_report, trajectories=trajectory
         )
-    tell(report, out, as_json)
+    tell(report, out, as_json, not no_report)
     terminal.end(failures(gates, report), not report["coverage"]["points_untouched"])
 
 
-def tell(report: dict, out: Path, as_json: bool) -> None:
+def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
     """Say what stands first in the report, the RMSE of misclosures, and where the results lie.
 
     Parameters
@@ -110,6 +110,8 @@ def tell(report: dict, out: Path, as_json: bool) -> None:
         Folder of the results.
     as_json : bool
         Whether to print the report on stdout.
+    page : bool
+        Whether report.html was written.
     """
     from mlscorr.report.tie_words import tie_sentences
 
@@ -123,7 +125,12 @@ def tell(report: dict, out: Path, as_json: bool) -> None:
         ("check points", report["check"], "after"),
     ]
     terminal.say_rmse(rows, width=24, decimals=3)
-    if (out / "report.html").exists():
+    made = {file["name"] for file in report["files"]} | ({"report.html"} if page else set())
+    clouds = [path.name for path in out.glob("*") if path.suffix.lower() in (".las", ".laz")]
+    pages = ["report.html"] * (out / "report.html").exists()
+    if older := sorted({*clouds, *pages} - made):
+        terminal.warn(f"Of an earlier run, and left as it was in {out}: {', '.join(older)}.")
+    if page:
         terminal.say(f"Report:    {out / 'report.html'}")
         terminal.say(f"Pictures:  {out / 'pictures'}")
     terminal.say(f"Corrected: {', '.join(str(out / file['name']) for file in report['files'])}")

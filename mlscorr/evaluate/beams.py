@@ -35,8 +35,10 @@ class BeamCheck:
 
         def watch(file: CloudFile) -> Iterator[PointCloud]:
             rows, numbers = self.samples[file], self.segments[file] = [], []
+            step = 0
             for chunk in read(file):
-                some = chunk[:: max(1, len(chunk) // IO.sampled_points)]
+                step = step or max(1, len(chunk) // IO.sampled_points)  # of the last, short one too
+                some = chunk[::step]
                 numbers.append(self.survey.trajectory.segment(some.gps_time))
                 some = some[numbers[-1] >= 0]
                 rows.append(self._sample(some, self.survey.of(file).mounting))

@@ -146,7 +146,7 @@ def read_effects(source: str | Path) -> tuple[Effect, ...]:
 def _of_gap(content):
     """The effects of the most probable cause; a ValueError where there is none."""
     label, cause = content["verdict"]["label"], content["causes"][0] if content["causes"] else None
-    if cause is None or cause["effect"] != label:
+    if label in ("none", "unknown") or cause is None or cause["effect"] != label:
         raise ValueError(f"The diagnosis names no cause but {label}: nothing can be taken out.")
     effects = []
     for name in label.split("+"):
@@ -241,14 +241,10 @@ class AppliedSurvey(Summary):
                 write_trajectory_csv(folder / trajectory, correction.corrected)
             parts = survey.by_scanner.values()
             write_survey_copy(
-                survey.path,
-                folder / FILE_NAME,
-                out,
-                [] if mounting is None else [mounting],
-                [[written_name(file.path) for file in part.clouds] for part in parts],
-                trajectory,
+                survey.path, folder / FILE_NAME, out, [] if mounting is None else [mounting],
+                [[written_name(file.path) for file in part.clouds] for part in parts], trajectory,
                 survey.corrected_by,
-            )
+            )  # fmt: skip
             effects = [effect.document() for effect in self.effects]
             content = document("applied", {"name": survey.name, "effects": effects, "files": files})
             write_json(folder / "applied.json", content)

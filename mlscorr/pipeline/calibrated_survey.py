@@ -85,11 +85,10 @@ class CalibrationResult(Summary):
         from mlscorr.report.calibration_page import calibration_page
 
         survey, parts = self.survey, self.parts
-        content = document("calibration", self.report(with_drift))
+        content = document("calibration", self.report(with_drift) | {"files": []})
         calibrations = {name: part.calibration for name, part in parts.items()}
         files = [[written_name(file.path) for file in p.survey.clouds] for p in parts.values()]
         with output_folder(out, survey.inputs, overwrite) as folder:
-            write_json(folder / "calibration.json", content)
             calibration_page(content).write(folder / "calibration.html")
             if with_drift:  # the one of all
                 drift = next(iter(calibrations.values())).drift
@@ -100,7 +99,10 @@ class CalibrationResult(Summary):
                     name: c.correction_with_drift if with_drift else c.correction()
                     for name, c in calibrations.items()
                 }
-                write_clouds(survey, folder, moved, done)
+                for path, points, outside in write_clouds(survey, folder, moved, done):
+                    row = {"name": path.name, "points": points, "untouched": outside}
+                    content["files"].append(row)
+            write_json(folder / "calibration.json", content)
             write_survey_copy(
                 survey.path,
                 folder / FILE_NAME,

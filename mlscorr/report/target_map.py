@@ -30,8 +30,12 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     report : CorrectionReport
     """
     way = track(correction.corrected)
-    rows = ordered(report.targets)
-    points = np.vstack([way[np.isfinite(way).all(axis=1)], array(rows, "surveyed")[:, :2]])
+    driven = way[np.isfinite(way).all(axis=1)]
+    margin = max(float(np.ptp(driven, axis=0).max()), 1.0) / 4
+    box = driven.min(axis=0) - margin, driven.max(axis=0) + margin
+    rows = [row for row in ordered(report.targets) if _is_within(row.surveyed[:2], *box)]
+    outside = len(report.targets) - len(rows)
+    points = np.vstack([driven, array(rows, "surveyed")[:, :2]])
     extent = max(float(np.ptp(points, axis=0).max()), 1.0)
     arrows = [row for row in ordered(rows, "control", "check") if row.is_observed]
     times = _enlargement(array(arrows, "before")[:, :2], extent)
@@ -49,12 +53,17 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     mark_places(axes, [(place.easting, place.northing) for place in report.next_control])
     write_names(axes, names, width)
     frame(axes, low, high)
-    axes.set_title("Where the targets lie, and their horizontal residuals")
+    far = f" (far outside: {outside})" if outside else ""
+    axes.set_title(f"Where the targets lie, and their horizontal residuals{far}")
     _key(axes, low, high, strip, times)
     handles = _legend(rows, len(arrows), times, short)
     handles += [Line2D([], [], label=NEXT_WORDS, **NEXT)] * bool(report.next_control)
     style.legend_above(figure, handles)
     return figure
+
+
+def _is_within(place, low, high):
+    return bool(np.all((place >= low) & (place <= high)))
 
 
 def mark_places(axes: Axes, places: Sequence[tuple[float, float]]) -> None:
@@ -170,15 +179,10 @@ def _key(axes, low, high, strip, times):
         )
     east = low[0] + 0.95 * width
     axes.annotate(
-        "N",
-        (east, low[1] + 0.9 * strip),
-        xytext=(east, low[1] + 0.22 * strip),
+        "N", (east, low[1] + 0.9 * strip), xytext=(east, low[1] + 0.22 * strip),
         arrowprops={"arrowstyle": "-|>", "color": "black", "linewidth": 1.4},
-        horizontalalignment="center",
-        verticalalignment="center",
-        fontweight="bold",
-        zorder=4,
-    )
+        horizontalalignment="center", verticalalignment="center", fontweight="bold", zorder=4,
+    )  # fmt: skip
 
 
 def _legend(rows, arrows, times, short):

@@ -1,5 +1,6 @@
 """Clouds that the vehicle can't have measured at the times that they state."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -65,7 +66,7 @@ def test_a_tile_of_another_town_is_named_without_a_mounting(survey):
         return PointCloud(cloud.xyz + far, cloud.gps_time, cloud.intensity)
 
     (sentence,) = said(replace(survey, mounting=None), moved)
-    assert "pass-1.laz lie 3" in sentence and "m beside the trajectory" in sentence
+    assert re.search(r"pass-1\.laz lie (2999|3000|3001) m beside the trajectory", sentence)
 
 
 def clocks(survey, late, beam=((0.0, -8.0), (0.0, 8.0)), speed=5.0, start=357_700.0, system="week"):

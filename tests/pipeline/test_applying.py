@@ -1,6 +1,7 @@
 """What was found wrong, taken out of clouds, trajectory and survey.toml."""
 
 import json
+import shutil
 import tomllib
 import warnings
 
@@ -146,3 +147,16 @@ def test_one_effect_need_be_in_no_list(site):
         survey = mlscorr.read_survey(site)
     late = make_effect("time_offset", magnitude=0.01)
     assert mlscorr.apply(survey, late).effects == mlscorr.apply(survey, [late]).effects == (late,)
+
+
+def test_points_that_stay_as_they_are_end_with_a_code_of_their_own(site, tmp_path):
+    "The trajectory ends early: the rest of the cloud is counted, and the code says that not all was done"
+    folder = shutil.copytree(site, tmp_path / "short")
+    rows = (folder / "trajectory.csv").read_text().splitlines(keepends=True)
+    (folder / "trajectory.csv").write_text("".join(rows[: len(rows) * 3 // 4]))
+    out = tmp_path / "out"
+    given = ["apply", str(folder), "vertical_datum=0.1", "-o", str(out), "--json"]
+    done = CliRunner().invoke(app, given)
+    assert done.exit_code == 4, done.output
+    untouched = sum(file["untouched"] for file in json.loads(done.stdout)["files"])
+    assert untouched > 1000 and f"{untouched} points outside" in done.stderr

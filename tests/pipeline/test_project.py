@@ -352,3 +352,21 @@ def test_one_corrupt_file_is_named_and_the_rest_done(project, tmp_path):
     assert sorted(path.name for path in (out / "second").glob("*.laz")) == ["tile-1.laz"]
     assert len([*(out / "first").glob("*.laz")]) == 2
     assert "Failed: second/tile-2.laz" in run.stderr
+
+
+@pytest.mark.long
+def test_results_are_of_the_paths_and_the_crs_that_are_asked_for(project, tmp_path):
+    """Resumed by another path, a cloud that is missing is written; in another CRS nothing stays
+    of the one before.
+    """
+    folder, out = shutil.copytree(project.parent, tmp_path / "city"), tmp_path / "out"
+    correct_project(folder, out, QUICK)
+    (out / "first" / "tile-2.laz").unlink()
+    (tmp_path / "link").symlink_to(folder)
+    correct_project(tmp_path / "link", out, Options(page=False, resume=True))
+    assert (out / "first" / "tile-2.laz").is_file()
+    for path in folder.rglob("*.toml"):
+        path.write_text(path.read_text().replace("EPSG:32650", "EPSG:32649"))
+    with warnings.catch_warnings(action="ignore"):  # of the other zone
+        correct_project(folder, out, Options(page=False, resume=True))
+    assert json.loads((out / "first" / "report.json").read_text())["crs"] == "EPSG:32649"

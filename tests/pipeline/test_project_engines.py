@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mlscorr.io.preparation import temporary_folder
 from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.project import check_engine
 from mlscorr.pipeline.project.engine import engine
@@ -177,3 +179,10 @@ def test_a_worker_gives_memory_back():
     with engine(2, None) as chosen:
         chosen.submit(kept_memory, 3, 12.0).result()  # the threshold of C grows with what is freed
         assert chosen.submit(kept_memory, 30, 8.0).result() < 8.0
+
+
+def test_a_worker_keeps_files_in_the_folder_of_who_started_it():
+    "So nothing is left when it is ended in the middle: the folder goes with the program"
+    with engine(2, None) as workers:
+        folder = workers.submit(tempfile.gettempdir).result()
+    assert folder == temporary_folder()

@@ -47,3 +47,13 @@ def test_names_on_the_map_go_to_the_other_side_of_a_star():
     assert not name.get_window_extent().overlaps(box)
     assert not name.get_window_extent().overlaps(texts["1"].get_window_extent())
     assert (name.xyann[0] > 0) == (row.before[0] > 0)
+
+
+def test_a_point_far_away_does_not_shrink_the_drive():
+    "A control point of another town, or at 0/0, is counted in the title and left out of the map"
+    _, correction, report = fabricate(drive())
+    far = replace(report.targets[0], name="far", surveyed=(0.0, 0.0, 0.0))
+    figure = map_figure(correction, replace(report, targets=[*report.targets, far]))
+    (axes,) = figure.axes
+    assert "(far outside: 1)" in axes.get_title(loc="left")
+    assert np.ptp(axes.get_xlim()) < 1e4  # m

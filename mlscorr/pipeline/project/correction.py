@@ -198,8 +198,9 @@ class _Work:
         planned[:] = [drive.without(lost) for drive in planned]
         planned[:] = [drive for drive in planned if drive.survey.clouds]
         files = [task.key for task in every]
-        lists = [d.survey.control for d in planned], [d.survey.check for d in planned]
-        key = digest(VERSION, files, *lists, self.options.order, self.ties, self.options.sigma)
+        surveys = [d.survey for d in planned]  # what results keep of them, paths and notes too
+        kept = [(s.control, s.check, s.crs, s.notes, s.inputs, s.clouds) for s in surveys]
+        key = digest(VERSION, files, kept, self.options.order, self.ties, self.options.sigma)
         keys = {d.survey.name: digest(key, d.survey.name) for d in planned}
         if not all(_is_there(store, own) for own in keys.values()):
             self._estimate(planned, every, findings, keys, origin)

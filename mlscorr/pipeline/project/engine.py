@@ -6,11 +6,14 @@ import ctypes
 import multiprocessing
 import os
 import signal
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
+
+from mlscorr.io.preparation import temporary_folder
 
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
 LARGE_ARRAY = 1 << 22  # B; glibc keeps freed ones of up to 32 MB: 0.15 GB after some tasks
@@ -56,7 +59,9 @@ class Processes:
     def _pool(self):
         if self._executor is None:
             context = multiprocessing.get_context("spawn")  # a fork may inherit held locks
-            self._executor = ProcessPoolExecutor(self.width, context, _start_worker)
+            self._executor = ProcessPoolExecutor(
+                self.width, context, _start_worker, (temporary_folder(),)
+            )
         return self._executor
 
     def close(self) -> None:
@@ -76,12 +81,14 @@ def _in_single_threads(function, *arguments):
     return function(*arguments)
 
 
-def _start_worker():
+def _start_worker(folder):
     """Leave interruptions to the process that waits for this one, and end with it.
 
-    Large arrays' memory returns to the system at once, as dask has it, too.
+    What it keeps for a while goes into that one's folder, which goes however this one ends. Large
+    arrays' memory returns to the system at once, as dask has it, too.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tempfile.tempdir = folder
     with suppress(AttributeError, OSError, TypeError):  # a C library that isn't GNU's
         ctypes.CDLL(None).mallopt(-3, LARGE_ARRAY)  # M_MMAP_THRESHOLD of malloc.h
     threading.Thread(target=_end_with_parent, daemon=True).start()
