@@ -125,7 +125,10 @@ def effect_class(name: str) -> type[Effect]:
     by_name = effects_by_name()
     if name not in by_name:
         near = get_close_matches(str(name), by_name, n=1, cutoff=0.0)[0]
-        raise ValueError(f"{name!r} is an unknown effect; the nearest known one is {near}.")
+        raise ValueError(
+            f"{name!r} is an unknown effect; the nearest known one is {near}. Is it your own? Then "
+            "give its file: --effects FILE."
+        )
     return by_name[name]
 
 

@@ -19,6 +19,7 @@ from mlscorr.gap.plan.additions import NextData
 from mlscorr.survey import Survey
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
+NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
 LISTED = 1e-4  # probability from which on a pair is listed in the evidence
 
 
@@ -111,9 +112,7 @@ def _advice(inference, closure, next_data):
     """What to do about a verdict: a list of sentences."""
     verdict, sentences = inference.verdict, []
     if verdict.label == "none":
-        sentences.append(
-            "Nothing needs to be done: what is left agrees with what the simulator says."
-        )
+        sentences.append(NOTHING_TO_DO)
     elif verdict.is_hidden:
         sentences.append(
             "Find out why the targets of that stretch could not be matched before the survey is "

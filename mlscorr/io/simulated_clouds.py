@@ -39,7 +39,14 @@ def simulated_survey(path: Path | str, survey: Survey) -> Survey:
             if conflict := crs_conflict(read_layout(cloud), survey.crs):
                 raise ValueError(f"The simulated clouds can't be compared. {conflict}")
     with warnings.catch_warnings(action="ignore"):  # of the CRS, which agrees
-        files = [cloud_file(cloud, survey.trajectory, "auto", survey.crs)[0] for cloud in clouds]
+        try:
+            given = survey.trajectory, "auto", survey.crs
+            files = [cloud_file(cloud, *given)[0] for cloud in clouds]
+        except ValueError as error:
+            raise ValueError(
+                f"The simulated clouds of {path} can't be compared; change their times, not "
+                f"survey.toml. {error}"
+            ) from None
     return replace(survey, name=path.name, path=path, clouds=tuple(files))
 
 

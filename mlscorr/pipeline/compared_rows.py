@@ -26,6 +26,7 @@ NEXT_CLOUDS = (
     "Put the cause into your simulator, and give the clouds that it makes then as a second "
     "--simulated: they tell how far the gap shrinks, and by themselves what is left."
 )
+SECOND_CLOUDS = "Run mlscorr diagnose with your second clouds alone: they tell what is left."
 LINEAR = (
     "How far the gap would shrink is reckoned to the first order: your simulator ran only once."
 )
@@ -92,12 +93,14 @@ def compare_with_belief(
         When there is too little to say anything.
     """
     pairing, rows, beams, absence, patches = _observed(survey, believed, library, progress)
+    rows, noisy = observe.beside_seen_noise(rows)
     simulator = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
     used = np.arange(len(rows)) < len(pairing.rows)
     observed = without_effects(rows, believed, effects)
     apart = rng.spawn(1)[0]  # how much is contrasted leaves the draws of the verdict alone
     contrasts = contrast.contrast_returns(believed, patches, _loss(effects), apart)
-    compared = observed, used, simulator.added, absence, pairing.notes, contrasts
+    notes = (*pairing.notes, *noisy)
+    compared = observed, used, simulator.added, absence, notes, contrasts
     return ComparedRows(*compared, next_run=NEXT_RUN)
 
 
@@ -149,11 +152,7 @@ def compare_with_clouds(
         notes = (*notes, sentence)
     first, *following = observe.without_unpaired(compared)
     check_enough(survey, first, library, notes)
-    if not first.residual.any():
-        raise ValueError(
-            f"The clouds of {folders[0]} are the survey's own: none of {len(first)} differences is "
-            "other than zero. Give those that your simulator made."
-        )
+    _check_simulated(first, folders[0])
     is_check = np.isin(first.targets.name, survey.check.name)
     used = (first.survey_item < 0) | ~is_check[first.survey_item]
     real, simulated_first = samples[:2]
@@ -162,14 +161,25 @@ def compare_with_clouds(
         contrast.contrast_clouds(believed, real, simulated_first, apart),
         contrast.cloud_distances(real, simulated_first, samples[2] if following else None, apart),
     )
+    quiet, noisy = observe.beside_seen_noise(first)
+    notes = (*notes, *noisy)
     if following:
         change = first.residual - following[0].residual
-        return ComparedRows(first, used, change, absence, notes, *channels)
+        return ComparedRows(quiet, used, change, absence, notes, *channels, SECOND_CLOUDS)
 
     def to_first_order(effects):
         return expected(first, believed, effects).shift
 
-    return ComparedRows(first, used, to_first_order, absence, (*notes, LINEAR), *channels)
+    return ComparedRows(quiet, used, to_first_order, absence, (*notes, LINEAR), *channels)
+
+
+def _check_simulated(rows, folder):
+    """Refuse clouds that no simulator made."""
+    if not rows.residual.any():
+        raise ValueError(
+            f"The clouds of {folder} are the survey's own: none of {len(rows)} differences is "
+            "other than zero. Give those that your simulator made."
+        )
 
 
 def _simulated_clouds(simulated, patches, correction, progress):

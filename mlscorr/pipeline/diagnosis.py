@@ -14,7 +14,7 @@ from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import contrast
 from mlscorr.gap.agreement import agreements
 from mlscorr.gap.close import Closure, FoundCause, cause_for_simulator, close_gap
-from mlscorr.gap.document import gap_document
+from mlscorr.gap.document import NOTHING_TO_DO, gap_document
 from mlscorr.gap.infer import Costs, Inference, infer_causes
 from mlscorr.gap.observe import Absence, Rows, background
 from mlscorr.gap.plan import NextData, next_data
@@ -96,6 +96,7 @@ def diagnose(
     simulator = beliefs_of(survey) if simulator is None else simulator
     believed, effects = as_believed(survey, simulator)
     if simulated:
+        simulated = [simulated] if isinstance(simulated, str | Path) else simulated
         compared = compare_with_clouds(survey, believed, simulated, library, rng, progress)
     else:
         compared = compare_with_belief(survey, believed, effects, library, rng, progress)
@@ -136,8 +137,9 @@ def _looks_again(absence):
     return [
         NextData(
             f"the stretch from {run.gps_time[0]:.1f} to {run.gps_time[-1]:.1f} s again, and its "
-            f"targets {', '.join(run.name)}",
-            f"{len(run.name)} neighbours within sight have no residual: nothing is known there.",
+            f"targets {', '.join(run.distinct)}",
+            f"{len(run.distinct)} neighbours within sight have no residual: nothing is known "
+            "there.",
         )
         for run in absence.runs
     ]
@@ -170,18 +172,15 @@ class DiagnosedSurvey(Summary):
 
         believed, _ = as_believed(self.survey, self.simulator)
         content = gap_document(
-            survey=self.survey,
-            rows=self.rows,
-            inference=self.inference,
-            closure=self.closure,
-            next_data=self.next_data,
-            effects=self.effects,
-            left_out=self.left_out,
-            warnings=self.warnings,
-            absence=self.absence,
-        )
+            survey=self.survey, rows=self.rows, inference=self.inference, closure=self.closure,
+            next_data=self.next_data, effects=self.effects, left_out=self.left_out,
+            warnings=self.warnings, absence=self.absence,
+        )  # fmt: skip
         if self.inference.verdict.label not in ("none", "unknown"):
             content["advice"].append(self.next_run)
+        if any(contrast.sentences for contrast in self.contrasts):
+            content["advice"] = [s for s in content["advice"] if s != NOTHING_TO_DO]
+            content["advice"].append("See by what the clouds differ beside geometry: Channels.")
         agreement = agreements(self.rows, background(self.rows, believed))
         content["costs"] = vars(self.costs)
         content["contrasts"] = [contrast.document() for contrast in self.contrasts]

@@ -10,6 +10,7 @@ from mlscorr.effects.labels import lowered, title
 from mlscorr.gap.close import LoneEffect, lone_effects
 from mlscorr.gap.infer import Costs
 from mlscorr.io.output import document
+from mlscorr.pipeline.compared_rows import NEXT_RUN
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate.simulator_file import Simulator
@@ -63,7 +64,9 @@ class DiagnosedRounds:
             )
         lone = [vars(effect) | {"unit": "mm"} for effect in self.lone]
         ablation = {"rounds": rounds, "alone": lone, "ended": self.ended}
-        return document("gap", self.rounds[0].document | {"ablation": ablation})
+        first = self.rounds[0].document
+        advice = [sentence for sentence in first["advice"] if sentence != NEXT_RUN]
+        return document("gap", first | {"ablation": ablation, "advice": advice})
 
     def write(self, out: Path, overwrite: bool = False) -> dict:
         """Write gap.json and gap.html of the first round, and the last simulator.toml.

@@ -27,7 +27,7 @@ def noise_of_positions(g, effect, rng):
     return np.einsum("mi,im->m", rows.partials[:, :3], at_rows)
 
 
-KINDS = ("time_offset", "range_bias", "lever_arm", "position_bump", "position_noise")
+KINDS = ("time_offset", "range_bias", "lever_arm", "position_bump", "position_noise", "dropout")
 
 
 class Bed:
@@ -38,7 +38,10 @@ class Bed:
         fixed = [effect for effect in effects if not effect.random]
         self.rows, self.survey, self.effects = surveyed(g, 31, *fixed), g.survey, effects
         for effect in effects[len(fixed) :]:
-            moved = noise_of_positions(g, effect, np.random.default_rng(7))
+            if effect.name == "dropout":
+                moved = -effect.magnitude * (self.rows.channel == "return_rate")
+            else:
+                moved = noise_of_positions(g, effect, np.random.default_rng(7))
             self.rows = replace(self.rows, residual=self.rows.residual + moved)
         signs, _ = signatures(self.rows, self.survey)
         self.signs = tuple(sign for sign in signs if sign.name in KINDS)

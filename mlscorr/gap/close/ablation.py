@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from mlscorr.gap.close.systematic import unit_square
 from mlscorr.gap.infer.causes import Inference, cause_of
-from mlscorr.gap.infer.measure import Explanations, signed_root, unit_square
+from mlscorr.gap.infer.measure import Explanations, signed_root
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.signatures.signatures import Signature

@@ -120,7 +120,8 @@ def make_folds(
         return Folds(block, nothing, (whole,), held_out, whole, columns)
     shift = columns @ np.concatenate([np.zeros(0), *(size for _, size in case.shifting)])
     squares = np.bincount(block, (shift * rows.metric * used) ** 2)
-    if squares.max() > SETTINGS.block_share * squares.sum() > 0:
+    is_brief = len(np.unique(block[used & rows.metric])) < 2
+    if is_brief or squares.max() > SETTINGS.block_share * squares.sum() > 0:
         held_out = "Nothing could be held out: what acts in one moment is told by no other."
         return Folds(block, nothing, (whole,), held_out, whole, columns)
     fold = np.where(used, _dealt(squares)[block], -1)

@@ -43,6 +43,8 @@ def errors_over_sigma(
 ) -> OverSigma:
     """OverSigma of the rows along an axis of the map, by sizes found without them.
 
+    Not of planes of two passes: where they are is free, which outweighs all that passes differ by.
+
     Parameters
     ----------
     rows : Rows
@@ -63,7 +65,7 @@ def errors_over_sigma(
     scaled.append(o.whitener(after.model).draw(rng, SETTINGS.replicas) / _sigma(o, after)[:, None])
     axis = rows.covariates["axis"][o.row]
     inside = window_growth(after.model.windows, o.errors.gps_time)[:, 0] > 0
-    here = o.second & (inside | (not after.model.windows))
+    here = ~rows.two_times[o.row] & (inside | (not after.model.windows))
     parts = [(name, here & (axis == number)) for number, name in enumerate(AXES)]
     parts = [(name, part) for name, part in parts if part.any()]
     values = [[np.sqrt((v[part] ** 2).mean(axis=0)) for v in scaled] for _, part in parts]

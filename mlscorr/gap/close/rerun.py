@@ -7,7 +7,7 @@ and planes as the survey shows them; a plane that was seen twice is one.
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from mlscorr.gap.observe.selection import gate
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.gap.signatures.changes import check_mounting
 from mlscorr.gap.signatures.expectation import expected
+from mlscorr.gap.signatures.simulators import joined
 from mlscorr.simulate.scan import Draws, Met, Planes, Replay, TargetWorld, true_targets
 from mlscorr.survey import Survey
 
@@ -112,7 +113,8 @@ class BeamSimulator:
 
     def added(self, effects: Iterable[Effect]) -> np.ndarray:
         """What further effects add to each row (m,); to the first order where no run tells it."""
-        added = self._run((*self.effects, *effects)) - self._plain
+        union = reduce(joined, effects, [*self.effects])
+        added = self._run(tuple(union)) - self._plain
         linear = expected(self.rows, self.survey, effects).shift
         return np.where(np.isfinite(added) & self.rows.metric, added, linear)
 

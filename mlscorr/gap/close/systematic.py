@@ -17,7 +17,7 @@ from mlscorr.gap.close.cross_fit import CrossFit
 from mlscorr.gap.close.folds import Folds
 from mlscorr.gap.infer.columns import ColumnTable
 from mlscorr.gap.infer.error_models import ErrorModel
-from mlscorr.gap.infer.measure import Explanations, unit_square
+from mlscorr.gap.infer.measure import Explanations
 from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 
@@ -39,6 +39,23 @@ def share_gone(before: float, after: float, chance: float = -np.inf) -> float:
     before, after = max(before, 0.0), -after if after < chance else max(after, 0.0)
     largest = max(before, after)
     return float((before - after) / largest) if largest > 0 else 0.0
+
+
+def unit_square(observations: Observations, model: ErrorModel) -> float:
+    """Square of the length that a sum of squares of one has, spread over all rows. Units: m^2.
+
+    The sigma is that of the median innovation; of planes of two passes that of the second look, as
+    the first one only says where the plane is.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : ErrorModel
+        Of V.
+    """
+    _, sigma = observations.whitener(model).innovations(np.zeros((len(observations), 1)))
+    second = observations.second
+    return float(np.median(sigma[second]) ** 2 / second.sum())
 
 
 @dataclass(frozen=True)

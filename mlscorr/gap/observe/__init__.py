@@ -1,6 +1,7 @@
 """What is compared: rows of observed minus simulated, and what each was measured under."""
 
 from mlscorr.gap.observe.absence import Absence, find_absence
+from mlscorr.gap.observe.channels import beside_seen_noise
 from mlscorr.gap.observe.pairing import Pairing, build_rows
 from mlscorr.gap.observe.patch_search import PatchCollector
 from mlscorr.gap.observe.patches import Patches

@@ -29,12 +29,17 @@ class AbsentRun:
     reason: tuple[str, ...]
 
     @property
+    def distinct(self) -> list[str]:
+        """The names, each once: what hides a target in one pass hides it in the next."""
+        return list(dict.fromkeys(self.name))
+
+    @property
     def lead(self) -> str:
         """What the run looks like, in words."""
         return (
             f"stretch from {self.gps_time[0]:.1f} to {self.gps_time[-1]:.1f} s in which the "
-            f"{len(self.name)} surveyed targets {', '.join(self.name)} were within sight and none "
-            "could be matched"
+            f"{len(self.distinct)} surveyed targets {', '.join(self.distinct)} were within sight "
+            "and none could be matched"
         )
 
     def document(self) -> dict:
@@ -71,8 +76,8 @@ class Absence:
         There are fewer than n places for a run of r, each of probability q^r; q is the share that
         is missing outside the runs, by Laplace's rule of succession.
         """
-        lengths = np.array([len(run.name) for run in self.runs], dtype=int)
-        inside = lengths.sum()
+        lengths = np.array([len(run.distinct) for run in self.runs], dtype=int)
+        inside = sum(len(run.name) for run in self.runs)
         share = (self.missing - inside + 1) / (self.sightings - inside + 2)
         return float(np.prod(np.minimum(self.sightings * share**lengths, 1.0)))
 

@@ -20,7 +20,7 @@ from mlscorr.gap.observe.selection import consistent, gate, moved_by, places, sp
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.gap.observe.shared_planes import compare_planes, plane_noise
 from mlscorr.gap.observe.surfaces import OnReference
-from mlscorr.survey import PointCloud, Survey, TargetObservations
+from mlscorr.survey import Matched, PointCloud, Survey, TargetObservations
 from mlscorr.targets import Candidates
 
 
@@ -150,12 +150,13 @@ def rows_against(
         f" No pulse of the same time has its point within {SETTINGS.cell:g} m of the real one: "
         "another clock, other beams or another place was simulated."
     )
+    is_elsewhere = number > 0 and not np.isfinite(simulated.beams.xyz).any()
     is_whole = targets == len(matched) and by_beams + by_place == number
     return rows, (
         f"Of {simulated.name}, {targets} of {len(matched)} observed targets were paired, and "
         f"{by_beams + by_place} of {number} patches ({by_beams} by pulses of the same times, "
         f"{by_place} by place){'.' if is_whole else '; the rest is not compared.'}"
-        f"{elsewhere * (by_beams == 0 < number)}"
+        f"{elsewhere * is_elsewhere}{_beside(survey, simulated.matched) if targets else ''}"
     )
 
 
@@ -255,7 +256,7 @@ def _by_place(survey, patches, near, simulated, other):
 
 def _against_channels(rows, survey, simulated, other):
     """Roughness and return rates less those of the simulated patches; NaN without one."""
-    residual, noise = rows.residual.copy(), rows.noise.copy()
+    residual, noise, believed = rows.residual.copy(), rows.noise.copy(), rows.believed.copy()
     channels = np.isin(rows.channel, ("roughness", "return_rate"))
     if simulated is None:
         return replace(rows, residual=np.where(channels, np.nan, residual))
@@ -269,7 +270,19 @@ def _against_channels(rows, survey, simulated, other):
         has = (pair >= 0) & known[pair]
         residual[on] = np.where(has, residual[on] - value[pair], np.nan)
         noise[on] += np.where(has, variance[pair], 0.0)
-    return replace(rows, residual=residual, noise=noise)
+        if channel == "roughness":
+            believed[on] *= np.where(has, np.exp(value[pair]), 1.0)
+    return replace(rows, residual=residual, noise=noise, believed=believed)
+
+
+def _beside(survey, matched):
+    """A sentence on how far simulated targets stand from where they were surveyed."""
+    misclosure = Matched.by_name(matched, survey.surveyed).misclosure
+    middle = "/".join(f"{v:+.3f}" for v in -np.median(misclosure, axis=0))
+    return (
+        f" In the median its targets stand {middle} m (E/N/H) beside where they were surveyed: of "
+        "that much a wrong datum can't be told."
+    )
 
 
 def _elsewhere(survey, patches, simulated):

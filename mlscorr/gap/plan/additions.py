@@ -144,17 +144,17 @@ def _followed(trajectory, rows, time, **changed):
 
 
 def _more_targets(rows, survey, items, farther=1.0):
-    """Targets like the items, half an interval later, seen under the same angles."""
+    """Targets like the items, half an interval later or sooner, seen under the same angles."""
     once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
     trajectory = survey.trajectory
     visits = np.sort(np.unique(once.gps_time))
     later = 0.5 * np.median(np.diff(visits)) if len(visits) > 1 else 1.0
 
     def anew(time):
-        moved = time + later
-        same = trajectory.segment(moved) == trajectory.segment(time)
-        back = np.maximum(time - later, trajectory.gps_time[0])
-        return np.where(same & (trajectory.segment(moved) >= 0), moved, back)
+        moved, own = time, trajectory.segment(time)
+        for other in (time - later, time + later):
+            moved = np.where(trajectory.segment(other) == own, other, moved)
+        return moved
 
     return _new_targets(rows, survey, once, anew, farther)
 

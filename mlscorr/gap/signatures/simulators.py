@@ -1,5 +1,6 @@
 """The survey as a simulator believes in it, and the simulator with a cause added."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from mlscorr.effects import Effect, in_order
 from mlscorr.effects.mounting import Boresight, LeverArm
+from mlscorr.effects.ranging import Dropout
 from mlscorr.simulate.simulator_file import Simulator, beliefs_of
 from mlscorr.survey import Survey
 
@@ -75,11 +77,11 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     """
     effects = list(simulator.effects)
     for new in cause.effects:
-        effects = _with(effects, new)
+        effects = joined(effects, new)
     if simulator.mounting is not None:  # differences of the mounting have become effects
         _, effects_now = as_believed(survey, replace(simulator, effects=()))
         for effect in effects_now:
-            effects = _with(effects, effect)
+            effects = joined(effects, effect)
     scale, pos = cause.model.scale, simulator.pos
     if not cause.parts or scale != 1.0:
         attitude = np.asarray(pos.attitude_sigma) * scale
@@ -89,13 +91,21 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     return replace(simulator, mounting=mounting, pos=pos, effects=in_order(effects))
 
 
-def _with(effects, new):
-    """Effects with one more; one of the same kind and place is joined with it."""
+def joined(effects: Sequence[Effect], new: Effect) -> list[Effect]:
+    """Effects with one more; one of the same kind and place is joined with it.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    new : Effect
+    """
     fixed = _fixed(new)
     for i, old in enumerate(effects):
         if old.name == new.name and _fixed(old) == fixed:
             a, b = np.asarray(old.magnitude, float), np.asarray(new.magnitude, float)
             total = np.hypot(a, b) if new.random else a + b
+            if new.name == Dropout.name:  # of the pulses that are left
+                total = a + b - a * b
             size = float(total) if total.ndim == 0 else total.tolist()
             return [*effects[:i], replace(old, magnitude=size), *effects[i + 1 :]]
     return [*effects, new]

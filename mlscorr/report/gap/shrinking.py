@@ -42,7 +42,7 @@ def is_within(value: float | None, band: list[float | None]) -> bool:
     value : float or None
     band : list of 2 floats or None
     """
-    return all(map(known, [value, *band])) and value <= band[1]
+    return all(map(known, [value, *band])) and band[0] <= value <= band[1]
 
 
 def shrinking(document: dict) -> Fact:
@@ -62,7 +62,7 @@ def shrinking(document: dict) -> Fact:
         nearest = f"With the nearest known effect, {lowered(title(closure['effect']))},"
         return Fact(f"{nearest} in the simulator", pair, shrunk(closure))
     more = ""
-    if is_within(closure["after"], closure["null_band"]):
+    if is_within(closure["after"], closure["null_band"]) and not not_closed(closure):
         more = " What is left is what chance leaves when nothing is wrong."
     part = f"{GAPS.get(closure.get('kind'), 'Gap')} on held-out data"
     return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)

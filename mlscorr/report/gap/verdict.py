@@ -203,6 +203,9 @@ def _certainty(document):
     share = answer["probability"] + sum(share.get(name) or 0.0 for name in _same(document))
     share = min(1.0, share)
     words = next(words for least, words in CERTAINTY if share >= least)
+    if max((p or 0.0 for name, p in _probabilities(document).items() if name != answer["label"]),
+           default=0.0) > share:  # fmt: skip
+        words = "another is likelier, but would cost more if it were wrong"
     more = [chance(answer["p_value"]), "± is one sigma." if is_named(document) else ""]
     return Fact("How sure", f"{in_hundred(share)}: {words}", " ".join(filter(None, more)))
 

@@ -3,6 +3,10 @@
 import numpy as np
 import pytest
 
+from mlscorr.effects import make_effect
+from mlscorr.report.gap.shrinking import is_within
+from tests.beds.gap_closure import Bed
+
 
 def test_a_cause_closes_its_gap_where_its_size_was_not_looked_for(late):
     "Of the clock's shift 98 % go truly; so it is stated to 3 %, and the interval holds the truth"
@@ -57,3 +61,15 @@ def test_noise_closes_within_its_bounds(shaky):
     assert 0.8 < closure.shrink <= 1.0
     assert -1 <= closure.interval[0] <= closure.shrink <= closure.interval[1] <= 1
     assert len(closure.folds) == 5
+
+
+def test_lost_returns_close_like_any_other_cause():
+    "A tenth of the pulses is lost: put in at the size that is found, most of the square is gone"
+    closure = Bed(make_effect("dropout", magnitude=0.1)).close("dropout")
+    assert closure.kind == "returns"
+    assert closure.before == pytest.approx(-10.0, abs=0.5)  # %
+    assert closure.before < closure.after < 0
+    gone = 1 - (closure.after / closure.before) ** 2
+    assert closure.shrink == pytest.approx(gone, abs=0.01)
+    assert closure.interval[0] < closure.shrink < closure.interval[1]
+    assert not is_within(closure.before, list(closure.null_band))

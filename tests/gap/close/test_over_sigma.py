@@ -5,7 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mlscorr.gap.close.folds import Folds
 from mlscorr.gap.close.over_sigma import OverSigma, errors_over_sigma
+from mlscorr.gap.infer.measure import Predicted
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.observe.rows import background
 
 
 def test_errors_that_are_simulated_are_about_one_sigma(late):
@@ -33,3 +37,21 @@ def test_twice_the_sigma_may_be_chance(after, beyond):
     "Beyond is what is more than 1.96 sigma and more than chance makes of this survey"
     errors = OverSigma(("E", "H"), (9.0, 9.0), (1.0, after), (1.3, 2.5))
     assert errors.beyond == beyond
+
+
+def test_planes_of_two_passes_tell_nothing_of_sigma(case):
+    "Where they are is free to a metre: they take no part, and targets and surfaces count in full"
+    survey, _, rows, _ = case
+    both = Observations.of(rows, background(rows, survey))
+    kept = rows.select(~rows.two_times)
+    single = Observations.of(kept, background(kept, survey))
+    nothing = [Predicted.nothing(r) for r in (rows, kept)]
+    errors = [
+        errors_over_sigma(
+            r, o, Folds(*np.zeros((2, len(r)), int), (p,), "", p, np.zeros((len(r), 0))),
+            np.random.default_rng(1),
+        )
+        for r, o, p in zip((rows, kept), (both, single), nothing, strict=True)
+    ]  # fmt: skip
+    assert rows.two_times.sum() > 50
+    assert errors[0].before == pytest.approx(errors[1].before, rel=0.05)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.close.rerun import rerun
+from mlscorr.gap.close.rerun import BeamSimulator, rerun
 from mlscorr.gap.signatures.changes import Bench
 from tests.beds.gap_surveys import beams_of, read_once, rows_of
 
@@ -163,3 +163,14 @@ def test_without_a_mounting_the_pose_can_still_be_wrong(case):
         assert np.sqrt(np.nanmean(left[rows.channel == channel] ** 2)) < rms
     with pytest.raises(ValueError, match=r"range_bias acts on the range, .* no \[mounting\]"):
         run(blind_case, make_effect("range_bias", magnitude=0.01))
+
+
+def test_noise_that_is_there_already_can_be_found_again(case):
+    "The simulator has a range noise of 3 mm, and 4 mm more are found: as one of 5 mm"
+    survey, _, rows, beams = case
+    known, found, both = (make_effect("range_noise", magnitude=m) for m in (0.003, 0.004, 0.005))
+    again = BeamSimulator(rows, survey, beams, (known,), 3).added([found])
+    plain = BeamSimulator(rows, survey, beams, (), 3)
+    rough = rows.channel == "roughness"
+    expected = plain.added([both]) - plain.added([known])
+    assert again[rough] == pytest.approx(expected[rough], abs=1e-9)

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.close.cross_fit import CrossFit
-from mlscorr.gap.close.systematic import SystematicGap, share_gone
+from mlscorr.gap.close.systematic import SystematicGap, share_gone, unit_square
 from mlscorr.gap.infer.columns import ColumnBlock, ColumnTable
+from mlscorr.gap.infer.error_models import STATED
 from mlscorr.gap.infer.measure import Explanations
+from mlscorr.gap.infer.observations import Observations
+from mlscorr.gap.observe.rows import background
 
 
 @pytest.mark.parametrize(("before", "after", "share"), [
@@ -64,3 +67,13 @@ def test_nothing_predicted_leaves_the_signed_gap_as_it_is():
     squares = gap(0.0, found=0.0)[0].measure(np.random.default_rng(2))
     low, high = np.percentile(squares.chance, [0.5, 99.5])
     assert low <= squares.square[0] == squares.square[1] <= high
+
+
+def test_a_sum_over_planes_of_two_passes_is_as_long_as_what_they_differ_by(case):
+    "The first look at a plane says where it is, to a metre: the unit is that of the second looks"
+    survey, _, rows, _ = case
+    shared = rows.select(rows.two_times)
+    observations = Observations.of(shared, background(shared, survey))
+    length = np.sqrt(unit_square(observations, STATED) * observations.second.sum())
+    assert len(observations) > 1.5 * observations.second.sum()
+    assert 0.0005 < length < 0.05  # m: noise of a plane, of a POS of centimetres

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.gap.infer.verdict import with_absence
-from mlscorr.gap.observe.absence import Absence, find_absence
+from mlscorr.gap.observe.absence import Absence, AbsentRun, find_absence
 from mlscorr.matching import Matches, Refusal
 from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
 
@@ -80,3 +80,11 @@ def test_targets_out_of_sight_are_not_missed():
     survey = survey_of(NAMES)
     survey.control.position[4:7, 1] = 50.0
     assert find_absence(survey, matches_of(survey, NAMES[4:7])) == Absence((), 12, 0)
+
+
+def test_a_target_hidden_in_two_passes_is_missed_once():
+    "Two neighbours that both passes miss are a run of two, not of four: no less by chance"
+    twice = AbsentRun(("T04", "T05", "T05", "T04"), (25.0, 30.0, 65.0, 70.0), ("",) * 4)
+    once = AbsentRun(("T04", "T05"), (25.0, 30.0), ("",) * 2)
+    assert "the 2 surveyed targets T04, T05 were" in twice.lead
+    assert Absence((twice,), 30, 4).chance == pytest.approx(Absence((once,), 30, 2).chance, rel=0.2)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.observe.channels import loss_variance, return_rate, roughness
+from mlscorr.gap.observe.channels import beside_seen_noise, loss_variance, return_rate, roughness
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.io.las import read_chunks
@@ -94,3 +94,16 @@ def test_where_all_is_lost_the_variance_stays_positive():
     "Nothing returns from 3 patches of 80 pulses: that of a loss of 99.8 %"
     variance = loss_variance(np.zeros(3), np.full(3, 80), np.ones(3, dtype=bool))
     assert variance * 80 == pytest.approx(0.998 * 0.002)
+
+
+def test_a_scanner_believed_too_noisy_is_told_and_noise_is_compared_with_the_cloud(pairing):
+    "Planes that scatter a third of what is believed: so it is said, and nothing is left to explain"
+    case_rows = pairing.rows
+    rough = case_rows.channel == "roughness"
+    quiet = replace(case_rows, residual=case_rows.residual - 2 * np.log(3.0) * rough)
+    rows, (sentence,) = beside_seen_noise(quiet)
+    assert "scatter 3.0 times less" in sentence
+    assert np.median(rows.residual[rough]) == pytest.approx(0.0, abs=1e-9)
+    ratio = rows.believed[rough] / quiet.believed[rough]
+    assert ratio == pytest.approx(np.full(rough.sum(), 1 / 9), rel=0.1)
+    assert beside_seen_noise(case_rows) == (case_rows, ())

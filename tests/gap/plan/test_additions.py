@@ -15,3 +15,12 @@ def test_every_addition_can_be_made_where_pulses_spread_about_their_targets():
     made = additions(replace(g.rows, pulses=early), g.survey)
     assert len(made) == 5
     assert all(len(rows) > len(g.rows) for rows, _ in made.values())
+
+
+def test_one_target_seen_by_two_passes_can_have_a_neighbour():
+    "No visit moves into the pause between the passes: additions are made of one target, too"
+    g = gap_study.geometry(6, targets=1, patches=0)
+    first, last = g.survey.trajectory.passes[0]
+    made = additions(g.rows, g.survey)
+    assert last > first
+    assert all(len(rows) > len(g.rows) for rows, _ in made.values())

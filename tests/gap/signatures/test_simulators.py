@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.signatures.simulators import as_believed
+from mlscorr.effects import make_effect
+from mlscorr.gap.signatures.simulators import as_believed, joined
 from mlscorr.simulate.simulator_file import beliefs_of
 
 
@@ -35,3 +36,13 @@ def test_a_mounting_that_the_survey_lacks_is_refused(clean):
     survey = clean[0]
     with pytest.raises(ValueError, match="give it there"):
         as_believed(replace(survey, mounting=None), beliefs_of(survey))
+
+
+@pytest.mark.parametrize(("name", "more", "total"), [
+    ("dropout", 0.05, 0.0975), ("range_noise", 0.05, 0.05 * np.sqrt(2)), ("time_offset", 0.05, 0.1),
+])  # fmt: skip
+def test_the_same_effect_again_is_joined(name, more, total):
+    "Losses of what is left, noise by squares, offsets by their sum: one effect, never two"
+    effect = make_effect(name, magnitude=more)
+    (both,) = joined([effect], effect)
+    assert both.magnitude == pytest.approx(total)
