@@ -83,7 +83,7 @@ def find_windows(equations: Equations, screening: Screening) -> tuple[DriftWindo
         run = tuple(dict.fromkeys(names[start : end + 1].tolist()))
         if _deviate_together([rejected[name] for name in run]):
             windows.append(_window(equations, times, start, end, run, rejected))
-    return tuple(windows)
+    return tuple(w for w in windows if w.first < w.last)  # others passed there at the same time
 
 
 def _deviate_together(tests: list[TargetTest]):

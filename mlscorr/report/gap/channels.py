@@ -69,17 +69,20 @@ def channel_statements(document: dict) -> Iterator[Statement]:
     document : dict
         The content of gap.json.
     """
-    compared = [each for each in document.get("contrasts", ()) if not each["silent"]]
+    parts = [], []
+    for each in document.get("contrasts", ()):
+        parts[bool(each["silent"])].append(each)
+    compared, silent = parts
     if not compared:
         return
+    names, rest = (joined(lowered(WORDS[e["channel"]][0]) for e in some) for some in parts)
+    rest = f" Not compared: {rest}." if silent else ""
     sentences = [text for each in compared for text in each["sentences"]]
     if not sentences:
-        names = joined(lowered(WORDS[each["channel"]][0]) for each in compared)
-        text = f"No difference beyond chance in {names}."
-        yield Statement("Channels", "green", text)
+        yield Statement("Channels", "green", f"No difference beyond chance in {names}.{rest}")
         return
     more = len(sentences) - 1
-    rest = f" {more} more on the page." if more else ""
+    rest = f" {more} more on the page." * bool(more) + rest
     yield Statement("Channels", "amber", f"{sentences[0]}{rest}")
 
 
