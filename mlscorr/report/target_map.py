@@ -31,9 +31,13 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     """
     way = track(correction.corrected)
     driven = way[np.isfinite(way).all(axis=1)]
-    margin = max(float(np.ptp(driven, axis=0).max()), 1.0) / 4
-    box = driven.min(axis=0) - margin, driven.max(axis=0) + margin
-    rows = [row for row in ordered(report.targets) if _is_within(row.surveyed[:2], *box)]
+    margin = max(float(np.ptp(driven, axis=0).max()), 200.0) / 4  # m
+    low, high = driven.min(axis=0) - margin, driven.max(axis=0) + margin
+    rows = [
+        row
+        for row in ordered(report.targets)
+        if row.is_observed or np.all((row.surveyed[:2] >= low) & (row.surveyed[:2] <= high))
+    ]
     outside = len(report.targets) - len(rows)
     points = np.vstack([driven, array(rows, "surveyed")[:, :2]])
     extent = max(float(np.ptp(points, axis=0).max()), 1.0)
@@ -60,10 +64,6 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     handles += [Line2D([], [], label=NEXT_WORDS, **NEXT)] * bool(report.next_control)
     style.legend_above(figure, handles)
     return figure
-
-
-def _is_within(place, low, high):
-    return bool(np.all((place >= low) & (place <= high)))
 
 
 def mark_places(axes: Axes, places: Sequence[tuple[float, float]]) -> None:

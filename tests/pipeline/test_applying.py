@@ -150,7 +150,7 @@ def test_one_effect_need_be_in_no_list(site):
 
 
 def test_points_that_stay_as_they_are_end_with_a_code_of_their_own(site, tmp_path):
-    "The trajectory ends early: the rest of the cloud is counted, and the code says that not all was done"
+    "The trajectory ends early: the rest is counted, and not all was done"
     folder = shutil.copytree(site, tmp_path / "short")
     rows = (folder / "trajectory.csv").read_text().splitlines(keepends=True)
     (folder / "trajectory.csv").write_text("".join(rows[: len(rows) * 3 // 4]))
