@@ -129,9 +129,9 @@ def _history(trajectory):
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
     first = np.append(time[rises], np.inf)[np.searchsorted(time[rises], edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
-    # where sigma(t) stays raised across an edge it doesn't rise: GNSS isn't back, or not fixed
-    across = np.searchsorted(time, [edges, edges + SETTINGS.fix_time]).clip(max=len(time) - 1)
-    starts = np.where(is_raised[across].all(axis=0), edges, starts)
+    # where sigma(t) stays raised from one edge to the next it doesn't rise: GNSS isn't back
+    rows, lowered = np.searchsorted(time, edges), np.append(0, np.cumsum(~is_raised))
+    starts = np.where(lowered[np.append(rows[1:], len(time))] == lowered[rows], edges, starts)
     return DriftHistory(trajectory, steps, restarts, returns, starts, held)
 
 

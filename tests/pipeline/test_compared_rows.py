@@ -80,7 +80,7 @@ def test_their_next_run_tells_how_far_the_gap_shrinks(compared):
     "18 of 20 ms take 99 % of the square, to 1 %"
     assert compared["closure"]["shrink"] == pytest.approx(0.99, abs=0.01)
     assert "next run" in compared["closure"]["held_out"]
-    assert "give the clouds that it makes then" in compared["advice"][-1]
+    assert "your second clouds alone" in compared["advice"][-1]
     assert any("another clock, other beams" in sentence for sentence in compared["warnings"])
 
 

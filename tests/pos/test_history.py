@@ -101,6 +101,14 @@ def test_drift_goes_on_where_sigma_falls_and_stays_raised():
     assert np.isinf(history.starts[2])
 
 
+def test_sigma_that_converges_after_its_fall_is_no_drift():
+    "GNSS is back, and sigma sinks from 0.2 m within 30 s: nothing grows there"
+    late = np.where(TIME >= 120.0, 0.18 * np.exp(-(TIME - 120.0) / 10.0), 0.0)
+    history = drift_history(drive(0.02 + grown(3.0) + late))
+    assert history.restarts == pytest.approx([START + 120.0], abs=0.11)
+    assert np.isinf(history.starts[1])
+
+
 def test_heights_that_vary_less_are_held_like_the_rest():
     "Sigma of the plan grows tenfold in an outage, of the height by half: all three are held"
     sigma = np.column_stack([0.02 + grown(0.2), 0.02 + grown(0.2), 0.04 + grown(0.02)])
