@@ -13,7 +13,7 @@ class Settings:
     steady_ratio: float = 2.0  # of largest to held sigma; below it sigma(t) tells of no drift
     outage: float = 60.0  # s; for which data sheets of GNSS/INS state how far the position drifts
     smallest_step: float = 0.1  # m; two fixed RTK solutions of 2 cm per axis differ by less
-    step_ratio: float = 10.0  # to the median of driven seconds' largest steps: updates, jerks
+    step_ratio: float = 10.0  # to the median of seconds' largest steps: updates, noise
     largest_jerk: float = 5.0  # m/s^3, of braking in town (ISO 15622); a step is beyond it
     step_duration: float = 0.4  # s; over which filters and resampling spread a fall-back
     whole_step: float = 0.9  # of the largest size; a span that shows less cuts the step

@@ -39,7 +39,7 @@ def find_steps(trajectory: Trajectory) -> Steps:
 
     Over three equal spans the middle one's way is half of both others', but for half the jerk
     times the span cubed. What is more than that, and far above the largest differences of all other
-    seconds that the vehicle drives in, is a step.
+    seconds, is a step.
 
     Parameters
     ----------
@@ -102,11 +102,9 @@ def _differences(gps_time, position, span):
     length = np.linalg.norm(size, axis=1)
     start = gps_time[span : span + len(size)]
     second = np.floor(start - gps_time[0]).astype(int)
-    # what stands tells of no motion
-    driven = second[np.linalg.norm(about, axis=1) > SETTINGS.smallest_step]  # in a second
     largest = np.zeros(second[-1] + 1)
     np.maximum.at(largest, second, length)
-    usual = np.median(largest[np.unique(driven)]) if len(driven) else 0.0
+    usual = np.median(largest[np.unique(second)])
     jerk = SETTINGS.largest_jerk / 2 * times[span : span + len(size)] ** 3
     limit = np.maximum(jerk, max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual))
     rows = np.flatnonzero((length > limit) & (length == largest[second]))
