@@ -180,6 +180,7 @@ def test_a_sample_of_ties_does_not_depend_on_the_origin_of_time():
     np.testing.assert_array_equal(*taken)
 
 
+@pytest.mark.long
 def test_ties_do_not_outvote_control_that_agrees():
     "Facades 15 cm off, as by a turned scanner, against 16 good points: ties go, no point does"
     times = np.linspace(3.0, 57.0, 8)
@@ -193,6 +194,7 @@ def test_ties_do_not_outvote_control_that_agrees():
     assert rms(survey.left(tied.correction)) < 0.02  # m
 
 
+@pytest.mark.long
 def test_without_control_a_shift_of_all_passes_stays_in_sigma():
     "GNSS states 2, 2 and 3 cm, which ties of both passes can't see: so much is claimed"
     survey = tied_passes(1)

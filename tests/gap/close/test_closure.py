@@ -63,6 +63,7 @@ def test_noise_closes_within_its_bounds(shaky):
     assert len(closure.folds) == 5
 
 
+@pytest.mark.long
 def test_lost_returns_close_like_any_other_cause():
     "A tenth of the pulses is lost: put in at the size that is found, most of the square is gone"
     closure = Bed(make_effect("dropout", magnitude=0.1)).close("dropout")

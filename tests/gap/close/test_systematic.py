@@ -69,6 +69,7 @@ def test_nothing_predicted_leaves_the_signed_gap_as_it_is():
     assert low <= squares.square[0] == squares.square[1] <= high
 
 
+@pytest.mark.long
 def test_a_sum_over_planes_of_two_passes_is_as_long_as_what_they_differ_by(case):
     "The first look at a plane says where it is, to a metre: the unit is that of the second looks"
     survey, _, rows, _ = case
