@@ -34,15 +34,18 @@ def is_closed(document: dict) -> bool:
     return closure["effect"] not in (None, "", "none") and known(closure["shrink"])
 
 
-def is_within(value: float | None, band: list[float | None]) -> bool:
+def is_within(value: float | None, band: list[float | None], kind: str | None = None) -> bool:
     """Whether a gap is what it may be when nothing is wrong; not, when one is not known.
 
     Parameters
     ----------
     value : float or None
     band : list of 2 floats or None
+    kind : str, optional
+        Of the gap: below the band more returns are lost than by chance, of others it is smaller.
     """
-    return all(map(known, [value, *band])) and band[0] <= value <= band[1]
+    is_known = all(map(known, [value, *band]))
+    return is_known and value <= band[1] and (kind != "returns" or value >= band[0])
 
 
 def shrinking(document: dict) -> Fact:
@@ -62,7 +65,8 @@ def shrinking(document: dict) -> Fact:
         nearest = f"With the nearest known effect, {lowered(title(closure['effect']))},"
         return Fact(f"{nearest} in the simulator", pair, shrunk(closure))
     more = ""
-    if is_within(closure["after"], closure["null_band"]) and not not_closed(closure):
+    is_chance = is_within(closure["after"], closure["null_band"], closure.get("kind"))
+    if is_chance and not not_closed(closure):
         more = " What is left is what chance leaves when nothing is wrong."
     part = f"{GAPS.get(closure.get('kind'), 'Gap')} on held-out data"
     return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)
@@ -87,7 +91,7 @@ def shrunk(closure: dict) -> str:
         text = f"All of the squared gap is gone{between}."
     elif share < 0:
         text = f"The squared gap did not shrink, it grew{between}."
-    if is_within(closure["before"], closure["null_band"]):
+    if is_within(closure["before"], closure["null_band"], closure.get("kind")):
         text += " Before, it was within chance already: the share says little."
     return not_closed(closure) + text
 

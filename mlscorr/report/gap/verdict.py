@@ -82,7 +82,8 @@ def is_named(document: dict) -> bool:
 
 
 def _nothing(document):
-    is_by_chance = is_within(document["gap"]["before"], document["gap"]["null_band"])
+    gap = document["gap"]
+    is_by_chance = is_within(gap["before"], gap["null_band"], gap.get("kind"))
     kicker = "Nothing is wrong that this survey could show"
     if document["verdict"]["set"] != ["none"] or not is_by_chance:
         kicker = "Nothing is shown to be wrong, but not all is ruled out"

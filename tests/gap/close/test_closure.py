@@ -73,4 +73,5 @@ def test_lost_returns_close_like_any_other_cause():
     gone = 1 - (closure.after / closure.before) ** 2
     assert closure.shrink == pytest.approx(gone, abs=0.01)
     assert closure.interval[0] < closure.shrink < closure.interval[1]
-    assert not is_within(closure.before, list(closure.null_band))
+    assert not is_within(closure.before, list(closure.null_band), closure.kind)
+    assert is_within(-5.0, [-1.0, 1.0], "position")  # less than by chance is no doubt
