@@ -37,9 +37,9 @@ class Steps(Columns):
 def find_steps(trajectory: Trajectory) -> Steps:
     """Steps of the recorded position against the speed before and after them.
 
-    Over three equal spans the middle one's way is half of both others', but for half the jerk
-    times the span cubed. What is more than that, and far above the largest differences of all other
-    seconds, is a step.
+    Over three equal spans the middle one's way is half of both others', straight on or turned with
+    the vehicle, but for half the jerk times the span cubed. What is more than that, and far above
+    the largest differences of all other seconds, is a step.
 
     Parameters
     ----------
@@ -58,18 +58,19 @@ def find_steps(trajectory: Trajectory) -> Steps:
     table = [np.empty((0, 6))]
     for first, last in trajectory.passes:
         rows = (trajectory.gps_time >= first) & (trajectory.gps_time <= last)
-        table.append(_steps_of_pass(trajectory.gps_time[rows], trajectory.position[rows]))
+        table.append(_steps_of_pass(trajectory.select(rows)))
     columns = np.vstack(table)
     return Steps(columns[:, 0], columns[:, 1], columns[:, 2:5], columns[:, 5])
 
 
-def _steps_of_pass(gps_time, position):
+def _steps_of_pass(driven):
     """Rows (k, 6) of the steps of one pass: before, after, size, sigma."""
+    gps_time = driven.gps_time
     if len(gps_time) < 2:
         return np.empty((0, 6))
     epochs = max(round(SETTINGS.step_duration / float(np.median(np.diff(gps_time)))), 1)
     spans = {1, *(epochs // part for part in (4, 2, 1))} - {0}
-    candidates = [row for span in spans for row in _differences(gps_time, position, span)]
+    candidates = [row for span in spans for row in _differences(driven, span)]
     steps = []
     while candidates:
         largest = max(candidates, key=_length)
@@ -91,15 +92,21 @@ def _is_near(row, other):
     return row[0] < other[1] + 1.0 and row[1] > other[0] - 1.0
 
 
-def _differences(gps_time, position, span):
+def _differences(driven, span):
     """Rows (before, after, size, sigma): seconds' largest differences, if far above others'."""
+    gps_time = driven.gps_time
     if len(gps_time) <= 3 * span + 1:
         return []
-    ways, times = (values[span:] - values[:-span] for values in (position, gps_time))
+    ways, times = (values[span:] - values[:-span] for values in (driven.position, gps_time))
     speed = ways / times[:, None]
-    about = (speed[: -2 * span] + speed[2 * span :]) / 2
-    size = ways[span:-span] - times[span:-span, None] * about
-    length = np.linalg.norm(size, axis=1)
+    frames = driven.attitude[span // 2 : span // 2 + len(ways)]
+    turned = frames.inv().apply(speed)  # a car turns with its way, a drone may not
+    about = [(v[: -2 * span] + v[2 * span :]) / 2 for v in (speed, turned)]
+    about[1] = frames[span:-span].apply(about[1])
+    sizes = ways[span:-span] - times[span:-span, None] * np.array(about)
+    lengths = np.linalg.norm(sizes, axis=2)
+    nearer, rows = np.argmin(lengths, axis=0), np.arange(lengths.shape[1])
+    size, length = sizes[nearer, rows], lengths[nearer, rows]
     start = gps_time[span : span + len(size)]
     second = np.floor(start - gps_time[0]).astype(int)
     largest = np.zeros(second[-1] + 1)

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
+from mlscorr.frames import attitude_from_angles
 from mlscorr.pos import find_steps
 from mlscorr.survey import Trajectory
 
@@ -99,3 +101,29 @@ def test_braking_and_turning_is_no_step_at_any_rate(rate):
     every = slice(None, None, round(200.0 / rate))
     path = CORNER + 0.005 * np.cumsum(way, axis=0)
     assert len(find_steps(recorded(fine[every], path[every]))) == 0
+
+
+@pytest.mark.parametrize("rate", [1.0, 5.0, 10.0, 100.0, 200.0])
+def test_a_brisk_corner_is_no_step(rate):
+    "A quarter turn of 10 m radius at 8 m/s: the vehicle turns with its way, drives on, and no step"
+    fine = np.arange(0.0, 60.0, 1e-3)
+    curvature = np.where(np.abs(fine - 30.0) < 10.0 * np.pi / 32, 0.1, 0.0)  # 1/m
+    curvature = gaussian_filter1d(curvature, 250)  # over 2 m
+    heading = np.cumsum(8.0 * curvature) * 1e-3
+    path = np.cumsum(8.0 * np.column_stack([np.sin(heading), np.cos(heading), 0 * heading]), axis=0)
+    rows = slice(0, None, round(1000 / rate))
+    attitude = attitude_from_angles(0.0, 0.0, heading[rows])
+    driven = CORNER + path[rows] * 1e-3
+    assert len(find_steps(Trajectory(START + fine[rows], driven, attitude))) == 0
+    if rate > 1.0:
+        driven[fine[rows] > 45.0] += [0.3, -0.2, 0.1]
+        steps = find_steps(Trajectory(START + fine[rows], driven, attitude))
+        assert steps.size == pytest.approx(np.array([[0.3, -0.2, 0.1]]), abs=0.02)  # m
+
+
+def test_a_drone_that_turns_on_its_way_makes_no_steps():
+    "5 m/s straight on, turning by 90 deg/s about up: nothing but the way counts there"
+    time = np.arange(0.0, 60.0, 0.1)
+    path = CORNER + np.outer(time, [3.0, 4.0, 0.0])
+    turning = attitude_from_angles(0.0, 0.0, np.radians(90.0) * np.clip(time - 20.0, 0.0, 8.0))
+    assert len(find_steps(Trajectory(START + time, path, turning))) == 0
