@@ -7,9 +7,9 @@ import numpy as np
 from mlscorr.frames import scanner_position
 from mlscorr.survey import Survey, TieFeatures
 from mlscorr.survey.columns import Columns
+from mlscorr.ties.faces import COLUMNS, ROWS, join_across_faces
 from mlscorr.ties.settings import SETTINGS
 
-ROWS, COLUMNS = np.triu_indices(3)  # of the products: xx, xy, xz, yy, yz, zz
 # Visible is the half of a pole that faces the scanner, its points evenly spread across the beam:
 # their mean lies pi / 4 of the radius before the axis, their variance across is radius^2 / 3, and
 # that along the beam (2/3 - pi^2 / 16) radius^2.
@@ -84,6 +84,7 @@ def find_shapes(
     moments : (n, 21) array
         See mlscorr.ties.cells.
     """
+    moments = join_across_faces(middle, begin, group, moments)
     rows = np.flatnonzero(moments[:, 0] >= SETTINGS.points)
     middle, begin, group, moments = middle[rows], begin[rows], group[rows], moments[rows]
     covariance, noise = covariances(moments)
