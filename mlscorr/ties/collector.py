@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures
+from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures, Trajectory
 from mlscorr.ties.cells import CellTable
 from mlscorr.ties.markings import find_markings, window_of
 from mlscorr.ties.paint import Crossings, find_crossings
@@ -76,7 +76,8 @@ class TieCollector:
         self._loose += len(self._kept[-1]) + len(self._kept[-2])
         if self._loose > max(self._held_cells, self._kept_in_order):
             features = TieFeatures.concatenate(self._kept)
-            self._kept = [features[thin(features, self._origin)]]
+            rows = thin(features, self._origin, self._survey.trajectory)
+            self._kept = [features[rows]]
             self._kept_in_order, self._loose = len(self._kept[0]), 0
 
     def _shapes(self, rows):
@@ -102,10 +103,12 @@ class TieCollector:
         number = np.empty(self._starts.size, int)
         number[np.argsort(self._starts.ravel(), kind="stable")] = np.arange(1, number.size + 1)
         features = replace(features, pass_number=number[group], scanner=self._scanner(group))
-        return join_features([features], self._origin)
+        return join_features([features], self._origin, self._survey.trajectory)
 
 
-def join_features(parts: Iterable[TieFeatures], origin: np.ndarray) -> TieFeatures:
+def join_features(
+    parts: Iterable[TieFeatures], origin: np.ndarray, trajectory: Trajectory | None = None
+) -> TieFeatures:
     """Those that stay of the features of some passes, in order of pass and time.
 
     Parameters
@@ -113,8 +116,10 @@ def join_features(parts: Iterable[TieFeatures], origin: np.ndarray) -> TieFeatur
     parts : iterable of TieFeatures
     origin : (3,) array
         As of TieCollector. Units: m.
+    trajectory : Trajectory, optional
+        That says where the scanner stands.
     """
     features = TieFeatures.concatenate(parts)
-    features = features[thin(features, origin)]
+    features = features[thin(features, origin, trajectory)]
     keys = (*features.centre.T, features.gps_time, features.pass_number)
     return features[np.lexsort(keys)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.survey import TIE_KINDS, TieFeatures, Ties
+from mlscorr.survey import TIE_KINDS, TieFeatures, Ties, Trajectory
 from mlscorr.ties.settings import SETTINGS
 
 
@@ -28,7 +28,32 @@ def kind_number(features: TieFeatures) -> np.ndarray:
     return sum(number * (features.kind == kind) for number, kind in enumerate(TIE_KINDS))
 
 
-def thin(features: TieFeatures, origin: np.ndarray) -> np.ndarray:
+def moment_number(gps_time: np.ndarray, trajectory: Trajectory | None = None) -> np.ndarray:
+    """Number (n,) of the moment of times; a stand is one of a pause: nothing new is seen there.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    trajectory : Trajectory, optional
+        That says where the scanner stands.
+    """
+    moment = np.floor(gps_time / SETTINGS.moment).astype(np.int64)
+    if trajectory is None:
+        return moment
+    window = np.floor(trajectory.gps_time / SETTINGS.pause)
+    first = np.flatnonzero(np.diff(window, prepend=-np.inf))
+    position = trajectory.position
+    way = np.maximum.reduceat(position, first) - np.minimum.reduceat(position, first)
+    stands = window[first][np.linalg.norm(way, axis=1) < SETTINGS.cell]
+    own = np.floor(gps_time / SETTINGS.pause)
+    whole = np.floor(own * SETTINGS.pause / SETTINGS.moment).astype(np.int64)
+    return np.where(np.isin(own, stands), whole, moment)
+
+
+def thin(
+    features: TieFeatures, origin: np.ndarray, trajectory: Trajectory | None = None
+) -> np.ndarray:
     """Rows (k,) of the features that stay, whatever the order in which they came.
 
     Of each second and pass, kind and class of directions stay at most SETTINGS.features, so that
@@ -41,8 +66,10 @@ def thin(features: TieFeatures, origin: np.ndarray) -> np.ndarray:
     features : TieFeatures
     origin : (3,) array
         Of the blocks: the same for all passes. Units: m.
+    trajectory : Trajectory, optional
+        As of moment_number.
     """
-    moment = np.floor(features.gps_time / SETTINGS.moment).astype(np.int64)
+    moment = moment_number(features.gps_time, trajectory)
     bins = len(TIE_KINDS) * direction_class(features.direction) + kind_number(features)
     chances = [
         integer_hash(np.floor((features.centre - origin) / edge).astype(np.int64))

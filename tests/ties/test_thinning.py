@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from mlscorr.survey import Ties
+from mlscorr.survey import Ties, Trajectory
 from mlscorr.ties import SETTINGS, join_features
 from mlscorr.ties.thinning import direction_class, thin, thinned_ties
 from tests.beds import tie_streets as street
@@ -31,6 +32,20 @@ def test_no_second_and_direction_has_more_than_its_share():
     counts = np.bincount(direction_class(kept.direction), minlength=27)
     assert counts[13] == 0
     assert (np.delete(counts, 13) == SETTINGS.features).all()
+
+
+def test_a_stand_keeps_as_many_as_one_second_of_each_pause():
+    "20 s at a light and 10 s of driving: 2 + 10 seconds' worth of each direction stay"
+    time = 414_000.0 + np.arange(0.0, 30.0, 0.1)
+    way = 8.0 * np.maximum(time - time[0] - 20.0, 0.0)
+    place = street.ORIGIN + np.outer(way, [1.0, 0.0, 0.0])
+    trajectory = Trajectory(time, place, Rotation.identity(len(time)))
+    rng = np.random.default_rng(3)
+    direction = np.tile([0.0, 0.0, 1.0], (MANY, 1))
+    features = replace(crowd(), gps_time=time[0] + rng.uniform(0, 29.9, MANY), direction=direction)
+    kept = features[thin(features, street.ORIGIN, trajectory)]
+    assert len(kept) == 12 * SETTINGS.features
+    assert np.sum(kept.gps_time < time[0] + 20.0) == 2 * SETTINGS.features
 
 
 def test_order_does_not_matter_nor_does_thinning_twice():
