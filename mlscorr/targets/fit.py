@@ -14,7 +14,7 @@ from mlscorr.targets.outline import Outline
 from mlscorr.targets.plane import Centre, centre_of
 from mlscorr.targets.regions import BrightRegion
 from mlscorr.targets.scanner_path import ScannerPath
-from mlscorr.targets.seeds import bright_seeds, hole_seeds, plate_seeds, region_seeds
+from mlscorr.targets.seeds import Seed, bright_seeds, hole_seeds, plate_seeds, region_seeds
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shape_fit import ShapeFit, exact_fit, rough_fit
 from mlscorr.targets.shapes import BY_EDGES
@@ -135,22 +135,59 @@ def fit_targets(
     echoes = Echoes(cloud.xyz, cloud.gps_time, intensity, path, tolerance)
     blind = why_useless(intensity) is not None
     near = [replace(target, position=target.position - origin) for target in known]
-    rough: list[ShapeFit] = []
+    seeds: list[tuple[Seed, str, float | None]] = []
     for kind, size in shapes:
         if kind == "hole":
-            seeds = hole_seeds(echoes, size, rng)
+            of_shape = hole_seeds(echoes, size, rng)
         elif kind in BY_EDGES or blind:
-            seeds = plate_seeds(echoes, kind, size, rng)
+            of_shape = plate_seeds(echoes, kind, size, rng)
         elif region is not None:
-            seeds = region_seeds(echoes, region, origin, kind, size)
+            of_shape = region_seeds(echoes, region, origin, kind, size)
         else:
-            seeds = bright_seeds(echoes, kind, size)
+            of_shape = bright_seeds(echoes, kind, size)
+        seeds += [(seed, kind, size) for seed in of_shape]
+    return [
+        _as_target(echoes, fit, origin) for fit in _best(fit_seeds(echoes, seeds, near, scanner))
+    ]
+
+
+def fit_seeds(
+    echoes: Echoes,
+    seeds: Sequence[tuple[Seed, str, float | None]],
+    known: Sequence[FittedTarget],
+    scanner: Scanner,
+) -> list[ShapeFit]:
+    """Exact fits of seeds, each where none is good already.
+
+    A rough fit that is refused in the end, as that of a single scan line, settles nothing: what
+    waited for it is looked at again.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    seeds : sequence of (Seed, kind, size or None)
+    known : sequence of FittedTarget
+    scanner : Scanner
+    """
+    fits: list[ShapeFit] = []
+    while seeds:
+        rough: list[ShapeFit] = []
+        waiting = []
         for seed in seeds:
-            if not any(_is_settled(fit, seed, kind, size) for fit in (*near, *rough)):
-                fit = rough_fit(echoes, seed, kind, size)
-                rough += [fit] if fit is not None else []
-    fits = [exact_fit(echoes, fit, scanner) for fit in _best(rough)]
-    return [_as_target(echoes, fit, origin) for fit in _best([f for f in fits if f is not None])]
+            if any(_is_settled(fit, *seed) for fit in (*known, *fits)):
+                continue
+            if any(_is_settled(fit, *seed) for fit in rough):
+                waiting.append(seed)
+            elif (fit := rough_fit(echoes, *seed)) is not None:
+                rough.append(fit)
+        best = _best(rough)
+        exact = [exact_fit(echoes, fit, scanner) for fit in best]
+        fits += [fit for fit in exact if fit is not None]
+        if all(fit is not None for fit in exact):
+            break
+        others = [fit for fit in rough if not any(fit is tried for tried in best)]
+        seeds = [*waiting, *((fit.seed, fit.kind, fit.size) for fit in others)]
+    return fits
 
 
 def distinct(targets: Iterable[FittedTarget]) -> list[FittedTarget]:

@@ -4,11 +4,14 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from target_rays import SCANNER, TARGETS, view
 
 from mlscorr.survey import PointCloud
-from mlscorr.targets.fit import fit_targets
+from mlscorr.targets.echoes import Echoes
+from mlscorr.targets.fit import fit_seeds, fit_targets
 from mlscorr.targets.scanner_path import ScannerPath
+from mlscorr.targets.seeds import bright_seeds
 from mlscorr.targets.shapes import BRIGHT
 
 UTM = np.array([532_000.0, 3_374_000.0, 40.0])  # m
@@ -72,6 +75,28 @@ def test_a_target_that_is_known_is_not_fitted_again(look):
             assert [each.points for each in again([poor, away])] == [target.points]
     assert len(repeats) >= len(views(look)) - 1
     assert np.mean(repeats) < 0.5  # some that are partly hidden have their middle elsewhere
+
+
+def test_a_line_of_points_does_not_hide_the_disc_it_lies_on():
+    "A plane turned about one scan line fits it well at first and fails: the whole disc is fitted"
+    seen = view("disc", SIZE, np.random.default_rng([7, 4]), 60.0, 0.3, step=STEP)
+    middle = seen.cloud.xyz.mean(axis=0)
+    cloud = replace(seen.cloud, xyz=seen.cloud.xyz - middle)
+    path, thickness = seen.path.seen_from(middle), 4 * SCANNER.range_noise
+    echoes = Echoes(cloud.xyz, cloud.gps_time, cloud.intensity, path, thickness)
+    whole = max(bright_seeds(echoes, "circle", SIZE), key=lambda seed: len(seed.rows))
+    rows = np.sort(whole.rows)
+    pauses = np.diff(cloud.gps_time[rows])
+    line = max(np.split(rows, np.flatnonzero(pauses > 8 * np.median(pauses)) + 1), key=len)
+    along = cloud.xyz[line[-1]] - cloud.xyz[line[0]]
+    turn = Rotation.from_rotvec(np.radians(60.0) * along / np.linalg.norm(along))
+    axes, origin = turn.apply(whole.plane.axes), cloud.xyz[line].mean(axis=0)
+    plane = replace(whole.plane, origin=origin, axes=axes)
+    seed = replace(whole, rows=line, plane=plane, middle=np.zeros(2))
+    shaped = [(each, "circle", SIZE) for each in (seed, whole)]
+    assert not fit_seeds(echoes, shaped[:1], [], SCANNER)
+    (fitted,) = fit_seeds(echoes, shaped, [], SCANNER)
+    assert fitted.position + middle == pytest.approx(seen.centre, abs=0.003)  # m
 
 
 @pytest.mark.parametrize("look", ["disc", "plate", "hole"])
