@@ -12,7 +12,7 @@ import numpy as np
 
 from mlscorr.gap.contrast.settings import SETTINGS
 from mlscorr.gap.observe.covariates import scanner_origin
-from mlscorr.gap.observe.plane_fit import block_chance, chance, place_key
+from mlscorr.gap.observe.plane_fit import block_chance, cell_corner, chance, place_key
 from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.survey.columns import Columns
@@ -155,7 +155,7 @@ def cells_of(cloud: PointCloud, share: float) -> Cells:
     key = key[order]
     first = np.flatnonzero(np.append(True, np.diff(key) != 0)[: len(key)])
     xyz, time = cloud.xyz[order], cloud.gps_time[order]
-    corner = np.floor(xyz[first] / OBSERVE.cell) * OBSERVE.cell
+    corner = cell_corner(xyz[first])
     moment = np.floor(time[first] / OBSERVE.moment) * OBSERVE.moment
     count = np.diff(np.append(first, len(key)))
     local = xyz - np.repeat(corner, count, axis=0)

@@ -44,7 +44,7 @@ def block_chance(xyz: np.ndarray) -> np.ndarray:
     xyz : (n, 3) array
         Units: m.
     """
-    cells = np.floor(xyz[:, :2] / (SETTINGS.block_cells * SETTINGS.cell))
+    cells = np.floor(_in_cells(xyz[:, :2]) / SETTINGS.block_cells)
     return chance(*cells.T.astype(np.int64))
 
 
@@ -62,9 +62,34 @@ def place_key(xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
     -------
     (n,) uint64 array
     """
-    cell = np.floor(xyz / SETTINGS.cell).astype(np.int64)
+    cell = np.floor(_in_cells(xyz)).astype(np.int64)
     moment = np.floor(gps_time / SETTINGS.moment).astype(np.int64)
     return integer_hash(np.column_stack([cell, moment]))
+
+
+def cell_corner(xyz: np.ndarray) -> np.ndarray:
+    """The least corner (n, 3) of the cells of points. Units: m.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    """
+    return (np.floor(_in_cells(xyz)) - 1.0 / 3.0) * SETTINGS.cell
+
+
+def _in_cells(xyz):
+    """Places in edges of a cell, whose faces stand a third off the whole numbers: models have
+    floors and walls there.
+    """
+    return xyz / SETTINGS.cell + 1.0 / 3.0
+
+
+def _is_whole(centre, normal, variance):
+    """Whether each plane (g,) shows all its noise: near a cell's face, along it, half is beyond."""
+    inside = _in_cells(centre) % 1.0
+    depth = SETTINGS.cell * np.minimum(inside, 1.0 - inside)
+    return (depth > SETTINGS.trims[-1] * np.sqrt(variance)[:, None] * np.abs(normal)).all(axis=1)
 
 
 def chance(*numbers: np.ndarray) -> np.ndarray:
@@ -82,6 +107,7 @@ def _fit(survey, chunk, number, rows, count):
     least = np.maximum(SETTINGS.plane_points, SETTINGS.rule * count)
     good = (held >= least) & (variance <= SETTINGS.roughest**2)
     good &= values[:, 1] >= SETTINGS.narrowest**2
+    good &= _is_whole(chunk.xyz[rows[first]] + mean, axes[:, :, 0], variance)
     if not good.any():
         return None
     fired, returned = _misses(chunk.gps_time[rows], number[rows], first, group)

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.contrast.cells import CellCollector, cells_of, sampled
+from mlscorr.gap.observe.plane_fit import cell_corner
 from mlscorr.survey import PointCloud
 from mlscorr.targets import NO_POINTS
 
-ORIGIN = np.array([532000.0, 3374000.0, 20.0])
+ORIGIN = cell_corner(np.array([532000.0, 3374000.0, 20.0]))
 
 
 def cloud_of(count, rng):

@@ -9,12 +9,16 @@ from mlscorr.survey import PointCloud
 NOISE = 0.004  # m
 
 
-def wall(survey, rng, bent=0.0):
-    "A second of scan lines on a square of 0.8 m, 6 m beside the vehicle, with noise across it"
+def wall(survey, rng, bent=0.0, beyond=0.5):
+    """A second of scan lines on a square of 0.8 m, 6 m beside the vehicle, with noise across it
+
+    So far (m) beyond a whole easting it stands.
+    """
     start = survey.trajectory.gps_time[0] + 2.0
     start = np.ceil(start)
     pose = survey.trajectory.at([start + 0.5])
-    centre = np.floor(pose.position[0] + [6.0, 6.0, 1.0]) + 0.5
+    centre = np.floor(pose.position[0] + [6.0, 6.0, 1.0])
+    centre += [beyond, 0.2, 0.2]
     u, v = np.tile(np.linspace(-0.4, 0.4, 60), 50), np.repeat(np.linspace(-0.4, 0.4, 50), 60)
     away = rng.normal(0.0, NOISE, 3000) + bent * u**2
     xyz = centre + np.column_stack([away, u, v])
@@ -33,6 +37,20 @@ def test_a_wall_gives_its_normal_and_its_noise(survey):
     assert patches.ripple[0] == pytest.approx(1.0, abs=0.15)
 
 
+def test_a_wall_on_a_whole_metre_has_all_of_its_noise(survey):
+    "Models have walls and floors there: no cell's face halves their noise"
+    cloud = wall(survey, np.random.default_rng(1), beyond=0.0)
+    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
+    assert np.sqrt(patches.variance) == pytest.approx([NOISE], rel=0.1)
+    assert patches.centre[0, 0] == pytest.approx(cloud.xyz[:, 0].mean(), abs=NOISE / 20)  # m
+
+
+def test_a_wall_in_a_face_of_cells_is_left(survey):
+    "Both cells would hold half of its noise, 0.8 sigmas off the wall"
+    cloud = wall(survey, np.random.default_rng(1), beyond=2.0 / 3.0)
+    assert fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2) is None
+
+
 def test_what_is_bent_is_rougher_than_its_noise(survey):
     "A bow of 5 cm has ten times the variance of the noise, or is no patch at all"
     cloud = wall(survey, np.random.default_rng(1), bent=0.3)
@@ -43,7 +61,7 @@ def test_what_is_bent_is_rougher_than_its_noise(survey):
 def test_a_key_tells_cells_and_moments_apart():
     "Points of one cubic metre and second share a number; those of the next ones don't"
     place = np.array([[523_000.2, 3_378_000.3, 40.4]] * 4)
-    place[1] += 0.5
+    place[1] += 0.2
     place[2, 0] += 1.0
     key = place_key(place, np.array([413_200.1, 413_200.9, 413_200.1, 413_201.1]))
     assert key[0] == key[1] and len(set(key.tolist())) == 3
