@@ -28,9 +28,20 @@ def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
     shift, variance, growth = np.zeros(m), np.zeros(m), np.zeros(m)
     for effect in effects:
         change = bench.change(effect)
-        shift, variance = shift + change.shift, variance + change.variance
+        shift, variance = shift + _shift(bench, effect, change), variance + change.variance
         growth = growth + change.growth
     return Change(shift, variance, growth)
+
+
+def _shift(bench, effect, change):
+    """Shift (m,) that takes what was recorded to what is true: a change, or an opposite effect's.
+
+    They differ by twice the second order.
+    """
+    with suppress(ValueError):  # of an effect that has no other sign
+        opposite = replace(effect, magnitude=(-np.asarray(effect.magnitude)).tolist())
+        return np.where(bench.rows.metric, -bench.change(opposite).shift, change.shift)
+    return change.shift
 
 
 def without_effects(rows: Rows, survey: Survey, effects: Sequence[Effect]) -> Rows:

@@ -42,6 +42,15 @@ def test_a_turn_of_degrees_is_told_beyond_the_first_order(clean):
     np.testing.assert_allclose(both, expected_shift, atol=1e-6)
 
 
+def test_a_known_turn_of_degrees_leaves_nothing(clean):
+    "2 deg of boresight that a simulator has already are taken from the rows to 1 um"
+    survey, rows, _, _ = clean
+    back = make_effect("boresight", magnitude=(0.0, 0.0, -2.0))
+    true = back.apply(survey.mounting, rows.reference)
+    change = expected(rows, survey, [make_effect("boresight", magnitude=(0.0, 0.0, 2.0))])
+    np.testing.assert_allclose(change.shift, recorded_less_true(survey, rows, true), atol=1e-6)
+
+
 def test_what_is_random_is_told_to_the_first_order(clean, patches):
     "Lost returns move the return rate, and have nothing beyond: no pulse returns twice"
     bench = Bench(patches, clean[0])
