@@ -4,10 +4,11 @@ python benchmarks/pos_study.py [FILE of real POS errors (.err)] [--seeds 2] [--e
 
 RMS in 3D of the whole trajectory over many drives: windows of a real error series with and without
 its sigma(t); clones of the paper's car and boat; MEMS and tactical units, filtered and smoothed,
-with their stated sigmas, without any, and with sigmas ten times too small and too large. Beside
-it what practitioners use on the same control points: linear and monotone interpolation, the former
-cut at the steps of the path, and a Gaussian process of scikit-learn. With --every 4 each fourth
-control point along the drive takes part, with its passes.
+with their stated sigmas, without any, and with sigmas ten times too small and too large; and a POS
+whose GNSS loses its fixed solution now and again. Beside it what practitioners use on the same
+control points: linear and monotone interpolation, the former cut at the steps of the path, and a
+Gaussian process of scikit-learn. With --every 4 each fourth control point along the drive takes
+part, with its passes.
 """
 
 import argparse
@@ -16,7 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 from feature_surveys import feature_survey, scenarios
-from real_windows import cases
+from real_windows import WINDOW, cases, window
+from scipy.signal import lfilter
 
 from mlscorr.baselines import fit_gaussian_process, fit_linear, fit_pchip
 from mlscorr.estimate import estimate_correction
@@ -29,6 +31,7 @@ PEERS = {
     "gp": fit_gaussian_process,
 }
 UNSTATED = Pos(position_sigma=0.5)  # m, a constant that says nothing of the drift
+HELD, FLOAT, MEMORY = 0.02, 0.4, 60.0  # m, m, s: fixed, not fixed, and how long its errors last
 WORSE = 1.1  # times the best peer: beyond it a survey counts as worse
 
 
@@ -50,6 +53,20 @@ def surveys(series, seeds):
                 recorded = replace(survey.recorded, position_sigma=sigma)
                 pos = UNSTATED if factor is None else None
                 yield f"{name}{title}", recorded, survey.matched, error, pos
+    for seed in range(seeds):
+        yield "not fixed at times", *unfixed(seed), None
+
+
+def unfixed(seed):
+    """Recorded trajectory, matched control and error of a drive that GNSS fixes in turns."""
+    rng, time = np.random.default_rng(seed), np.arange(0.0, WINDOW, 0.1)
+    turns = np.cumsum(rng.uniform(10.0, 60.0, 30))  # s
+    size = np.where(np.searchsorted(turns, time) % 2, FLOAT, HELD)[:, None] * [1.0, 1.0, 1.5]
+    kept = np.exp(-0.1 / MEMORY)
+    series = lfilter([np.sqrt(1 - kept**2)], [1, -kept], rng.normal(size=(6, len(time) + 6000)))
+    fixed, floated = series[:, -len(time) :].T.reshape(-1, 2, 3).swapaxes(0, 1)
+    error = size * np.where(size > size.min(axis=0), floated, fixed)
+    return window(345_600.0 + time, error, size, seed)
 
 
 def drives():

@@ -45,7 +45,7 @@ def cases(path):
     for seed, first in enumerate(starts):
         if abs(first - USED) >= WINDOW / 2:
             part = (series.gps_time >= first) & (series.gps_time <= first + WINDOW)
-            made = _window(series.gps_time[part], -series.position[part], sigma[part], seed)
+            made = window(series.gps_time[part], -series.position[part], sigma[part], seed)
             yield f"{first:.0f} s", *made
 
 
@@ -90,7 +90,7 @@ def _print_windows(title, rows, shares):
           f"{shares[1]:.1%}")  # fmt: skip
 
 
-def _window(gps_time, error, sigma, seed):
+def window(gps_time, error, sigma, seed):
     """A drive of 10 m/s with a POS error (true - recorded) and 16 even targets beside it."""
     rng, n = np.random.default_rng(seed), 16
     zero = np.zeros(len(gps_time))

@@ -10,6 +10,7 @@ import numpy as np
 from mlscorr.collocation import Noise
 from mlscorr.estimate.equations import NO_TREND, Equations
 from mlscorr.frames import mounting_partials, partials_by_scanner, pose_partials
+from mlscorr.pos import SETTINGS as POS_SETTINGS
 from mlscorr.pos import Steps, stated_sigma
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos, Trajectory
 
@@ -43,7 +44,8 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
     """The equations, and below them three rows for each fall-back of the POS.
 
     After it the POS errs as GNSS lets it; so what the recorded position moves is the drift of the
-    epoch before, but for jitter before and after. It tells nothing of bias, attitude and trend.
+    epoch before, but for jitter before and after. Where GNSS holds it much worse on a step's other
+    side, it is all of the error there. It tells nothing of attitude and trend.
 
     Parameters
     ----------
@@ -54,10 +56,21 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
     steps = steps[np.linalg.norm(steps.size, axis=1) < SEARCH_RADIUS]
     if len(steps) == 0:
         return equations
-    stated = _stated(equations, steps.before)
-    variance = (steps.sigma[:, None] ** 2 + 2 * stated.gnss**2)[:, :, None] * np.eye(3)
-    inserted = steps.before, steps.size, variance, np.tile(np.eye(3, 6), (len(steps), 1, 1))
-    return replace(_insert(equations, len(equations.gps_time), *inserted), fallbacks=len(steps))
+    before, after = (_stated(equations, times) for times in (steps.before, steps.after))
+    is_after = _is_much_larger(after.gnss, before.position)
+    shown = is_after | _is_much_larger(before.gnss, after.position)
+    times = np.where(is_after, steps.after, steps.before)
+    size = np.where(is_after[:, None], -steps.size, steps.size)
+    other = np.where(is_after[:, None], before.position, after.position)
+    hidden = np.where(shown[:, None], other**2, before.gnss**2 + after.gnss**2)
+    variance = (steps.sigma[:, None] ** 2 + hidden)[:, :, None] * np.eye(3)
+    inserted = times, size, variance, np.tile(np.eye(3, 6), (len(steps), 1, 1))
+    return replace(_insert(equations, len(equations.gps_time), *inserted), shown=shown)
+
+
+def _is_much_larger(sigma, other):
+    size, least = (np.linalg.norm(values, axis=1) for values in (sigma, other))
+    return size > POS_SETTINGS.steady_ratio * least
 
 
 def mounting_equations(

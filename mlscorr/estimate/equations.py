@@ -6,7 +6,7 @@ Both have the same misclosures, signals and noise; they differ in A, the trend.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,7 @@ from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.pos import StatedSigma, stated_sigma
-from mlscorr.survey import Pos, Trajectory
+from mlscorr.survey import SAME_EPOCH, Pos, Trajectory
 from mlscorr.survey.summary import Summary
 
 NO_TREND = -1  # the order of a polynomial without any coefficient
@@ -58,8 +58,8 @@ class Equations(Summary):
         What is believed of the parameters before the misclosures: a Prior.
     trajectory : Trajectory
     pos : Pos
-    fallbacks : int
-        Number of fall-backs among the last h epochs.
+    shown : (h,) bool array
+        Which of the last h epochs, fall-backs, show what GNSS holds the POS to, beside its drift.
     ties : TieEquations, optional
         Of what two passes both saw.
     trend_span : (float, float), optional
@@ -79,10 +79,15 @@ class Equations(Summary):
     trajectory: Trajectory
     pos: Pos
     mounting: np.ndarray | None = None
-    fallbacks: int = 0
+    shown: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     ties: TieEquations | None = None
     trend_span: tuple[float, float] | None = None
     tolerance: float = SETTINGS.knot_tolerance
+
+    @property
+    def fallbacks(self) -> int:
+        """Number of fall-backs."""
+        return len(self.shown)
 
     @cached_property
     def stated_epochs(self) -> StatedSigma:
@@ -119,20 +124,17 @@ class Equations(Summary):
 
     def _rows(self, kept):
         return replace(
-            self,
-            gps_time=self.gps_time[kept],
-            misclosure=self.misclosure[kept],
-            noise=self.noise.select(kept),
-            partials=self.partials[kept],
+            self, gps_time=self.gps_time[kept], misclosure=self.misclosure[kept],
+            noise=self.noise.select(kept), partials=self.partials[kept],
             stated=self.stated.at(kept),
             mounting=None if self.mounting is None else self.mounting[kept],
-        )
+        )  # fmt: skip
 
     def without_fallbacks(self) -> Equations:
         """The equations of control points alone."""
         if len(self.names) == len(self.gps_time):
             return self
-        return replace(self._rows(np.arange(len(self.names))), fallbacks=0)
+        return replace(self._rows(np.arange(len(self.names))), shown=self.shown[:0])
 
     def without_outer_fallbacks(self) -> Equations:
         """The equations without fall-backs outside the control span."""
@@ -140,7 +142,7 @@ class Equations(Summary):
         fallbacks = self.gps_time[first:]
         inside = (fallbacks >= self.span[0]) & (fallbacks <= self.span[1])
         kept = np.append(np.arange(first), np.arange(first, n)[inside])
-        return replace(self._rows(kept), fallbacks=int(inside.sum()))
+        return replace(self._rows(kept), shown=self.shown[inside])
 
     def without(self, names: Collection[str]) -> Equations:
         """The equations of all targets but some.
@@ -168,11 +170,12 @@ class Equations(Summary):
     def interval(self) -> float:
         """Mean interval of the control epochs without the trajectory's gaps between them. Units: s.
 
-        All that was recorded where they are as good as one. Where there is none, or where ties tell
-        more of the time than how far apart targets stand, the believed correlation time as the
-        paper's rule has it.
+        Where they are none or as good as one, or where ties tell more of the time than how far
+        apart targets stand, the believed correlation time as the paper's rule has it.
         """
-        if len(self.observed) == 0 or self.ties is not None:
+        control, recorded_time = np.sort(self.observed), self.trajectory.recorded_time
+        is_short = len(control) == 0 or recorded_time(*control[[0, -1]]) < SAME_EPOCH
+        if is_short or self.ties is not None:
             return self.pos.correlation_time / SETTINGS.start_ratio
         return self.trajectory.control_interval(self.observed)
 
@@ -240,9 +243,9 @@ class Equations(Summary):
     @property
     def _is_dense(self):
         """Whether the covariance matrix is the fastest way to a likelihood."""
-        if self.ties is None:
-            return False
-        return self.misclosure.size + len(self.ties) <= SETTINGS.dense_rows
+        return (
+            self.ties is not None and self.misclosure.size + len(self.ties) <= SETTINGS.dense_rows
+        )
 
     def rows(self, parameters: SignalParameters) -> list[SparseRows]:
         """Rows of control, and of ties where there are any.
@@ -251,8 +254,7 @@ class Equations(Summary):
         ----------
         parameters : SignalParameters
         """
-        signals = pose_signals(self.stated, parameters, self.partials)
-        signals = drift_alone(signals, self.fallbacks)
+        signals = drift_alone(pose_signals(self.stated, parameters, self.partials), self.shown)
         times = self.gps_time[:, None]
         control = SparseRows(times, self.misclosure, self.noise, self.design, signals)
         if self.ties is None:

@@ -57,11 +57,12 @@ def pose_signals(
     """
     position, rotation = partials[:, :, :3], partials[:, :, 3:]
     family = "matern32" if parameters.family == INTEGRATED else parameters.family
-    gnss = position * stated.gnss[:, None]
+    gnss, clock = position * stated.gnss[:, None], stated.gnss_clock
+    jitter = Covariance("exponential", parameters.jitter_time)
     return (
         *_drift(stated, parameters, position),
-        Signal(parameters.jitter_scale * gnss, Covariance("exponential", parameters.jitter_time)),
-        Signal(parameters.bias_scale * gnss, Covariance(family, parameters.bias_time)),
+        Signal(parameters.jitter_scale * gnss, jitter, clock),
+        Signal(parameters.bias_scale * gnss, Covariance(family, parameters.bias_time), clock),
         Signal(
             parameters.attitude_scale * rotation @ stated.attitude,
             Covariance(family, parameters.attitude_time),
@@ -84,20 +85,22 @@ def _drift(stated, parameters, position):
     )
 
 
-def drift_alone(signals: tuple[Signal, ...], rows: int) -> tuple[Signal, ...]:
-    """The signals, of which the last rows show drift only.
+def drift_alone(signals: tuple[Signal, ...], shown: np.ndarray) -> tuple[Signal, ...]:
+    """The signals, of which the last rows show drift, and jitter and bias where they are shown.
 
     Parameters
     ----------
     signals : tuple of Signal
         As pose_signals gives them: jitter, bias and attitude are the last three.
-    rows : int
+    shown : (h,) bool array
+        Of the last h rows.
     """
+    rows = len(shown)
     if rows == 0:
         return signals
     hidden = []
-    for signal in signals[-3:]:
+    for signal, stays in zip(signals[-3:], (shown, shown, np.zeros(rows)), strict=True):
         mixing = signal.mixing.copy()
-        mixing[-rows:] = 0.0
+        mixing[-rows:] *= np.reshape(stays, (-1, 1, 1))
         hidden.append(replace(signal, mixing=mixing))
     return (*signals[:-3], *hidden)

@@ -31,6 +31,9 @@ class DriftHistory:
     held : (3,) array
         The sigma of E, N, H that stays while GNSS holds the POS; zero where sigma(t) doesn't tell
         it from the part that grows. Units: m.
+    level : (n, 3) array
+        The same at each epoch of the trajectory, larger where sigma(t) is raised at once, as by a
+        solution that is not fixed: the smallest since it was raised. Units: m.
     """
 
     trajectory: Trajectory
@@ -39,6 +42,7 @@ class DriftHistory:
     returns: np.ndarray
     starts: np.ndarray
     held: np.ndarray
+    level: np.ndarray
 
     @property
     def is_stated(self) -> bool:
@@ -96,6 +100,25 @@ class DriftHistory:
         number[~is_raised] = -1
         return number[np.clip(np.searchsorted(epochs, gps_time), 0, len(epochs) - 1)]
 
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """Times (j,) at which the level changes at once: another solution, of other errors. s."""
+        time, size = self.trajectory.gps_time, np.linalg.norm(self.level, axis=1)
+        least, largest = np.sort([size[1:], size[:-1]], axis=0)
+        rows = np.flatnonzero(largest > SETTINGS.steady_ratio * least)
+        return (time[rows] + time[rows + 1]) / 2
+
+    def level_at(self, gps_time: np.ndarray) -> np.ndarray:
+        """The level (n, 3) of the epochs at or before times. Units: m.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        """
+        rows = np.searchsorted(self.trajectory.gps_time, gps_time, side="right") - 1
+        return self.level[np.maximum(rows, 0)]
+
 
 _KNOWN: WeakValueDictionary[int, DriftHistory] = WeakValueDictionary()
 
@@ -117,29 +140,42 @@ def drift_history(trajectory: Trajectory) -> DriftHistory:
 def _history(trajectory):
     time, held, steps = trajectory.gps_time, held_sigma(trajectory), find_steps(trajectory)
     restarts = np.sort(np.concatenate([trajectory.passes[1:, 0], steps.middle]))
+    level = np.tile(held, (len(time), 1))
     if not held.any():
         starts = np.append(time[0], restarts)
-        return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, held)
+        return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, held, level)
+    sigma = trajectory.position_sigma
     restarts = np.sort(np.append(restarts, _falls(trajectory, held, restarts)))
-    excess = np.maximum(trajectory.position_sigma**2 - held**2, 0.0).sum(axis=1)
-    is_raised = excess > held @ held
-    change = np.diff(is_raised.astype(int), prepend=0)
-    rises, sinks = np.flatnonzero(change > 0), np.flatnonzero(change < 0)
-    returns = _returns(trajectory, zip(rises, sinks, strict=False), restarts)
+    is_raised = np.maximum(sigma**2 - held**2, 0.0).sum(axis=1) > held @ held
+    returns = _returns(trajectory, _runs(is_raised), restarts)
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
-    first = np.append(time[rises], np.inf)[np.searchsorted(time[rises], edges)]
+    grown = [np.inf]
+    for first, last in reversed(_runs(is_raised, np.searchsorted(time, edges))):
+        level[first:last] = np.minimum.accumulate(sigma[first:last], axis=0)
+        # what is raised at once and goes back is no drift, but what GNSS holds the POS to
+        if np.any((sigma[first:last] ** 2 - 2 * level[first:last] ** 2).sum(axis=1) > 0):
+            grown.append(time[first])
+    grown = np.array(grown[::-1])
+    first = grown[np.searchsorted(grown, edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
-    # where sigma(t) stays raised from one edge to the next it doesn't rise: GNSS isn't back
-    rows, lowered = np.searchsorted(time, edges), np.append(0, np.cumsum(~is_raised))
-    starts = np.where(lowered[np.append(rows[1:], len(time))] == lowered[rows], edges, starts)
-    return DriftHistory(trajectory, steps, restarts, returns, starts, held)
+    return DriftHistory(trajectory, steps, restarts, returns, starts, held, level)
 
 
-def _returns(trajectory, grown, restarts):
+def _runs(flags, cuts=()):
+    """First row of each run of flags (n,), and the row after its last one; parted at cuts."""
+    change = np.diff(flags.astype(int), prepend=0, append=0)
+    cuts = [row for row in cuts if 0 < row < len(flags) and flags[row - 1] and flags[row]]
+    rows = [np.sort(np.append(np.flatnonzero(change == side), cuts)) for side in (1, -1)]
+    return list(zip(*(row.astype(int) for row in rows), strict=True))
+
+
+def _returns(trajectory, raised, restarts):
     """Ends of outages in the middle of which sigma(t) is largest, as a smoother states it. s."""
     size, time = np.linalg.norm(trajectory.position_sigma, axis=1), trajectory.gps_time
     returns = []
-    for first, last in grown:
+    for first, last in raised:
+        if last == len(time):
+            continue
         # sigma of a filter grows until GNSS is back, that of a smoother until the middle
         peak = time[first + np.argmax(size[first:last])]
         is_tied = first > 0 and peak < (time[first] + 3 * time[last]) / 4

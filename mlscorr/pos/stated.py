@@ -49,10 +49,10 @@ class StatedSigma:
     history: DriftHistory
     starts: np.ndarray
 
-    @property
+    @cached_property
     def held(self) -> np.ndarray:
-        """The part (3,) of the position's sigma that stays while GNSS holds the POS. Units: m."""
-        return self.history.held
+        """The part (n, 3) of the position's sigma to which GNSS holds the POS. Units: m."""
+        return self.history.level_at(self.gps_time)
 
     @cached_property
     def attitude(self) -> np.ndarray:
@@ -108,6 +108,15 @@ class StatedSigma:
         """Time (n,) that leaps where drift starts anew. Units: s."""
         first = self.history.trajectory.gps_time[0]
         return self.gps_time - first + LEAP * self.history.segment(self.gps_time)
+
+    @cached_property
+    def gnss_clock(self) -> np.ndarray | None:
+        """Time (n,) that leaps where another solution holds the POS; None where none does. s."""
+        turns = self.history.turns
+        if len(turns) == 0:
+            return None
+        first = self.history.trajectory.gps_time[0]
+        return self.gps_time - first + LEAP * np.searchsorted(turns, self.gps_time)
 
     @cached_property
     def growth_clock(self) -> np.ndarray:

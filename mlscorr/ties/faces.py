@@ -54,10 +54,10 @@ def _cells_at(middle, begin, group, rows, way):
     own = np.unique(np.column_stack([begin, group]), axis=0, return_inverse=True)[1].ravel()
     size = (own.max() + 1, *(place.max(axis=0) + 2))
     keys = np.ravel_multi_index((own, *place.T), size)
-    wanted = np.ravel_multi_index((own[rows], *(place[rows] + way.astype(np.int64)).T), size)
+    partner = np.ravel_multi_index((own[rows], *(place[rows] + way.astype(np.int64)).T), size)
     order = np.argsort(keys)
-    nearest = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-    return np.where(keys[nearest] == wanted, nearest, -1)
+    nearest = order[np.minimum(np.searchsorted(keys, partner, sorter=order), len(keys) - 1)]
+    return np.where(keys[nearest] == partner, nearest, -1)
 
 
 def _moved(moments, way):

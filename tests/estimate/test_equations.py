@@ -14,7 +14,7 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.signals import drift_alone, pose_signals
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps
-from mlscorr.survey import control_epochs
+from mlscorr.survey import Pos, control_epochs
 from tests.beds.pos_errors import CONSTANT, EPOCHS, LENGTH, START, Case, smooth_case
 from tests.beds.tied_passes import tied_passes
 
@@ -93,7 +93,7 @@ def test_rows_of_a_target_are_those_of_all_its_passes():
     [
         ([10.0, 60.0, 110.0], 3, 50.0),
         ([10.0, 10.4, 10.8, 110.0], 2, 100.0),
-        ([100.0, 100.2], 1, LENGTH),
+        ([100.0, 100.2], 1, Pos().correlation_time / 4),
     ],
     ids=["apart", "three at one", "all at one"],
 )
@@ -132,7 +132,8 @@ def test_the_solution_is_the_dense_one(family):
     objective = Objective.of(complete)
     parameters = objective.parameters(family, objective.initial)
     solved = complete.solve(parameters)
-    signals = drift_alone(pose_signals(complete.stated, parameters, complete.partials), 1)
+    signals = pose_signals(complete.stated, parameters, complete.partials)
+    signals = drift_alone(signals, complete.shown)
     rows = SparseRows(
         complete.gps_time[:, None], complete.misclosure, complete.noise, complete.design, signals
     )

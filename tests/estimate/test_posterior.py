@@ -177,11 +177,11 @@ def test_more_drift_than_stated_raises_its_scale():
 
 @pytest.mark.parametrize("sigma", [0.02, 0.5])
 def test_what_is_stated_stands_where_nothing_can_tell_its_scale(sigma):
-    "A single control point leaves 100 s away from it what the POS states, to a factor of three"
+    "A single control point leaves 100 s away from it what the POS states, to a factor of 3.5"
     case = Case(EPOCHS, CONSTANT / 4, [100.0], np.random.default_rng(3), np.full((2001, 3), sigma))
     corrected = case.estimate().correction.corrected
     largest = corrected.position_sigma.max(axis=0)
-    assert (sigma < largest).all() and (largest < 3 * sigma).all()  # m
+    assert (sigma < largest).all() and (largest < 3.5 * sigma).all()  # m
 
 
 @pytest.mark.parametrize("times, is_known", [([100.0], False), ([60.0, 100.0], True)])

@@ -92,13 +92,22 @@ def test_a_history_is_worked_out_once_for_a_trajectory():
     assert drift_history(drive()) is not history
 
 
-def test_drift_goes_on_where_sigma_falls_and_stays_raised():
-    "From an outage back to a float solution of 0.5 m for 40 s: what is fixed last starts never"
+def test_gnss_that_is_not_fixed_holds_the_pos_to_what_it_states():
+    "From an outage back to a float solution of 0.5 m for 40 s: nothing grows, and 0.5 m is held"
     floated = (TIME >= 120.0) & (TIME < 160.0)
     history = drift_history(drive(0.02 + grown(3.0) + 0.48 * floated))
     assert history.restarts == pytest.approx([START + 120.0, START + 160.0], abs=0.11)
-    assert history.starts[1] == pytest.approx(history.restarts[0])
-    assert np.isinf(history.starts[2])
+    assert np.isinf(history.starts[1:]).all()
+    level = history.level_at(START + np.array([60.0, 100.0, 140.0, 180.0]))[:, 0]
+    assert level == pytest.approx([0.02, 0.02, 0.5, 0.02], abs=0.01)  # m
+
+
+def test_drift_grows_from_what_is_held():
+    "A float solution of 0.3 m, lost after a while: drift grows to 3 m, beside what was held"
+    floated = 0.28 * (TIME >= 60.0)
+    history = drift_history(drive(0.02 + floated + grown(3.0)))
+    assert history.starts[0] == pytest.approx(START + 60.0, abs=0.11)
+    assert history.level_at(np.array([START + 100.0]))[0, 0] == pytest.approx(0.3)  # m
 
 
 def test_sigma_that_converges_after_its_fall_is_no_drift():
@@ -115,5 +124,5 @@ def test_heights_that_vary_less_are_held_like_the_rest():
     trajectory = Trajectory(START + TIME, CORNER + np.outer(TIME, [0.0, 10.0, 0.0]),
                             Rotation.identity(len(TIME)), sigma)  # fmt: skip
     stated = stated_sigma(trajectory, Pos())
-    assert stated.held == pytest.approx([0.02, 0.02, 0.04])  # m
+    assert stated.held[0] == pytest.approx([0.02, 0.02, 0.04])  # m
     assert stated.gnss[0] == pytest.approx([0.02, 0.02, 0.04])
