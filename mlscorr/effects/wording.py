@@ -1,6 +1,7 @@
 """Sizes as a surveyor says them: a unit that suits, and as many figures as sigma allows."""
 
 import math
+import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -106,6 +107,35 @@ def figures(value: float, count: int) -> str:
     if value == 0:
         return "0"
     return f"{value:.{max(0, count - 1 - math.floor(math.log10(abs(value))))}f}"
+
+
+def percent(share: float | None) -> str:
+    """A share in percent, with a decimal near nothing and near all.
+
+    Parameters
+    ----------
+    share : float or None
+
+    >>> percent(0.97), percent(0.9952), percent(None), percent(-0.1), percent(0.0004)
+    ('97 %', '99.5 %', '–', '−10 %', '0.0 %')
+    """
+    if not known(share):
+        return DASH
+    fine = 0 < abs(share) < 0.01 or 0.98 <= share < 1
+    return f"{100 * share:.{int(fine)}f} %".replace("-", "−")
+
+
+def with_articles(text: str) -> str:
+    """A text put together of parts, with *an* before a vowel.
+
+    Parameters
+    ----------
+    text : str
+
+    >>> with_articles("a easting error at a incidence angle, a scan angle")
+    'an easting error at an incidence angle, a scan angle'
+    """
+    return re.sub(r"\ba (?=[aeio])", "an ", text)
 
 
 def joined(words: Iterable[str], last: str = "and") -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mlscorr.effects import Effect, effect_class
 from mlscorr.effects.labels import lowered, title
-from mlscorr.effects.wording import size
+from mlscorr.effects.wording import percent, size, with_articles
 from mlscorr.gap.close.closure import Closure
 from mlscorr.gap.infer.causes import Inference
 from mlscorr.gap.infer.separability import Separability
@@ -62,7 +62,7 @@ def gap_document(
             "same": [name for name in inference.same if name != verdict.label],
             "lead": verdict.lead,
             "hidden": verdict.is_hidden,
-            "sentence": _sentence(inference),
+            "sentence": with_articles(_sentence(inference)),
         },
         "gap": {
             "before": closure.gap.before,
@@ -71,7 +71,7 @@ def gap_document(
             "null_band": list(closure.gap.null_band),
             "kind": closure.kind,
         },
-        "headline": where.headline,
+        "headline": with_articles(where.headline),
         "advice": _advice(inference, closure, next_data),
         "where": [_split(split) for split in where.splits],
         "causes": [_cause(rows, cause) for cause in inference.causes],
@@ -123,8 +123,8 @@ def _advice(inference, closure, next_data):
         if closure.effect != "none":  # it impersonates the cause
             sentences.append(
                 f"The nearest known effect, {lowered(title(closure.effect))}, closes "
-                f"{100 * max(0.0, min(1.0, closure.shrink)):.0f} % of the gap and leaves "
-                "the rest: don't use it."
+                f"{percent(max(0.0, closure.shrink))} of the squared gap, but does not explain "
+                "it: don't use it."
             )
     else:
         sentences += [effect_class(part).remedy for part in verdict.label.split("+")]
@@ -135,7 +135,7 @@ def _advice(inference, closure, next_data):
             f"To settle what is open ({', '.join(dict.fromkeys(open_question))}), measure "
             f"{next_data[0].survey}: {next_data[0].why}"
         )
-    return list(dict.fromkeys(sentences))
+    return list(dict.fromkeys(map(with_articles, sentences)))
 
 
 def _split(split):

@@ -71,19 +71,3 @@ def signed(value: float | None, unit: str = "mm") -> str:
         return DASH
     text = f"{value:.{1 + (abs(value) < 0.95)}f}"
     return (text.replace("-", "−") if float(text) else text.lstrip("-")) + f" {unit}"
-
-
-def percent(share: float | None) -> str:
-    """A share in percent, with a decimal near nothing and near all.
-
-    Parameters
-    ----------
-    share : float or None
-
-    >>> percent(0.97), percent(0.9952), percent(None), percent(-0.1), percent(0.0004)
-    ('97 %', '99.5 %', '–', '−10 %', '0.0 %')
-    """
-    if not known(share):
-        return DASH
-    fine = 0 < abs(share) < 0.01 or 0.98 <= share < 1
-    return f"{100 * share:.{int(fine)}f} %".replace("-", "−")

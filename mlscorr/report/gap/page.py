@@ -1,14 +1,14 @@
 """The pages of a diagnosis, and of what a survey could diagnose before it is driven."""
 
 from mlscorr.effects.labels import family, lowered, title, titles
-from mlscorr.effects.wording import DASH, joined
+from mlscorr.effects.wording import DASH, joined, percent
 from mlscorr.report.gap import rows
 from mlscorr.report.gap.accuracy import accuracy_sentence
 from mlscorr.report.gap.channels import WORDS, channel_rows, channel_statements, distance_rows
 from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
 from mlscorr.report.gap.first_screen import accuracy, unjudged
 from mlscorr.report.gap.innovations import channel_style
-from mlscorr.report.gap.numbers import percent, signed
+from mlscorr.report.gap.numbers import signed
 from mlscorr.report.gap.settings import SETTINGS
 from mlscorr.report.gap.shrinking import is_closed, shrunk, span
 from mlscorr.report.gap.verdict import (

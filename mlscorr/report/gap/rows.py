@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from mlscorr.effects.labels import meaning, title
-from mlscorr.effects.wording import DASH, known
+from mlscorr.effects.wording import DASH, known, percent
 from mlscorr.report.gap.labels import sentences_of
-from mlscorr.report.gap.numbers import column, percent, plain, signed
+from mlscorr.report.gap.numbers import column, plain, signed
 
 COVARIATES = {
     "time": "Time since the start", "location": "Way along the road",

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from mlscorr.effects.labels import lowered, title
-from mlscorr.effects.wording import DASH, joined, known
-from mlscorr.report.gap.numbers import percent, signed
+from mlscorr.effects.wording import DASH, joined, known, percent
+from mlscorr.report.gap.numbers import signed
 
 GAPS = {  # by the kind of gap that a closure measures
     "systematic": "Systematic part of the gap (a mean over all rows)",
