@@ -9,17 +9,24 @@ import numpy as np
 from mlscorr.effects import Effect, effect_class
 from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import percent, size, with_articles
+from mlscorr.gap.agreement import Agreement, agreements
 from mlscorr.gap.close.closure import Closure
 from mlscorr.gap.infer.causes import Inference
 from mlscorr.gap.infer.separability import Separability
+from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.where import NAMES
 from mlscorr.gap.observe.absence import Absence
-from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.observe.rows import Rows, background
 from mlscorr.gap.plan.additions import NextData
 from mlscorr.survey import Survey
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
 NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
+ADVICE = {  # where no cause is named, by what is left is more than
+    "": NOTHING_TO_DO,
+    "stated": "Errors are larger than stated: run mlscorr correct, or state POS sigmas larger.",
+    "chance": "More control points, or a second pass, may show why the two differ.",
+}
 LISTED = 1e-4  # probability from which on a pair is listed in the evidence
 
 
@@ -39,6 +46,7 @@ def gap_document(
     Parameters
     ----------
     survey : Survey
+        With what the simulator believes of scanner and POS.
     rows : Rows
     inference : Inference
     closure : Closure
@@ -52,6 +60,8 @@ def gap_document(
         Of surveyed targets that have no row.
     """
     verdict, where = inference.verdict, inference.where
+    agreement = agreements(rows, background(rows, survey))
+    excess = excess_of(inference, closure, agreement)
     return {
         "name": survey.name,
         "verdict": {
@@ -62,7 +72,8 @@ def gap_document(
             "same": [name for name in inference.same if name != verdict.label],
             "lead": verdict.lead,
             "hidden": verdict.is_hidden,
-            "sentence": with_articles(_sentence(inference)),
+            "excess": excess,
+            "sentence": with_articles(_sentence(inference, excess)),
         },
         "gap": {
             "before": closure.gap.before,
@@ -72,7 +83,8 @@ def gap_document(
             "kind": closure.kind,
         },
         "headline": with_articles(where.headline),
-        "advice": _advice(inference, closure, next_data),
+        "agreement": [vars(part) for part in agreement],
+        "advice": advice_of(inference, closure, next_data, excess),
         "where": [_split(split) for split in where.splits],
         "causes": [_cause(rows, cause) for cause in inference.causes],
         "separability": separability_document(inference.separability),
@@ -91,11 +103,47 @@ def gap_document(
     }
 
 
-def _sentence(inference):
+def excess_of(inference: Inference, closure: Closure, agreement: Iterable[Agreement]) -> str:
+    """What it is more than that is left where no cause is named: stated, chance, or nothing.
+
+    Parameters
+    ----------
+    inference : Inference
+    closure : Closure
+        Of its verdict.
+    agreement : iterable of Agreement
+    """
+    if inference.verdict.label != "none":
+        return ""
+    worse = [part for part in agreement if part.rms_mm > SETTINGS.quantile * part.stated_mm]
+    if worse or closure.over_sigma.beyond:
+        return "stated"
+    gaps = closure.gap, inference.where
+    return "chance" if any(gap.before > gap.null_band[1] for gap in gaps) else ""
+
+
+def no_cause(labels: Sequence[str], excess: str) -> str:
+    """What is said where no cause is named, without a full stop.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        That hold 95 %.
+    excess : str
+        As ``excess_of`` gives it.
+    """
+    if excess:
+        return f"No cause is shown, but the two differ by more than {excess}"
+    if list(labels) != ["none"]:
+        return "Nothing is shown to be wrong, but not all is ruled out"
+    return "Nothing is wrong that this survey could show"
+
+
+def _sentence(inference, excess):
     verdict, cause = inference.verdict, inference.cause
     chance = f"probability {verdict.probability:.2f}"
     if verdict.label == "none":
-        return f"Nothing is wrong that this survey could show ({chance})."
+        return f"{no_cause(verdict.set, excess)} ({chance} that nothing is wrong)."
     if verdict.is_hidden:
         return (
             f"What was compared shows nothing wrong, but it can't be said that nothing is: there "
@@ -108,11 +156,23 @@ def _sentence(inference):
     return f"{title(verdict.label)} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
 
 
-def _advice(inference, closure, next_data):
-    """What to do about a verdict: a list of sentences."""
+def advice_of(
+    inference: Inference, closure: Closure, next_data: Sequence[NextData], excess: str
+) -> list[str]:
+    """What to do about a verdict, in sentences.
+
+    Parameters
+    ----------
+    inference : Inference
+    closure : Closure
+        Of its verdict.
+    next_data : sequence of NextData
+    excess : str
+        As ``excess_of`` gives it.
+    """
     verdict, sentences = inference.verdict, []
     if verdict.label == "none":
-        sentences.append(NOTHING_TO_DO)
+        sentences.append(ADVICE[excess])
     elif verdict.is_hidden:
         sentences.append(
             "Find out why the targets of that stretch could not be matched before the survey is "
@@ -131,6 +191,7 @@ def _advice(inference, closure, next_data):
     labels = (*verdict.set, *inference.same)
     open_question = [lowered(title(n)) for n in labels if n not in ("none", verdict.label)]
     if open_question and next_data:
+        sentences = [sentence for sentence in sentences if sentence != NOTHING_TO_DO]
         sentences.append(
             f"To settle what is open ({', '.join(dict.fromkeys(open_question))}), measure "
             f"{next_data[0].survey}: {next_data[0].why}"

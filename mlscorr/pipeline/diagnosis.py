@@ -12,7 +12,6 @@ import numpy as np
 
 from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import contrast
-from mlscorr.gap.agreement import agreements
 from mlscorr.gap.close import Closure, FoundCause, cause_for_simulator, close_gap
 from mlscorr.gap.document import NOTHING_TO_DO, gap_document
 from mlscorr.gap.infer import Costs, Inference, infer_causes
@@ -172,7 +171,7 @@ class DiagnosedSurvey(Summary):
 
         believed, _ = as_believed(self.survey, self.simulator)
         content = gap_document(
-            survey=self.survey, rows=self.rows, inference=self.inference, closure=self.closure,
+            survey=believed, rows=self.rows, inference=self.inference, closure=self.closure,
             next_data=self.next_data, effects=self.effects, left_out=self.left_out,
             warnings=self.warnings, absence=self.absence,
         )  # fmt: skip
@@ -181,11 +180,9 @@ class DiagnosedSurvey(Summary):
         if any(contrast.sentences for contrast in self.contrasts):
             content["advice"] = [s for s in content["advice"] if s != NOTHING_TO_DO]
             content["advice"].append("See by what the clouds differ beside geometry: Channels.")
-        agreement = agreements(self.rows, background(self.rows, believed))
         content["costs"] = vars(self.costs)
         content["contrasts"] = [contrast.document() for contrast in self.contrasts]
         content["distances"] = [distance.document() for distance in self.distances]
-        content["agreement"] = [vars(part) for part in agreement]
         return document("gap", gap_screen(content) | content)
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from mlscorr.effects.labels import lowered, title
 from mlscorr.gap.close import LoneEffect, lone_effects
+from mlscorr.gap.document import no_cause
 from mlscorr.gap.infer import Costs
 from mlscorr.io.output import document
 from mlscorr.pipeline.compared_rows import NEXT_RUN
@@ -39,7 +40,9 @@ class DiagnosedRounds:
         named = [lowered(title(each.inference.verdict.label)) for each in self.rounds[:-1]]
         if label == "none":
             whole = f"with {', '.join(named)} in the simulator " if named else ""
-            return f"Round {number}: {whole}nothing is left to find."
+            excess = self.rounds[-1].document["verdict"]["excess"]
+            left = lowered(no_cause((), excess)) if excess else "nothing is left to find"
+            return f"Round {number}: {whole}{left}."
         if label == "unknown":
             return f"Round {number}: what is left no known effect explains."
         words = lowered(title(label))

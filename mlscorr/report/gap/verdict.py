@@ -5,6 +5,7 @@ from typing import NamedTuple
 from mlscorr.effects import Effect
 from mlscorr.effects.labels import family, lowered, meaning, title
 from mlscorr.effects.wording import DASH, joined, known, size
+from mlscorr.gap.document import no_cause
 from mlscorr.report.gap.labels import sentences_of
 from mlscorr.report.gap.shrinking import Fact, is_closed, is_within, shrinking
 
@@ -15,6 +16,13 @@ CERTAINTY = (  # probability from which on one says so
     (0.5, "more likely than not"),
     (0.0, "only the likeliest of several"),
 )
+DIFFERENCE = {  # by what is left more than, where no cause is named
+    "": "The survey and its simulation differ by no more than chance makes them differ.",
+    "stated": "Errors are larger than what is stated makes them, but no error that is known "
+    "explains them well enough to be named.",
+    "chance": "All in all the two differ by more than 39 of 40 surveys do in which nothing is "
+    "wrong, but no error that is known explains this better than chance does.",
+}
 NUMBER_WORDS = ("none", "one", "two", "three", "four")
 SCATTER = "This is scatter: no correction takes it off, but accuracies must be stated larger."
 NEGATIVE = "It is what the two differ by beyond chance; below zero: less than by chance."
@@ -82,19 +90,10 @@ def is_named(document: dict) -> bool:
 
 
 def _nothing(document):
-    gap = document["gap"]
-    is_by_chance = is_within(gap["before"], gap["null_band"], gap.get("kind"))
-    kicker = "Nothing is wrong that this survey could show"
-    if document["verdict"]["set"] != ["none"] or not is_by_chance:
-        kicker = "Nothing is shown to be wrong, but not all is ruled out"
-    text = "The survey and its simulation differ by no more than chance makes them differ."
-    if not is_by_chance:
-        text = (
-            "All in all the two differ by more than 39 of 40 surveys do in which nothing is wrong, "
-            "but no error that is known explains this better than chance does."
-        )
+    excess = document["verdict"]["excess"]
     small = "An error smaller than the sizes that would show here may be there all the same."
-    return VerdictBox("good" if is_by_chance else "open", kicker, [f"{text} {small}"])
+    kicker, tone = no_cause(document["verdict"]["set"], excess), "open" if excess else "good"
+    return VerdictBox(tone, kicker, [f"{DIFFERENCE[excess]} {small}"])
 
 
 def _unknown(document):

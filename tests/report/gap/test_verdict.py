@@ -68,10 +68,21 @@ def test_no_cause_and_a_gap_beyond_chance_do_not_contradict_each_other():
     "6.0 mm where chance makes up to 4.5: no cause is named, and no word says that it is chance"
     gap = {"before": 6.0, "after": 6.0, "unit": "mm", "null_band": [-4.0, 4.5]}
     document = gap_document("none", 0.967, gap=gap)
+    document["verdict"]["excess"] = "chance"
     assert verdict(document).tone == "open"
     assert "more than 39 of 40 surveys do in which nothing is wrong" in summary(document)
     assert "no more than chance" not in summary(document)
     assert "no more than chance" in summary(KINDS["none"]())
+
+
+def test_errors_beyond_their_sigma_are_not_called_chance():
+    "Seven sigmas without a cause: open, larger than stated, and nowhere nothing or chance"
+    document = gap_document("none", 0.34)
+    document["verdict"] |= {"excess": "stated", "set": ["position_bump", "none"]}
+    assert verdict(document).tone == "open"
+    assert "No cause is shown, but the two differ by more than stated" in summary(document)
+    assert "Errors are larger than what is stated makes them" in summary(document)
+    assert "chance" not in " ".join(verdict(document).sentences)
 
 
 def test_a_pattern_within_chance_is_explained():
