@@ -110,16 +110,16 @@ def _tell(content):
     for sentence in content["warnings"]:
         terminal.warn(f"Warning: {sentence}")
     terminal.say_statements(content["statements"])
-    if "ablation" in content:
-        _tell_rounds(content["ablation"])
-        return
     for number, sentence in enumerate(content["advice"], start=1):
         terminal.say(f"{number}. {sentence}")
+    if "ablation" in content:
+        _tell_rounds(content["ablation"])
 
 
 def _tell_rounds(ablation):
     """The gap with each effect by itself, and after each round."""
     from mlscorr.effects.labels import title
+    from mlscorr.report.gap.numbers import signed
 
     terminal.say(f"{'In the simulator':34s}{'gap before':>12s}{'after':>10s}")
     for row in ablation["alone"]:
@@ -127,5 +127,6 @@ def _tell_rounds(ablation):
         terminal.say(f"{words:34s}{row['before']:9.1f} mm{row['after']:7.1f} mm")
     for row in ablation["rounds"]:
         words, unit = f"round {row['round']}: {title(row['label'])}", row["unit"]
-        terminal.say(f"{words:34s}{row['before']:9.1f} {unit:2s}{row['after']:7.1f} {unit:2s}")
+        before, after = (signed(row[when], unit) for when in ("before", "after"))
+        terminal.say(f"{words:34s}{before:>12s}{after:>10s}")
     terminal.say(ablation["ended"])

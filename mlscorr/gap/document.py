@@ -11,7 +11,7 @@ from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import percent, size, with_articles
 from mlscorr.gap.agreement import Agreement, agreements
 from mlscorr.gap.close.closure import Closure
-from mlscorr.gap.infer.causes import Inference
+from mlscorr.gap.infer.causes import Cause, Inference
 from mlscorr.gap.infer.separability import Separability
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.where import NAMES
@@ -86,13 +86,13 @@ def gap_document(
         "agreement": [vars(part) for part in agreement],
         "advice": advice_of(inference, closure, next_data, excess),
         "where": [_split(split) for split in where.splits],
-        "causes": [_cause(rows, cause) for cause in inference.causes],
+        "causes": [cause_document(rows, cause) for cause in inference.causes],
         "separability": separability_document(inference.separability),
         "closure": _closure(closure),
         "next_data": [asdict(data) for data in next_data],
         "evidence": _evidence(inference),
         "innovations": _innovations(rows, where),
-        "windows": _windows(inference.cause, survey),
+        "windows": windows_document(inference.cause, survey),
         "map": map_document(survey) | {"rows": _on_map(rows, where)},
         "channels": {str(k): int((rows.channel == k).sum()) for k in np.unique(rows.channel)},
         "simulator": {"effects": [effect.document() for effect in effects]},
@@ -208,7 +208,15 @@ def _split(split):
     return named | place | columns | {"null_band": split.band.tolist(), "extent": extent}
 
 
-def _cause(rows, cause):
+def cause_document(rows: Rows, cause: Cause) -> dict:
+    """A cause with its parameters, and its target where it is of one.
+
+    Parameters
+    ----------
+    rows : Rows
+    cause : Cause
+        Found in these.
+    """
     moved = cause.shift[rows.metric]
     target = [part.fixed["target"] for part, _ in cause.parts if "target" in part.fixed]
     return {
@@ -275,8 +283,14 @@ def _innovations(rows, where):
     }
 
 
-def _windows(cause, survey):
-    """When the events of a cause act."""
+def windows_document(cause: Cause, survey: Survey) -> list[dict]:
+    """When the events of a cause act.
+
+    Parameters
+    ----------
+    cause : Cause
+    survey : Survey
+    """
     stretches = cause.stretches(survey.trajectory)
     return [{"effect": name, "start": start, "end": end} for name, start, end in stretches]
 

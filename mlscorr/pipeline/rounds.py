@@ -1,14 +1,14 @@
 """``diagnose --until-none``: effect after effect into the simulator, until nothing is left."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from mlscorr.effects.labels import lowered, title
 from mlscorr.gap.close import LoneEffect, lone_effects
-from mlscorr.gap.document import no_cause
+from mlscorr.gap.document import cause_document, no_cause, windows_document
 from mlscorr.gap.infer import Costs
 from mlscorr.io.output import document
 from mlscorr.pipeline.compared_rows import NEXT_RUN
@@ -53,18 +53,7 @@ class DiagnosedRounds:
     @property
     def document(self) -> dict:
         """That of gap.json of the first round, with ``ablation``."""
-        rounds, closed = [], ("before", "after", "unit", "shrink", "kind")
-        for number, each in enumerate(self.rounds, start=1):
-            verdict, closure = each.inference.verdict, each.closure
-            rounds.append(
-                {
-                    "round": number,
-                    "label": verdict.label,
-                    "probability": float(verdict.probability),
-                    "parameters": [asdict(size) for size in each.inference.cause.parameters],
-                }
-                | {name: getattr(closure, name) for name in closed}
-            )
+        rounds = [_round_document(*numbered) for numbered in enumerate(self.rounds, start=1)]
         lone = [vars(effect) | {"unit": "mm"} for effect in self.lone]
         ablation = {"rounds": rounds, "alone": lone, "ended": self.ended}
         first = self.rounds[0].document
@@ -92,6 +81,18 @@ class DiagnosedRounds:
         """
         survey, improved = self.rounds[0].survey, self.rounds[-1].improved
         return write_diagnosis(out, self.document, survey, improved, overwrite)
+
+
+def _round_document(number, diagnosed):
+    """What a round found, and the gap with it; none after what no simulator can take."""
+    cause, closure = diagnosed.inference.cause, diagnosed.closure
+    found = cause_document(diagnosed.rows, cause)
+    label, kept = found.pop("effect"), ("before", "after", "unit", "shrink", "kind")
+    gap = {name: getattr(closure, name) for name in kept}
+    if closure.effect != label:  # that of the nearest known effect, which was not put in
+        gap |= {"after": None, "shrink": None}
+    windows = windows_document(cause, diagnosed.survey)
+    return {"round": number, "label": label} | found | gap | {"windows": windows}
 
 
 def diagnose_until_none(

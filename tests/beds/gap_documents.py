@@ -147,6 +147,13 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
     return document | changes
 
 
+def round_document(label, **changes):
+    "A round of diagnose --until-none"
+    gap = {"before": 38.24, "after": 14.68, "unit": "mm", "shrink": 0.853, "kind": "systematic"}
+    found = {"round": 1, "label": label, "probability": 0.9, "parameters": [], "windows": []}
+    return found | gap | changes
+
+
 def contrasts():
     "Intensity that falls off beyond 20 m, of all 3 bins one unknown; nothing of the others"
     table = {

@@ -14,11 +14,11 @@ from mlscorr.gap.document import (
     ADVICE,
     NOTHING_TO_DO,
     _sentence,
-    _windows,
     advice_of,
     excess_of,
     map_document,
     separability_document,
+    windows_document,
 )
 from mlscorr.gap.infer.causes import Cause, Inference
 from mlscorr.gap.infer.error_models import STATED
@@ -27,7 +27,6 @@ from mlscorr.gap.infer.verdict import GapVerdict
 from mlscorr.gap.infer.where import Where
 from mlscorr.gap.plan.additions import NextData
 from mlscorr.gap.train import features
-
 
 BAND = (-0.4, 0.7)  # mm
 AGAIN = NextData("the same road again", "two passes share errors")
@@ -63,7 +62,7 @@ def closure(effect="none", before=0.1, after=0.1, shrink=0.0, over=1.0):
     ],
 )
 def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rms_mm, excess):
-    "Of gap, errors over their sigma and accuracy each can stand against it; sentence and advice say so"
+    "Gap, errors over their sigma, accuracy: each can stand against it, in sentence and advice"
     found, closed = inference(whole=whole), closure(before=before, over=over)
     assert excess_of(found, closed, [Agreement("target", 9, rms_mm, 20.6)]) == excess
     assert advice_of(found, closed, [], excess) == [ADVICE[excess]]
@@ -116,7 +115,7 @@ def test_an_event_is_told_no_farther_than_the_drive_reaches():
     first, last = survey.trajectory.gps_time[[0, -1]]
     model = replace(STATED, windows=((first - 1800.0, 3600.0 + last - first, 2.0, "rise"),))
     cause = Cause("position_noise", 1.0, (), (), np.zeros(6), model=model)
-    (window,) = _windows(cause, survey)
+    (window,) = windows_document(cause, survey)
     assert (window["start"], window["end"]) == (first, last)
     assert cause.stretches(survey.trajectory) == (("position_noise", first, last),)
 

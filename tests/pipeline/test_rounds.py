@@ -59,6 +59,21 @@ def test_what_has_no_bound_is_null(survey, tmp_path):
     assert told["ablation"]["rounds"][0]["parameters"][0]["detectable"] is None
 
 
+def test_what_no_known_effect_explains_closes_nothing(survey):
+    "The gap that the nearest effect leaves is that of no round: it was not put in"
+    first = diagnose(read_survey(survey))
+    inference, closure = first.inference, first.closure
+    cause = replace(inference.cause, effect="unknown", parameters=())
+    verdict = replace(inference.verdict, label="unknown", lead="height error")
+    inference = replace(inference, verdict=verdict, causes=(cause,))
+    unknown = replace(first, inference=inference)
+    known, found = DiagnosedRounds((first, unknown), ()).document["ablation"]["rounds"]
+    assert (known["after"], known["shrink"]) == (closure.after, closure.shrink)
+    assert found["before"] == closure.before
+    assert found["after"] is found["shrink"] is None
+    assert known["windows"] == [] and "target" not in known
+
+
 def test_another_simulator_cannot_run_here(survey, tmp_path):
     "Rounds with clouds of one's own simulator are refused: it would have to run"
     command = ["diagnose", str(survey), "--until-none", "--simulated", str(survey)]

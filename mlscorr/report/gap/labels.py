@@ -5,6 +5,7 @@ from collections.abc import Callable
 from mlscorr.effects import Effect, SizeEstimate
 from mlscorr.effects.catalogue import effects_by_name
 from mlscorr.effects.labels import meaning, title
+from mlscorr.effects.wording import known
 
 
 def sentences_of(
@@ -26,6 +27,30 @@ def sentences_of(
         sentence = kind.describe(estimates, where(kind)) if kind else meaning(name)
         sentences.append(sentence or f"{title(name)}.")
     return sentences
+
+
+def place_of(kind: type[Effect], target: str | None, windows: list[dict]) -> str:
+    """When an effect acts, or on which target, in words.
+
+    Parameters
+    ----------
+    kind : class of an Effect
+    target : str or None
+        Of the cause.
+    windows : list of dict
+        Of gap.json, with start and end. Units: s.
+    """
+    if kind.is_on_target():
+        return f"target {target}" if target else "one target"
+    for window in windows:
+        start, end = window["start"], window["end"]
+        if window["effect"] == kind.name and known(start) and known(end):
+            if end - start < 1.0:  # times are written in whole seconds
+                return f" at gps_time {start:.1f} s"
+            if kind.name == "position_step":  # from then on to the end of its pass
+                return f" about gps_time {start:.0f} s"
+            return f" between gps_time {start:.0f} s and {end:.0f} s"
+    return ""
 
 
 def parameters_of(label: str, parameters: list[dict]) -> dict[str, dict[str, SizeEstimate]]:

@@ -1,11 +1,12 @@
 """Rows of the tables of a diagnosis and of a plan, read from their documents."""
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 from mlscorr.effects.labels import meaning, title
 from mlscorr.effects.wording import DASH, known, percent
-from mlscorr.report.gap.labels import sentences_of
+from mlscorr.report.gap.labels import place_of, sentences_of
 from mlscorr.report.gap.numbers import column, plain, signed
 
 COVARIATES = {
@@ -89,7 +90,8 @@ def round_rows(rounds: list[dict]) -> list[RoundRow]:
     rows = []
     for each in rounds:
         label, gap = each["label"], [signed(each[k], each["unit"]) for k in ("before", "after")]
-        sizes = " ".join(sentences_of(label, each["parameters"], lambda _: ""))
+        place = partial(place_of, target=each.get("target"), windows=each["windows"])
+        sizes = " ".join(sentences_of(label, each["parameters"], place))
         gone = DASH if label == "none" else percent(each["shrink"])
         rows.append(RoundRow(f"{each['round']}. {title(label)}", sizes, *gap, gone))
     return rows

@@ -2,11 +2,10 @@
 
 from typing import NamedTuple
 
-from mlscorr.effects import Effect
 from mlscorr.effects.labels import family, lowered, meaning, title
 from mlscorr.effects.wording import DASH, joined, known, size
 from mlscorr.gap.document import no_cause
-from mlscorr.report.gap.labels import sentences_of
+from mlscorr.report.gap.labels import place_of, sentences_of
 from mlscorr.report.gap.shrinking import Fact, is_closed, is_within, shrinking
 
 CERTAINTY = (  # probability from which on one says so
@@ -141,22 +140,8 @@ def _sentences(document, label):
     cause = next((cause for cause in document["causes"] if cause["effect"] == label), None)
     if cause is None:
         return [meaning(label)]
-    return sentences_of(label, cause["parameters"], lambda kind: _where(document, cause, kind))
-
-
-def _where(document, cause, kind: type[Effect]):
-    """When an effect acts, or on which target, in words."""
-    if kind.is_on_target():
-        return f"target {cause['target']}" if cause.get("target") else "one target"
-    for window in document["windows"]:
-        start, end = window["start"], window["end"]
-        if window["effect"] == kind.name and known(start) and known(end):
-            if end - start < 1.0:  # times are written in whole seconds
-                return f" at gps_time {start:.1f} s"
-            if kind.name == "position_step":  # from then on to the end of its pass
-                return f" about gps_time {start:.0f} s"
-            return f" between gps_time {start:.0f} s and {end:.0f} s"
-    return ""
+    target, windows = cause.get("target"), document["windows"]
+    return sentences_of(label, cause["parameters"], lambda kind: place_of(kind, target, windows))
 
 
 def not_ruled_out(document: dict) -> str:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from mlscorr.report.gap.rows import bin_rows, cause_rows, detectable_rows, worst_rows
-from tests.beds.gap_documents import gap_document
+from mlscorr.report.gap.rows import bin_rows, cause_rows, detectable_rows, round_rows, worst_rows
+from tests.beds.gap_documents import CAUSES, gap_document, parameter, round_document
 
 
 def part(name, detectable, typical):
@@ -49,3 +49,24 @@ def test_every_bin_and_every_parameter_has_a_row():
     assert [row.chosen for row in causes if row.title == "Scanner clock offset"] == [True]
     nothing = next(row for row in causes if row.title == "Nothing")
     assert (nothing.name, nothing.estimate, nothing.unit) == ("–", "–", "–")
+
+
+def test_a_round_names_the_target_that_is_wrong():
+    "A correction sheet without the target's name helps nobody"
+    sizes = [parameter(axis, "m", 0.146, 0.004) for axis in ("easting", "northing", "height")]
+    (row,) = round_rows([round_document("target_outlier", parameters=sizes, target="T08")])
+    assert "The surveyed coordinates of target T08 are wrong" in row.size
+
+
+def test_a_round_says_when_its_event_acts():
+    "Of two passing errors, each found in a round of its own, each has its time"
+    window = {"effect": "position_bump", "start": 413215.0, "end": 413225.0}
+    sizes = CAUSES["position_bump"]
+    (row,) = round_rows([round_document("position_bump", parameters=sizes, windows=[window])])
+    assert "between gps_time 413215 s and 413225 s" in row.size
+
+
+def test_what_was_not_put_into_the_simulator_closes_nothing():
+    "Of something unknown the table has the gap before, and dashes for what is left and gone"
+    (row,) = round_rows([round_document("unknown", after=None, shrink=None)])
+    assert (row.before, row.after, row.gone) == ("38.2 mm", "–", "–")
