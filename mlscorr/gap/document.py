@@ -247,10 +247,10 @@ def separability_document(compared: Separability) -> dict:
 
 def _closure(closure):
     names = ("effect", "probability", "kind", "before", "after", "unit", "shrink")
+    names += ("held_out", "is_held_out")
     return {name: getattr(closure, name) for name in names} | {
         "interval": list(closure.interval),
         "null_band": list(closure.null_band),
-        "held_out": closure.held_out,
         "folds": [
             {"label": closure.effect, "before": float(before), "after": float(after)}
             for before, after in closure.folds

@@ -104,6 +104,7 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
             "interval": [None, None] if label == "none" else [0.931, 0.994],
             "null_band": [-2.1, 4.2],
             "held_out": "Each of 4 blocks of 25 s was held out in turn.",
+            "is_held_out": label != "none",
             "folds": [
                 {"label": tested, "before": before, "after": after}
                 for before, after in [(14.1, 2.2), (18.0, -1.1), (16.6, None), (17.3, 0.4)]
@@ -289,6 +290,7 @@ def too_little():
     verdict = {"label": "none", "probability": None, "set": [], "p_value": None, "same": []}
     verdict |= {"lead": "", "sentence": "Only 2 targets were seen; 12 are needed."}
     closure = gap | {"effect": "none", "shrink": None, "interval": [None, None], "held_out": ""}
+    closure["is_held_out"] = False
     nothing = {"names": [], "matrix": []}
     return empty | {
         "verdict": verdict,

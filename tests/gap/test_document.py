@@ -46,7 +46,7 @@ def closure(effect="none", before=0.1, after=0.1, shrink=0.0, over=1.0):
     sigmas = OverSigma(("H",), (over,), (over,), (1.9,))
     gap = Gap(before, after, BAND)
     return Closure(
-        effect, 0.3, "systematic", "mm", before, after, shrink, (shrink, shrink), BAND, "",
+        effect, 0.3, "systematic", "mm", before, after, shrink, (shrink, shrink), BAND, "", True,
         np.zeros((1, 2)), gap, sigmas,
     )  # fmt: skip
 

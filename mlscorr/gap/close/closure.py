@@ -66,6 +66,8 @@ class Closure:
         95 % of what the gap is when nothing is wrong.
     held_out : str
         A sentence.
+    is_held_out : bool
+        Whether the size was found without the rows that judge it.
     folds : (f, 2) array
         The gap in each fold alone, before and after. In the unit.
     gap : Gap
@@ -84,6 +86,7 @@ class Closure:
     interval: tuple[float, float]
     null_band: tuple[float, float]
     held_out: str
+    is_held_out: bool
     folds: np.ndarray
     gap: Gap
     over_sigma: OverSigma
@@ -121,7 +124,7 @@ def close_gap(
         cause.effect, float(cause.probability), kind, unit, gap.before,
         gap.before if nothing else gap.after, 0.0 if nothing else held.gone,
         (0.0, 0.0) if nothing else held.interval, gap.null_band, folds.held_out,
-        signed_root(held.folds, unit), in_sample,
+        folds.is_held_out, signed_root(held.folds, unit), in_sample,
         errors_over_sigma(rows, ruler.observations, folds, rng),
     )  # fmt: skip
 

@@ -55,6 +55,11 @@ class Folds:
     columns: np.ndarray
 
     @property
+    def is_held_out(self) -> bool:
+        """Whether rows judge a size that was found without them."""
+        return len(self.predicted) > 1
+
+    @property
     def of_rows(self) -> np.ndarray:
         """Which of `predicted` (m,) is compared with each row where one must be."""
         return np.clip(self.fold, 0, len(self.predicted) - 1)

@@ -68,7 +68,8 @@ def shrinking(document: dict) -> Fact:
     is_chance = is_within(closure["after"], closure["null_band"], closure.get("kind"))
     if is_chance and not not_closed(closure):
         more = " What is left is what chance leaves when nothing is wrong."
-    part = f"{GAPS.get(closure.get('kind'), 'Gap')} on held-out data"
+    data = "held-out data" if closure["is_held_out"] else "the data in which it was found"
+    part = f"{GAPS.get(closure.get('kind'), 'Gap')} on {data}"
     return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)
 
 

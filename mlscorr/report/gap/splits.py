@@ -118,7 +118,7 @@ def _write_share(panel, split, edges, high, is_explained):
 
 @styled
 def closure_figure(document: dict) -> Figure:
-    """The gap on held-out data, before and after: in all, and block by block.
+    """The gap on held-out data, where there is any, before and after: in all, and block by block.
 
     Parameters
     ----------
@@ -129,8 +129,9 @@ def closure_figure(document: dict) -> Figure:
     figure = new_figure(2.7)
     whole, each = figure.subplots(1, 2, width_ratios=[1, 2.4])
     _whole(whole, closure)
+    whole.set_title("All held-out data" if closure["is_held_out"] else "All data")
     whole.set_ylabel(f"Gap ({closure['unit']})")
-    _folds(each, closure["folds"])
+    _folds(each, closure["folds"] if closure["is_held_out"] else [])
     bars = Patch(color=BEFORE, label="Before"), Patch(color=AFTER, label="After")
     legend_above(figure, _legend(*bars))
     return figure
@@ -154,7 +155,6 @@ def _whole(panel, closure):
             )  # fmt: skip
     panel.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
     panel.set_xticks([0, 1], ["Before", "After"])
-    panel.set_title("All held-out data")
     panel.margins(y=0.15)
     panel.grid(axis="x", visible=False)
 

@@ -35,6 +35,7 @@ def test_each_row_is_judged_by_a_size_found_without_it(late):
     cause = late.cause("time_offset")
     folds = late.folds(cause)
     assert set(np.unique(folds.fold)) == {-1, 0, 1, 2, 3, 4}
+    assert folds.is_held_out
     assert (folds.fold[~late.used] == -1).all()
     for block in np.unique(folds.block):
         assert len(np.unique(folds.fold[late.used & (folds.block == block)])) <= 1
@@ -59,6 +60,7 @@ def test_a_cause_of_one_moment_holds_nothing_out(late):
     cause = replace(late.cause("time_offset"), parts=((jump, np.full(3, 0.05)),))
     folds = late.folds(cause)
     assert folds.held_out.startswith("Nothing could be held out")
+    assert not folds.is_held_out
     assert len(folds.predicted) == 1 and not folds.fold.any()
     np.testing.assert_array_equal(folds.predicted[0].shift, folds.whole.shift)
 

@@ -2,7 +2,9 @@
 
 import pytest
 
-from mlscorr.report.gap.shrinking import is_within, shrunk
+from mlscorr.report.gap import diagnosis_page
+from mlscorr.report.gap.shrinking import is_within, shrinking, shrunk
+from mlscorr.report.gap.splits import closure_figure
 from tests.beds.gap_documents import gap_document
 from tests.report.gap.test_verdict import summary
 
@@ -39,3 +41,16 @@ def test_heights_of_eight_sigma_are_not_closed():
 def test_a_gap_below_its_band_is_within_chance(value, within):
     "Up to the upper end of the band; what is not known is not"
     assert is_within(value, [-1.0, 3.5]) is within
+
+
+def test_what_was_not_held_out_is_not_called_so():
+    "A cause of one moment is measured where it was found: words, figure and page say so"
+    document = gap_document("position_bump", 0.96)
+    assert "on held-out data" in shrinking(document).title
+    document["closure"]["is_held_out"] = False
+    assert "on the data in which it was found" in shrinking(document).title
+    whole, each = closure_figure(document).axes
+    assert whole.get_title(loc="left") == "All data" and not each.get_visible()
+    page = diagnosis_page(document, "street").html()
+    assert "measured on the data in which it was found" in page
+    assert "had no part in finding" not in page
