@@ -188,6 +188,12 @@ def advice_of(
             )
     else:
         sentences += [effect_class(part).remedy for part in verdict.label.split("+")]
+        (low, high), before, after = closure.null_band, closure.before, closure.after
+        if closure.shrink < 0 and not low <= after <= high:
+            sentences.append(
+                f"But with that size in the simulator the gap grew (from {before:.1f} to "
+                f"{after:.1f} {closure.unit}): trust what was found, not how large it is."
+            )
     labels = (*verdict.set, *inference.same)
     open_question = [lowered(title(n)) for n in labels if n not in ("none", verdict.label)]
     if open_question and next_data:

@@ -86,6 +86,15 @@ def test_the_nearest_effect_is_advised_against_by_its_share():
     assert "closes 99.5 % of the squared gap" in second
 
 
+@pytest.mark.parametrize(("after", "shrink", "is_said"), [(-53.9, -0.88, True), (0.1, 0.9, False)])
+def test_a_size_with_which_the_gap_grew_is_not_advised_alone(after, shrink, is_said):
+    "The noise is stated as large as found, but for what the simulator says of that size"
+    found = inference("range_noise", labels=("range_noise",))
+    advice = advice_of(found, closure("range_noise", 18.7, after, shrink), [], "")
+    assert "as large as found" in advice[0]
+    assert any("the gap grew (from 18.7 to -53.9 mm)" in sentence for sentence in advice) == is_said
+
+
 def test_separability_is_told_in_plain_numbers():
     "Two parameters of correlation 0.96 are one class; biases are 4.13 sigmas"
     normal = np.array([[4.0, 4.8, 0.0], [4.8, 6.25, 0.0], [0.0, 0.0, 1.0]])

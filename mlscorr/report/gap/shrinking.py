@@ -34,7 +34,9 @@ def is_closed(document: dict) -> bool:
     return closure["effect"] not in (None, "", "none") and known(closure["shrink"])
 
 
-def is_within(value: float | None, band: list[float | None], kind: str | None = None) -> bool:
+def is_within(
+    value: float | None, band: list[float | None], kind: str | None = None, is_left: bool = False
+) -> bool:
     """Whether a gap is what it may be when nothing is wrong; not, when one is not known.
 
     Parameters
@@ -43,9 +45,12 @@ def is_within(value: float | None, band: list[float | None], kind: str | None = 
     band : list of 2 floats or None
     kind : str, optional
         Of the gap: below the band more returns are lost than by chance, of others it is smaller.
+    is_left : bool
+        Whether it is what a cause in the simulator leaves: below the band, too much was put in.
     """
     is_known = all(map(known, [value, *band]))
-    return is_known and value <= band[1] and (kind != "returns" or value >= band[0])
+    is_low = is_known and value < band[0]
+    return is_known and value <= band[1] and not (is_low and (is_left or kind == "returns"))
 
 
 def shrinking(document: dict) -> Fact:
@@ -64,10 +69,12 @@ def shrinking(document: dict) -> Fact:
     if document["verdict"]["label"] == "unknown":
         nearest = f"With the nearest known effect, {lowered(title(closure['effect']))},"
         return Fact(f"{nearest} in the simulator", pair, shrunk(closure))
-    more = ""
-    is_chance = is_within(closure["after"], closure["null_band"], closure.get("kind"))
-    if is_chance and not not_closed(closure):
-        more = " What is left is what chance leaves when nothing is wrong."
+    more, left = "", (closure["after"], closure["null_band"], closure.get("kind"))
+    if is_within(*left, is_left=True):
+        chance = " What is left is what chance leaves when nothing is wrong."
+        more = "" if not_closed(closure) else chance
+    elif is_within(*left):
+        more = " Less is left than chance leaves: too much was put in."
     data = "held-out data" if closure["is_held_out"] else "the data in which it was found"
     part = f"{GAPS.get(closure.get('kind'), 'Gap')} on {data}"
     return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)

@@ -44,13 +44,31 @@ def test_a_gap_below_its_band_is_within_chance(value, within):
 
 
 def test_what_was_not_held_out_is_not_called_so():
-    "A cause of one moment is measured where it was found: words, figure and page say so"
+    "A cause of one moment is measured where it was found: words and figure say so"
     document = gap_document("position_bump", 0.96)
     assert "on held-out data" in shrinking(document).title
     document["closure"]["is_held_out"] = False
     assert "on the data in which it was found" in shrinking(document).title
     whole, each = closure_figure(document).axes
     assert whole.get_title(loc="left") == "All data" and not each.get_visible()
+
+
+@pytest.mark.long
+def test_the_page_calls_nothing_held_out_that_was_not():
+    "A cause of one moment is measured where it was found, as the figure beside it says"
+    document = gap_document("position_bump", 0.96)
+    document["closure"]["is_held_out"] = False
     page = diagnosis_page(document, "street").html()
     assert "measured on the data in which it was found" in page
     assert "had no part in finding" not in page
+
+
+def test_less_than_chance_leaves_is_too_much_put_in():
+    "A gap of 18.7 mm that became -53.9 mm is no chance: before, below the band is; after, not"
+    band, document = [-0.5, 1.17], gap_document("range_noise", 0.99)
+    assert is_within(-53.9, band, "scatter") and not is_within(-53.9, band, "scatter", is_left=True)
+    over = {"before": 18.7, "after": -53.9, "null_band": band, "kind": "scatter", "shrink": -0.88}
+    document["closure"] |= over
+    assert shrinking(document).more.endswith("than chance leaves: too much was put in.")
+    document["closure"] |= {"after": 0.3, "shrink": 0.99}
+    assert shrinking(document).more.endswith("chance leaves when nothing is wrong.")
