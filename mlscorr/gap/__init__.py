@@ -8,7 +8,7 @@ The story, a room each:
 - infer: the verdict, causes with their parameters, where the gap lies, what can be told apart
 - close: the simulator with the cause in it, on data that were not used to find it
 - plan: what to measure next, and what a survey will show before it is driven
-- document: all of it as plain numbers and words
+- advice, document: what to do about it, and all of it as plain numbers and words
 """
 
 from mlscorr.gap.infer import Costs

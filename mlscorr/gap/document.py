@@ -6,14 +6,13 @@ from dataclasses import asdict
 
 import numpy as np
 
-from mlscorr.effects import Effect, effect_class
-from mlscorr.effects.labels import lowered, title
-from mlscorr.effects.wording import percent, size, with_articles
-from mlscorr.gap.agreement import Agreement, agreements
+from mlscorr.effects import Effect
+from mlscorr.effects.wording import with_articles
+from mlscorr.gap.advice import advice_of, excess_of, sentence_of
+from mlscorr.gap.agreement import agreements
 from mlscorr.gap.close.closure import Closure
 from mlscorr.gap.infer.causes import Cause, Inference
 from mlscorr.gap.infer.separability import Separability
-from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.where import NAMES
 from mlscorr.gap.observe.absence import Absence
 from mlscorr.gap.observe.rows import Rows, background
@@ -21,12 +20,6 @@ from mlscorr.gap.plan.additions import NextData
 from mlscorr.survey import Survey
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
-NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
-ADVICE = {  # where no cause is named, by what is left is more than
-    "": NOTHING_TO_DO,
-    "stated": "Errors are larger than stated: run mlscorr correct, or state POS sigmas larger.",
-    "chance": "More control points, or a second pass, may show why the two differ.",
-}
 LISTED = 1e-4  # probability from which on a pair is listed in the evidence
 
 
@@ -73,15 +66,9 @@ def gap_document(
             "lead": verdict.lead,
             "hidden": verdict.is_hidden,
             "excess": excess,
-            "sentence": with_articles(_sentence(inference, excess)),
+            "sentence": with_articles(sentence_of(inference, excess)),
         },
-        "gap": {
-            "before": closure.gap.before,
-            "after": closure.gap.after,
-            "unit": closure.unit,
-            "null_band": list(closure.gap.null_band),
-            "kind": closure.kind,
-        },
+        "gap": vars(closure.gap) | {"unit": closure.unit, "kind": closure.kind},
         "headline": with_articles(where.headline),
         "agreement": [vars(part) for part in agreement],
         "advice": advice_of(inference, closure, next_data, excess),
@@ -101,108 +88,6 @@ def gap_document(
         "warnings": [*absence.warnings, *warnings],
         "notes": list(survey.notes),
     }
-
-
-def excess_of(inference: Inference, closure: Closure, agreement: Iterable[Agreement]) -> str:
-    """What it is more than that is left where no cause is named: stated, chance, or nothing.
-
-    Parameters
-    ----------
-    inference : Inference
-    closure : Closure
-        Of its verdict.
-    agreement : iterable of Agreement
-    """
-    if inference.verdict.label != "none":
-        return ""
-    worse = [part for part in agreement if part.rms_mm > SETTINGS.quantile * part.stated_mm]
-    if worse or closure.over_sigma.beyond:
-        return "stated"
-    gaps = closure.gap, inference.where
-    return "chance" if any(gap.before > gap.null_band[1] for gap in gaps) else ""
-
-
-def no_cause(labels: Sequence[str], excess: str) -> str:
-    """What is said where no cause is named, without a full stop.
-
-    Parameters
-    ----------
-    labels : sequence of str
-        That hold 95 %.
-    excess : str
-        As ``excess_of`` gives it.
-    """
-    if excess:
-        return f"No cause is shown, but the two differ by more than {excess}"
-    if list(labels) != ["none"]:
-        return "Nothing is shown to be wrong, but not all is ruled out"
-    return "Nothing is wrong that this survey could show"
-
-
-def _sentence(inference, excess):
-    verdict, cause = inference.verdict, inference.cause
-    chance = f"probability {verdict.probability:.2f}"
-    if verdict.label == "none":
-        return f"{no_cause(verdict.set, excess)} ({chance} that nothing is wrong)."
-    if verdict.is_hidden:
-        return (
-            f"What was compared shows nothing wrong, but it can't be said that nothing is: there "
-            f"is a {verdict.lead} (probability of something unknown {verdict.probability:.2f})."
-        )
-    if verdict.label == "unknown":
-        return f"No known effect explains it ({chance}): it looks like a {verdict.lead}."
-    sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in cause.parameters]
-    do = "explain" if "+" in verdict.label else "explains"
-    return f"{title(verdict.label)} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
-
-
-def advice_of(
-    inference: Inference, closure: Closure, next_data: Sequence[NextData], excess: str
-) -> list[str]:
-    """What to do about a verdict, in sentences.
-
-    Parameters
-    ----------
-    inference : Inference
-    closure : Closure
-        Of its verdict.
-    next_data : sequence of NextData
-    excess : str
-        As ``excess_of`` gives it.
-    """
-    verdict, sentences = inference.verdict, []
-    if verdict.label == "none":
-        sentences.append(ADVICE[excess])
-    elif verdict.is_hidden:
-        sentences.append(
-            "Find out why the targets of that stretch could not be matched before the survey is "
-            "trusted there: the warnings give each one's reason."
-        )
-    elif verdict.label == "unknown":
-        sentences.append(f"Look for what makes a {verdict.lead}: no effect of the library does.")
-        if closure.effect != "none":  # it impersonates the cause
-            sentences.append(
-                f"The nearest known effect, {lowered(title(closure.effect))}, closes "
-                f"{percent(max(0.0, closure.shrink))} of the squared gap, but does not explain "
-                "it: don't use it."
-            )
-    else:
-        sentences += [effect_class(part).remedy for part in verdict.label.split("+")]
-        (low, high), before, after = closure.null_band, closure.before, closure.after
-        if closure.shrink < 0 and not low <= after <= high:
-            sentences.append(
-                f"But with that size in the simulator the gap grew (from {before:.1f} to "
-                f"{after:.1f} {closure.unit}): trust what was found, not how large it is."
-            )
-    labels = (*verdict.set, *inference.same)
-    open_question = [lowered(title(n)) for n in labels if n not in ("none", verdict.label)]
-    if open_question and next_data:
-        sentences = [sentence for sentence in sentences if sentence != NOTHING_TO_DO]
-        sentences.append(
-            f"To settle what is open ({', '.join(dict.fromkeys(open_question))}), measure "
-            f"{next_data[0].survey}: {next_data[0].why}"
-        )
-    return list(dict.fromkeys(map(with_articles, sentences)))
 
 
 def _split(split):

@@ -12,8 +12,9 @@ import numpy as np
 
 from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import contrast
+from mlscorr.gap.advice import NOTHING_TO_DO
 from mlscorr.gap.close import Closure, FoundCause, cause_for_simulator, close_gap
-from mlscorr.gap.document import NOTHING_TO_DO, gap_document
+from mlscorr.gap.document import gap_document
 from mlscorr.gap.infer import Costs, Inference, infer_causes
 from mlscorr.gap.observe import Absence, Rows, background
 from mlscorr.gap.plan import NextData, next_data

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.effects.labels import lowered, title
+from mlscorr.gap.advice import no_cause
 from mlscorr.gap.close import LoneEffect, lone_effects
-from mlscorr.gap.document import cause_document, no_cause, windows_document
+from mlscorr.gap.document import cause_document, windows_document
 from mlscorr.gap.infer import Costs
 from mlscorr.io.output import document
 from mlscorr.pipeline.compared_rows import NEXT_RUN
@@ -86,13 +87,13 @@ class DiagnosedRounds:
 def _round_document(number, diagnosed):
     """What a round found, and the gap with it; none after what no simulator can take."""
     cause, closure = diagnosed.inference.cause, diagnosed.closure
-    found = cause_document(diagnosed.rows, cause)
-    label, kept = found.pop("effect"), ("before", "after", "unit", "shrink", "kind")
+    content = cause_document(diagnosed.rows, cause)
+    label, kept = content.pop("effect"), ("before", "after", "unit", "shrink", "kind")
     gap = {name: getattr(closure, name) for name in kept}
     if closure.effect != label:  # that of the nearest known effect, which was not put in
         gap |= {"after": None, "shrink": None}
     windows = windows_document(cause, diagnosed.survey)
-    return {"round": number, "label": label} | found | gap | {"windows": windows}
+    return {"round": number, "label": label} | content | gap | {"windows": windows}
 
 
 def diagnose_until_none(

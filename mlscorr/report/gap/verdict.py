@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from mlscorr.effects.labels import family, lowered, meaning, title
 from mlscorr.effects.wording import DASH, joined, known, size
-from mlscorr.gap.document import no_cause
+from mlscorr.gap.advice import no_cause
 from mlscorr.report.gap.labels import place_of, sentences_of
 from mlscorr.report.gap.shrinking import Fact, is_closed, is_within, shrinking
 

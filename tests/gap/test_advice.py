@@ -1,0 +1,79 @@
+"""What is said of a verdict, and what to do about it."""
+
+import numpy as np
+import pytest
+
+from mlscorr.gap.advice import ADVICE, NOTHING_TO_DO, advice_of, excess_of, sentence_of
+from mlscorr.gap.agreement import Agreement
+from mlscorr.gap.close.closure import Closure, Gap
+from mlscorr.gap.close.over_sigma import OverSigma
+from mlscorr.gap.infer.causes import Cause, Inference
+from mlscorr.gap.infer.verdict import GapVerdict
+from mlscorr.gap.infer.where import Where
+from mlscorr.gap.plan.additions import NextData
+
+BAND = (-0.4, 0.7)  # mm
+AGAIN = NextData("the same road again", "two passes share errors")
+
+
+def inference(label="none", whole=0.1, labels=("none",), lead=""):
+    "Of a verdict, with the gap (mm) of all rows together"
+    none, empty = np.zeros(0), np.zeros((0, 2))
+    where = Where(whole, whole, BAND, (), none, none, empty, none, "")
+    verdict = GapVerdict(label, 0.34, labels, 0.6, lead, False)
+    cause = Cause(label, 0.34, (), (), np.zeros(3))
+    return Inference(verdict, (cause,), (), where, None, {label: 0.34}, None, None)
+
+
+def closure(effect="none", before=0.1, after=0.1, shrink=0.0, over=1.0):
+    "Of a cause, with gaps (mm) and errors in height (sigmas) after it"
+    sigmas = OverSigma(("H",), (over,), (over,), (1.9,))
+    gap = Gap(before, after, BAND)
+    return Closure(
+        effect, 0.3, "systematic", "mm", before, after, shrink, (shrink, shrink), BAND, "", True,
+        np.zeros((1, 2)), gap, sigmas,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("whole", "before", "over", "rms_mm", "excess"),
+    [
+        (0.1, 0.1, 1.0, 20.0, ""),
+        (12.9, 0.1, 1.0, 20.0, "chance"),
+        (0.1, 0.8, 1.0, 20.0, "chance"),
+        (0.1, 0.1, 7.3, 20.0, "stated"),
+        (12.9, 0.1, 1.0, 91.6, "stated"),
+    ],
+)
+def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rms_mm, excess):
+    "Gap, errors over their sigma, accuracy: each can stand against it, in sentence and advice"
+    found, closed = inference(whole=whole), closure(before=before, over=over)
+    assert excess_of(found, closed, [Agreement("target", 9, rms_mm, 20.6)]) == excess
+    assert advice_of(found, closed, [], excess) == [ADVICE[excess]]
+    assert ("Nothing is wrong" in sentence_of(found, excess)) == (not excess)
+    assert (ADVICE[excess] == NOTHING_TO_DO) == (not excess)
+
+
+def test_where_something_is_to_be_measured_something_needs_to_be_done():
+    "With an open question and an addition that settles it the addition is all that is advised"
+    found = inference(labels=("none", "lever_arm"))
+    (sentence,) = advice_of(found, closure(), [AGAIN], "")
+    assert sentence.startswith("To settle what is open (lever arm), measure the same road again")
+    assert advice_of(found, closure(), [], "") == [NOTHING_TO_DO]
+
+
+def test_the_nearest_effect_is_advised_against_by_its_share():
+    "99.5 % is not said to be all, and an easting has its article"
+    found = inference("unknown", labels=("unknown",), lead="easting error")
+    first, second = advice_of(found, closure("range_scale", 9.0, 0.6, 0.9952), [], "")
+    assert "makes an easting error" in first
+    assert "closes 99.5 % of the squared gap" in second
+
+
+@pytest.mark.parametrize(("after", "shrink", "is_said"), [(-53.9, -0.88, True), (0.1, 0.9, False)])
+def test_a_size_with_which_the_gap_grew_is_not_advised_alone(after, shrink, is_said):
+    "The noise is stated as large as found, but for what the simulator says of that size"
+    found = inference("range_noise", labels=("range_noise",))
+    advice = advice_of(found, closure("range_noise", 18.7, after, shrink), [], "")
+    assert "as large as found" in advice[0]
+    assert any("the gap grew (from 18.7 to -53.9 mm)" in sentence for sentence in advice) == is_said
