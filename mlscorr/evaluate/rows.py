@@ -85,11 +85,15 @@ class Score:
     before, after : Statistics
     left_out : Statistics or None
         Of control points once the others alone have corrected them.
+    sigma : (3,) array or None
+        RMS of one sigma of what is left of check points after the correction, or of control points
+        that are left out: of targets, their survey and the correction there. Units: m.
     """
 
     before: Statistics
     after: Statistics
     left_out: Statistics | None = None
+    sigma: np.ndarray | None = None
 
     @property
     def n(self) -> int:

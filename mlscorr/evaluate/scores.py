@@ -21,7 +21,12 @@ def misclosures(matched: Matched, correction: Correcting | None = None) -> np.nd
     return matched.surveyed.position - correction.apply(centres).xyz
 
 
-def score(matched: Matched, correction: Correcting, left_out: np.ndarray | None = None) -> Score:
+def score(
+    matched: Matched,
+    correction: Correcting,
+    left_out: np.ndarray | None = None,
+    sigma: np.ndarray | None = None,
+) -> Score:
     """What remains of observations before and after a correction.
 
     Parameters
@@ -30,11 +35,14 @@ def score(matched: Matched, correction: Correcting, left_out: np.ndarray | None 
     correction : anything with ``apply(cloud) -> cloud``
     left_out : (n, 3) array, optional
         Misclosures once the other points alone have corrected them, NaN where not known. Units: m.
+    sigma : (k, 3) array, optional
+        Of what a verdict rests on: of those left out, else of those after. Units: m.
     """
     return Score(
         Statistics.of(matched.misclosure),
         Statistics.of(misclosures(matched, correction)),
         None if left_out is None else Statistics.of(left_out[np.isfinite(left_out).all(axis=1)]),
+        None if sigma is None or not len(sigma) else Statistics.of(sigma).rmse[:3],
     )
 
 

@@ -80,11 +80,15 @@ class CorrectedSurvey(Summary):
 
     @property
     def _control(self) -> Score:
-        return score(self.matched_control, self.estimate.correction, self.estimate.left_out)
+        left_out, tests = self.estimate.left_out, self.estimate.tests
+        sigma = np.vstack([np.empty((0, 3)), *(test.sigma for test in tests)])
+        return score(self.matched_control, self.estimate.correction, left_out, sigma)
 
     @property
     def _check(self) -> Score:
-        return score(self.matched_check, self.estimate.correction)
+        there = self.trajectory.at(self.matched_check.gps_time).position_sigma
+        sigma = np.sqrt(self.matched_check.variance + there**2)
+        return score(self.matched_check, self.estimate.correction, sigma=sigma)
 
     @property
     def targets(self) -> list[TargetRow]:

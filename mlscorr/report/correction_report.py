@@ -209,18 +209,6 @@ class CorrectionReport:
                 return before, after, kind
         return None, None, "nothing"
 
-    def target_sigma(self, role: str) -> np.ndarray:
-        """RMS (3,) of one sigma of a role's misclosures: of targets and their survey. Units: m.
-
-        Parameters
-        ----------
-        role : str
-            ``control`` or ``check``.
-        """
-        sigma = np.array([row.sigma for row in self.targets if row.group == role]).reshape(-1, 3)
-        known = sigma[np.isfinite(sigma).all(axis=1)]
-        return np.sqrt(np.square(known).sum(axis=0) / max(len(known), 1))
-
     def count(self, role: str) -> tuple[int, int]:
         """How many points of a role, and how many observations (one for each pass) of them.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from mlscorr.evaluate.rows import SEEN_BY_OTHERS, PointCounts
 from mlscorr.report.correction_report import CorrectionReport
+from mlscorr.report.settings import SETTINGS
 from mlscorr.report.tables import length_in_words, percent, verdict
 from mlscorr.survey.summary import counted
 
@@ -98,7 +99,9 @@ def headline(report: CorrectionReport) -> str:
 def _result(report):
     """How far off the cloud was and is."""
     sentences, is_worse = verdict(report)
-    rating = "red" if is_worse else "green" if report.judgement[2] == "check" else "amber"
+    before, after, kind = report.judgement
+    is_tested = kind == "check" and after.rmse[4] <= before.rmse[4] + SETTINGS.difference
+    rating = "red" if is_worse else "green" if is_tested else "amber"
     return Statement("Result", rating, sentences[0], tuple(("", text) for text in sentences[1:]))
 
 

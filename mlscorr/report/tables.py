@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
+from mlscorr.estimate.settings import SETTINGS as ESTIMATE
 from mlscorr.evaluate.rows import Statistics
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
@@ -172,14 +174,16 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
     -------
     sentences : list of str
     worse : bool
-        It became worse on an axis, by more than the targets themselves are off, or check points are
-        missing where they should have been seen.
+        It became worse on an axis, by more than the sigmas of targets and correction allow, or
+        check points are missing where they should have been seen.
     """
     before, after, kind = report.judgement
     if before is None or after is None:
         return ["No target was found that could tell how good the correction is."], True
-    sigma = report.target_sigma("check" if kind == "check" else "control")
-    rise = np.where(after.rmse[:3] > sigma, (after.rmse - before.rmse)[:3], 0.0)
+    sigma = (report.check if kind == "check" else report.control).sigma
+    # as large as this it is by chance, as it is known no better there than by its own sigma
+    limit = np.inf if sigma is None else sigma * _largest_ratio(after.n)
+    rise = np.where(after.rmse[:3] > limit, (after.rmse - before.rmse)[:3], 0.0)
     axes = dict(zip(AXES, rise, strict=True))
     worse = [f"{a} by {number(by)} m" for a, by in axes.items() if by > SETTINGS.difference]
     sentences = [
@@ -191,6 +195,11 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
         axes = ", ".join(worse)
         sentences.append(f"After the correction it is worse than before: {axes} (RMS of {points}).")
     return sentences, bool(worse or report.points("check").missing)
+
+
+def _largest_ratio(n):
+    """How many times its sigma the RMS of n residuals may be by chance."""
+    return np.sqrt(chdtri(n, ESTIMATE.significance) / n)
 
 
 def _plainly(before, after, kind, holds_everywhere, is_worse):

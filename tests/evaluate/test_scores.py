@@ -69,6 +69,14 @@ def test_left_out_ones_that_are_not_known_do_not_count(matched):
     np.testing.assert_allclose(result.left_out.rmse[:3], 0.02)
 
 
+def test_a_score_knows_how_far_off_it_may_be_by_chance(matched):
+    "The RMS of the sigmas that are given, on each axis; None where none is known"
+    sigma = np.array([[0.03, 0.01, 0.0], [0.04, 0.01, 0.0]])
+    result = score(matched, Moved(SHIFT), sigma=sigma)
+    np.testing.assert_allclose(result.sigma, [np.hypot(0.03, 0.04) / np.sqrt(2), 0.01, 0.0])
+    assert score(matched, Moved(SHIFT), sigma=sigma[:0]).sigma is None
+
+
 def test_check_points_give_the_accuracy(matched):
     "With the survey's sigma in it, by as many points as there are names"
     document = accuracy(

@@ -106,6 +106,16 @@ def check_schema(value, schema, where="report"):
         assert not isinstance(value, float) or math.isfinite(value), where
 
 
+def test_a_verdict_knows_the_sigma_of_what_it_rests_on(corrected):
+    "Of check points that of targets and corrected position, of those left out that of their tests"
+    result = corrected[0]
+    check, there = result.matched_check, result.trajectory.at(result.matched_check.gps_time)
+    variance = check.variance + there.position_sigma**2
+    np.testing.assert_allclose(result._check.sigma, np.sqrt(variance.mean(axis=0)))
+    sigma = np.vstack([test.sigma for test in result.estimate.tests])
+    np.testing.assert_allclose(result._control.sigma, np.sqrt((sigma**2).mean(axis=0)))
+
+
 # ---- what is written
 
 

@@ -196,3 +196,13 @@ def test_a_drive_that_others_hold_is_nowhere_said_to_stand_on_the_pos_alone(weak
     assert "nothing but the POS" not in " ".join(row.sentence for row in statements(report))
     alone = (WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[NO_CONTROL]),)
     assert headline(replace(report, support=Support(alone))).startswith("No control point takes")
+
+
+def test_what_became_no_better_is_not_green():
+    "8 mm at check points that are 13 mm off afterwards, as their sigma allows: amber"
+    report = replace(fabricate(drive())[2], support=Support())
+    ratings = []
+    for before in (0.030, 0.008):
+        report.check.before.rmse[:], report.check.after.rmse[:] = before, 0.013
+        ratings.append(statements(report)[0].rating)
+    assert ratings == ["green", "amber"]

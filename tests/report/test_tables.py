@@ -10,6 +10,8 @@ from mlscorr.evaluate.rows import TargetRow
 from mlscorr.report import tables
 from tests.beds.reports import drive, fabricate
 
+ROLES = ("control", "check")
+
 
 def held(report):
     "The same report of a drive that control points hold everywhere"
@@ -51,12 +53,14 @@ def test_the_verdict_gives_centimetres_where_they_tell_enough():
 
 
 @pytest.mark.parametrize(("sigma", "worse"), [(0.030, False), (0.005, True)])
-def test_a_rise_within_the_targets_own_errors_speaks_against_nothing(sigma, worse):
-    "From 8 to 16 mm on each axis: with targets known to 30 mm no verdict, to 5 mm a red one"
-    report = held(fabricate(drive())[2])
-    known = [replace(row, sigma=np.full(3, sigma)) for row in report.targets]
-    report = replace(report, targets=known)
-    for statistics, rmse in ((report.check.before, 0.008), (report.check.after, 0.016)):
+@pytest.mark.parametrize("checks", [True, False], ids=["check", "left out"])
+def test_a_rise_within_its_own_sigma_speaks_against_nothing(sigma, worse, checks):
+    "From 8 to 16 mm on each axis, where it is known to 30 mm: no verdict; to 5 mm: a red one"
+    report = held(fabricate(drive(), checks=checks)[2])
+    known = {role: replace(getattr(report, role), sigma=np.full(3, sigma)) for role in ROLES}
+    report = replace(report, **known)
+    before, after, _ = report.judgement
+    for statistics, rmse in ((before, 0.008), (after, 0.016)):
         statistics.rmse[:] = [rmse] * 3 + [rmse * 2**0.5, rmse * 3**0.5]
     sentences, speaks_against = tables.verdict(report)
     assert speaks_against == worse
