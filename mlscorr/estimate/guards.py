@@ -55,8 +55,8 @@ class Guards:
     Parameters
     ----------
     gap : (float, float)
-        Start and end of the longest stretch without control inside a pass, the ends of passes
-        included. Units: s.
+        Start and end of the longest stretch without control inside a pass that has some, the ends
+        of passes included. Units: s.
     passes_without_control : tuple of (float, float)
         Start and end of each. Units: s.
     variance_ratio : (6,) array
@@ -74,6 +74,11 @@ class Guards:
     def determined(self) -> np.ndarray:
         """Which of the six components this geometry tells, (6,) bool."""
         return self.variance_ratio < SETTINGS.determined_ratio
+
+    @property
+    def longest_gap(self) -> tuple[float, float]:
+        """Start and end of the longest time without control; a pass without any is one. Units: s."""
+        return max([self.gap, *self.passes_without_control], key=np.ptp)
 
 
 def find_guards(
@@ -123,7 +128,7 @@ def _longest_gap(passes, control):
         if len(inside)
         for gap in pairwise([first, *inside.tolist(), last])
     ]
-    return max(gaps, key=lambda gap: gap[1] - gap[0], default=(0.0, 0.0))
+    return max(gaps, key=np.ptp, default=(0.0, 0.0))
 
 
 def _variance_ratio(equations, parameters, corrected):

@@ -40,7 +40,7 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
         "tests": [_test(test) for test in estimate.tests],
         "determined": _by_component(guards.determined),
         "variance_ratio": _by_component(guards.variance_ratio),
-        "longest_gap": list(guards.gap),
+        "longest_gap": list(guards.longest_gap),
         "passes_without_control": [list(span) for span in guards.passes_without_control],
     }
 

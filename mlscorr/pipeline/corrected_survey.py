@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -287,15 +286,13 @@ class CorrectedSurvey(Summary):
         """What figures show of the correction: all but files, counts of points, next control."""
         from mlscorr.report.correction_report import CorrectionReport, Coverage
 
-        epochs = np.unique(self.matched_control.gps_time[self.estimate.used]).tolist()
-        recorded = self.estimate.correction.recorded.recorded_time
-        gaps = (recorded(*ends) for ends in pairwise(epochs or self.estimate.span))
+        start, end = self.estimate.guards.longest_gap
         return CorrectionReport(
             name=self.survey.name, crs=self.survey.crs,
             notes=(*self.survey.notes, *filter(None, [self.estimate.untied])), targets=self.targets,
             control=self._control, check=self._check, accuracy=self.accuracy,
             model=model_section(self.estimate, self.warnings),
-            coverage=Coverage(self.estimate.span, max(gaps, default=0.0)),
+            coverage=Coverage(self.estimate.span, end - start),
             support=self.estimate.support, ties=self.tie_section,
             position_sigma=largest_sigma(self.trajectory, self.survey),
         )  # fmt: skip

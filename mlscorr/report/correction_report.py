@@ -48,7 +48,7 @@ class Coverage:
     control_span : (float, float)
         First and last control epoch. Units: s.
     longest_gap_s : float
-        Longest time without control. Units: s.
+        Longest time without control inside a pass, its ends included. Units: s.
     points_outside_trajectory, points_outside_control : int
         Points that were left as they were, and points before the first or past the last control
         point of the survey.

@@ -90,7 +90,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     values = {
         "Trajectory": span(time[0], time[-1]),
         "Control span (first to last control epoch)": control,
-        "Longest time without control": f"{number(covered.longest_gap_s)} s",
+        "Longest time without control inside a pass": f"{number(covered.longest_gap_s)} s",
         "Points outside the trajectory (left as they were)": points(outside),
         "Points before the first or past the last control point": points(beyond),
         "Points whose correction is extrapolated: no control point holds them": points(unheld),

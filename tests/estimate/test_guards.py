@@ -13,6 +13,7 @@ from mlscorr.estimate.guards import (
     Guards,
     _global_test,
     find_guards,
+    guards_of,
     global_test_warnings,
     guard_warnings,
     sparse_warnings,
@@ -62,6 +63,18 @@ def test_a_pass_without_control_is_named():
     text = f"The pass from {START + 130.1:.1f} to {START + 200:.1f} s has no control point"
     assert any(sentence.startswith(text) for sentence in estimate.warnings)
     assert estimate.guards.passes_without_control == ((START + 130.1, START + 200.0),)
+
+
+def test_a_pass_without_control_is_a_gap_as_a_whole():
+    "70 s of it are longer than 62 s between two points; without any control the longest pass is"
+    passes = START + np.array([[0.0, 70.0], [130.0, 200.0]])
+    without = Guards((0.0, 0.0), (), np.ones(6), None)
+    guards = guards_of(passes, START + np.array([4.0, 66.0]), without)
+    assert guards.gap == (START + 4.0, START + 66.0)
+    assert guards.longest_gap == (START + 130.0, START + 200.0)
+    edge = guards_of(passes[:1], START + np.array([66.0]), without)
+    assert edge.longest_gap == (START, START + 66.0)
+    assert guards_of(passes, np.empty(0), without).longest_gap == (START, START + 70.0)
 
 
 def test_a_long_gap_between_control_points_is_told():

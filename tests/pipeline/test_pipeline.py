@@ -180,12 +180,15 @@ def test_check_points_are_listed_as_not_used(corrected):
 
 
 def test_coverage_is_the_span_of_the_control_points(corrected):
-    "control_span, longest gap and the points beyond it follow from targets and cloud"
+    "control_span, longest gap (ends of the pass too) and the points beyond follow from the files"
     result, _, report = corrected
     times = sorted(t["gps_time"] for t in report["targets"] if t["used"])
     coverage = report["coverage"]
     assert coverage["control_span"] == pytest.approx([times[0], times[-1]])
-    assert coverage["longest_gap_s"] == pytest.approx(np.diff(times).max())
+    (ends,) = result.trajectory.scanned_passes
+    longest = np.diff([ends[0], *times, ends[1]]).max()
+    assert coverage["longest_gap_s"] == pytest.approx(longest)
+    assert np.ptp(report["model"]["longest_gap"]) == pytest.approx(longest)
     points = laspy.read(result.survey.clouds[0].path).gps_time
     outside = (points < times[0]) | (points > times[-1])
     assert coverage["points_outside_control"] == outside.sum()
