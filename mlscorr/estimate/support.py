@@ -118,7 +118,10 @@ def find_support(
     codes = _reasons(equations, solved, parameters, corrected)
     history, starts = equations.stated.history, equations.stated.starts
     ends_by_step = np.isin(history.edges[1:], history.steps.middle)
-    shown = np.isfinite(starts) & (ends_by_step | history.is_stated)
+    drifting = equations.trajectory.gps_time[_is_drifting(equations, parameters)]
+    epochs = [np.searchsorted(drifting, times) for times in (starts, history.edges[1:])]
+    # a start without a fall-back behind it may be set off by the noise of GNSS
+    shown = ends_by_step | (history.is_stated & (epochs[1] > epochs[0]))
     return Support(
         tuple(weak_stretches(codes, corrected)),
         tuple(
@@ -187,7 +190,16 @@ def _is_drift_open(equations, solved, parameters, corrected):
     after = np.einsum("qii->q", covariance[:, :3, :3])
     before = sum((mixing[:, :3] ** 2).sum(axis=(1, 2)) for mixing in mixings)
     is_open &= after > SETTINGS.determined_ratio * before
-    return is_open & (before > (stated.gnss**2).sum(axis=1))
+    return is_open & _is_drifting(equations, parameters)
+
+
+def _is_drifting(equations, parameters):
+    """Where (n,) the drift that may have come since it began is larger than the noise of GNSS."""
+    stated = equations.stated_epochs
+    partials = np.broadcast_to(np.eye(6), (len(stated.gps_time), 6, 6))
+    drift = pose_signals(stated, parameters, partials)[:-ERROR_SIGNALS]
+    size = sum((signal.mixing[:, :3] ** 2).sum(axis=(1, 2)) for signal in drift)
+    return size > (stated.gnss**2).sum(axis=1)
 
 
 def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakStretch]:

@@ -56,6 +56,20 @@ def test_an_outage_without_control_is_extrapolated_until_gnss_returns():
     assert sigma[~weak_times(support)].max() < 0.5 * stretch.sigma
 
 
+@pytest.mark.long
+def test_a_sigma_that_hardly_rises_is_no_outage():
+    "An outage of 60 s that states metres is shown; 3 cm instead of 2 cm in the last 15 s are not"
+    rng = np.random.default_rng(2)
+    trajectory, matched = survey(rng, walk(rng, 80.0, 140.0), EVEN)
+    since = np.where((TIME > 80.0) & (TIME < 140.0), TIME - 80.0, 0.0)
+    size = 0.02 + 5.0 * (since / 60.0) ** 1.5 + 0.01 * (TIME > 225.0)
+    stated = replace(trajectory, position_sigma=np.tile(size[:, None], 3))
+    estimate = estimate_correction(stated, matched)
+    assert np.isfinite(estimate.equations.stated.starts[-1])
+    ((_, end),) = estimate.support.outages
+    assert end - START == pytest.approx(140.0, abs=0.2)
+
+
 def test_the_start_of_a_drive_without_control_is_extrapolated():
     "Control from 150 s on leaves all before it to the trend"
     support, _ = support_of(3, (80.0, 140.0), EVEN[EVEN > 150.0])
