@@ -19,9 +19,9 @@ def write_targets_csv(path: str | Path, targets: Sequence[dict]) -> None:
     targets : sequence of dict
         Misclosures are surveyed - observed. Units: m.
     """
-    vectors = ("surveyed", "observed", "sigma", "before", "after")
+    vectors = ("surveyed", "observed", "sigma", "before", "after", "left_out")
     names = [f"{vector}_{axis}" for vector in vectors for axis in AXES]
-    rows = [("name", "pass", "gps_time", "role", *names, "used", "reason")]
+    rows = [("name", "pass", "gps_time", "role", *names, "used", "reason", "scanned")]
     for target in targets:
         numbers = [
             "" if value is None else f"{value:.4f}"
@@ -30,7 +30,8 @@ def write_targets_csv(path: str | Path, targets: Sequence[dict]) -> None:
         ]
         time = "" if target["gps_time"] is None else f"{target['gps_time']:.6f}"
         first = (target["name"], target["pass"] or "", time, target["role"])
-        rows.append((*first, *numbers, str(target["used"]).lower(), target["reason"] or ""))
+        used, scanned = (str(target[key]).lower() for key in ("used", "scanned"))
+        rows.append((*first, *numbers, used, target["reason"] or "", scanned))
     write_csv(path, rows)
 
 

@@ -136,9 +136,10 @@ def test_a_table_cut_in_its_last_cell_is_told(cut, tmp_path):
 
 def test_no_cell_of_a_result_is_a_formula(tmp_path):
     "A point named as a formula is text in a spreadsheet; negative numbers stay numbers"
-    vectors = ("surveyed", "observed", "sigma", "before", "after")
+    vectors = ("surveyed", "observed", "sigma", "before", "after", "left_out")
     row = {name: [-1.0, 0.0, 1.0] for name in vectors}
     row |= {"pass": 1, "gps_time": -1.5, "role": "control", "used": True, "reason": None}
+    row["scanned"] = True
     names = ["=cmd|' /C calc'!A0", "+1+1", "@SUM(A1)", "-x", "T01"]
     write_targets_csv(tmp_path / "a.csv", [{"name": name} | row for name in names])
     lines = (tmp_path / "a.csv").read_text().splitlines()[1:]
