@@ -77,7 +77,7 @@ class Guards:
 
     @property
     def longest_gap(self) -> tuple[float, float]:
-        """Start and end of the longest time without control; a pass without any is one. Units: s."""
+        """Start and end of the longest time without control, be it a whole pass. Units: s."""
         return max([self.gap, *self.passes_without_control], key=np.ptp)
 
 

@@ -80,7 +80,7 @@ def _statement(accuracy):
     """The accuracy in sentences, what is missing to a test by the standard before the classes."""
     if accuracy["based_on"] is None:
         return [
-            "Not determined: there are no check points, and too few control points to leave one "
+            "Not determined: no check point was scored, and too few control points to leave one "
             "out in turn."
         ]
     return [_test(accuracy), *(_classes(accuracy, axis) for axis in AXES), *_doubts(accuracy)]
@@ -91,7 +91,7 @@ def _test(accuracy):
     plural = "point was" if points == 1 else "points were"
     if accuracy["based_on"] != "check":
         return (
-            f"There are no check points. {points} control {plural} left out in turn and predicted "
+            f"No check point was scored. {points} control {plural} left out in turn and predicted "
             "from the others: an estimate of the accuracy, and not a conformant test, as these "
             "points took part in the correction."
         )

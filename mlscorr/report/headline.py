@@ -74,7 +74,7 @@ def statements(report: CorrectionReport) -> list[Statement]:
         _points_moved(report),
         check_statement(report.points("check")),
         _control(report),
-        _weakest(report),
+        _extrapolated(report),
         *_left_out(report),
         *_sigma(report),
         *warning_statements(report.model.get("warnings") or ()),
@@ -93,7 +93,7 @@ def headline(report: CorrectionReport) -> str:
     check, control = check_statement(report.points("check")).sentence, _control(report).sentence
     if report.points("control").surveyed == 0 and not report.is_held_by_others:
         return f"{control} {check}"
-    return f"{check} Control: {control} {_weakest(report).sentence}"
+    return f"{check} Control: {control} {_extrapolated(report).sentence}"
 
 
 def _result(report):
@@ -200,16 +200,16 @@ def _uncontrolled(report):
     return result
 
 
-def _weakest(report):
+def _extrapolated(report):
     """The parts of the drive that no control point holds: no matter where control holds others,
     and their sigma is below the largest residual that the verdict rests on.
     """
     weak = report.support.weak
     if not weak and report.is_held_by_others:
         sentence = "Control points of other drives hold the whole drive, through ties."
-        return Statement("Weakest", "amber", sentence)
+        return Statement("Extrapolated", "amber", sentence)
     if not weak:
-        return Statement("Weakest", "green", "Control points hold the whole drive.")
+        return Statement("Extrapolated", "green", "Control points hold the whole drive.")
     largest, after = max(stretch.sigma for stretch in weak), report.judgement[1]
     sentence = (
         f"No control holds {report.seconds_extrapolated:.1f} s "
@@ -218,10 +218,16 @@ def _weakest(report):
         "the correction is extrapolated there, and an error of up to "
         f"{length_in_words(largest)} is to be expected (one sigma)."
     )
+    sigma = report.position_sigma
+    if sigma is not None and not report.support.contains(np.array(sigma["time"])):
+        sentence += (
+            f" Between control points it is up to {length_in_words(sigma['largest'])}, at "
+            f"{sigma['time']:.1f} s."
+        )
     is_partly_held = report.coverage.share_extrapolated < 1
     is_small = is_partly_held and after is not None and largest <= after.maximum[4]
     rating = "green" if is_small else "amber"
-    return Statement("Weakest", rating, sentence, capped(_stretches(weak)))
+    return Statement("Extrapolated", rating, sentence, capped(_stretches(weak)))
 
 
 def _stretches(weak):

@@ -179,7 +179,8 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
     """
     before, after, kind = report.judgement
     if before is None or after is None:
-        return ["No target was found that could tell how good the correction is."], True
+        none = "No target was found" if report.targets else "There is no surveyed point"
+        return [f"{none} that could tell how good the correction is."], True
     sigma = (report.check if kind == "check" else report.control).sigma
     # as large as this it is by chance, as it is known no better there than by its own sigma
     limit = np.inf if sigma is None else sigma * _largest_ratio(after.n)
@@ -254,8 +255,10 @@ def _result(report, before, after, kind):
         return f"Check points: {figures}, {points} that took no part in the estimate."
     points = count(report, "control")
     if kind == "leave-one-out":
+        is_surveyed = report.points("check").surveyed > 0
+        none = "No check point was seen." if is_surveyed else "There are no check points."
         return (
-            "There are no check points. Control points, each left out in turn and predicted from "
+            f"{none} Control points, each left out in turn and predicted from "
             f"the others: {figures}, {points}."
         )
     return (

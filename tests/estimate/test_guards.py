@@ -13,9 +13,9 @@ from mlscorr.estimate.guards import (
     Guards,
     _global_test,
     find_guards,
-    guards_of,
     global_test_warnings,
     guard_warnings,
+    guards_of,
     sparse_warnings,
 )
 from mlscorr.estimate.posterior import Objective, choose_parameters

@@ -40,7 +40,7 @@ def test_points_left_out_in_turn_are_an_estimate_and_no_test():
     "However many: they took part in the correction"
     found = positional_accuracy(np.full((50, 3), 0.01), np.zeros((50, 3)), 50, "leave_one_out")
     assert not found["conformant"]
-    assert "There are no check points" in found["statement"][0]
+    assert "No check point was scored." in found["statement"][0]
 
 
 def test_without_any_point_the_accuracy_is_not_determined():

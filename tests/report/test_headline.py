@@ -10,7 +10,7 @@ from mlscorr.estimate import Support, WeakStretch
 from mlscorr.estimate.support import DRIFT, NO_CONTROL, REASONS
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.report.headline import first_screen, headline, statements
-from tests.beds.reports import drive, fabricate, page, report_of, words
+from tests.beds.reports import START, drive, fabricate, page, report_of, words
 
 
 def lost(name, role="check", scanned=True, number=None):
@@ -148,7 +148,7 @@ def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_w
         )
         row = next(
             row for row in statements(replace(report, support=Support(weak)))
-            if row.what == "Weakest"
+            if row.what == "Extrapolated"
         )  # fmt: skip
         assert row.rating == rating
         assert row.items[0][0] == "50.0 to 61.5 s, 300 to 360 m of the way"
@@ -160,7 +160,7 @@ def test_a_correction_that_is_extrapolated_everywhere_is_never_green():
     everywhere = replace(report.coverage, points_extrapolated=report.coverage.points_corrected)
     weak = Support((WeakStretch(0.0, 60.0, 300.0, 0.0001, "a"),))
     rows = statements(replace(report, coverage=everywhere, support=weak))
-    (row,) = (row for row in rows if row.what == "Weakest")
+    (row,) = (row for row in rows if row.what == "Extrapolated")
     assert row.rating == "amber" and "100 % of the points" in row.sentence
 
 
@@ -180,7 +180,7 @@ def test_a_drive_without_control_of_its_own_is_not_held_by_it():
     report = fabricate(drive())[2]
     rows = [row for row in report.targets if row.role == "check"]
     report = replace(report, targets=rows, support=Support())
-    (row,) = (row for row in statements(report) if row.what == "Weakest")
+    (row,) = (row for row in statements(report) if row.what == "Extrapolated")
     assert row.rating == "amber" and "of other drives" in row.sentence
 
 
@@ -206,3 +206,18 @@ def test_what_became_no_better_is_not_green():
         report.check.before.rmse[:], report.check.after.rmse[:] = before, 0.013
         ratings.append(statements(report)[0].rating)
     assert ratings == ["green", "amber"]
+
+
+def test_a_sigma_between_control_points_that_is_larger_than_any_extrapolated_is_named():
+    "9.5 cm in the middle of a drive that control holds, 9 cm at its ends; 9 cm there alone is not"
+    report = fabricate(drive())[2]
+    middle = {"median": 0.02, "largest": 0.095, "time": START + 30.0}
+    sentences = [
+        next(row.sentence for row in statements(other) if row.what == "Extrapolated")
+        for other in (report, replace(report, position_sigma=middle))
+    ]
+    assert (
+        sentences[1] == f"{sentences[0]} Between control points it is up to 9.5 cm, at 357911.0 s."
+    )
+    edge = replace(report, position_sigma=middle | {"time": START, "largest": 0.09})
+    assert sentences[0] in [row.sentence for row in statements(edge)]

@@ -100,3 +100,15 @@ def test_statistics_stand_in_the_order_of_their_heads():
     expected = [height.mean(), height.std(ddof=1), np.sqrt(np.mean(height**2))]
     np.testing.assert_allclose(rows[2][2][:3], expected, atol=1e-12)
     np.testing.assert_allclose(rows[2][2][3:], [height.min(), height.max()], atol=1e-12)
+
+
+def test_check_points_that_were_not_seen_are_not_said_to_be_none():
+    "A surveyed one without an observation, none that was surveyed, and no surveyed point at all"
+    report = fabricate(drive(), checks=False)[2]
+    lost = TargetRow.unobserved("C9", None, "check", np.zeros(3), "No target is left for it.")
+    seen = tables.verdict(replace(report, targets=[*report.targets, lost]))[0][1]
+    assert seen.startswith("No check point was seen. Control points, each left out in turn")
+    assert tables.verdict(report)[0][1].startswith("There are no check points. Control points,")
+    nothing = fabricate(drive(), count=0)[2]
+    assert tables.verdict(nothing)[0][0].startswith("There is no surveyed point that could tell")
+    assert tables.verdict(replace(nothing, targets=[lost]))[0][0].startswith("No target was found")
