@@ -111,20 +111,26 @@ def read_numbers(
     read: Any = dict(converters or {})
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*input contained no data")
-        try:
-            table = np.loadtxt(
-                (open_file(path, ENCODING) if is_remote(path) else path)
-                if layout.is_own
-                else _plain_lines(layout),
-                delimiter="," if layout.is_own else "\t",
-                skiprows=layout.lines if layout.is_own else 0,
-                usecols=columns,
-                encoding=ENCODING,
-                ndmin=2,
-                converters=read,
-            )
-        except ValueError:
-            raise ValueError(_first_bad(layout, converters or {})) from None
+        # our own are read as they are, which is faster, unless there are rows of empty cells
+        for is_plain in range(not layout.is_own, 2):
+            try:
+                table = np.loadtxt(
+                    _plain_lines(layout)
+                    if is_plain
+                    else (open_file(path, ENCODING) if is_remote(path) else path),
+                    delimiter="\t" if is_plain else ",",
+                    skiprows=0 if is_plain else layout.lines,
+                    usecols=columns,
+                    encoding=ENCODING,
+                    ndmin=2,
+                    converters=read,
+                )
+                break
+            except ValueError:
+                if bad := _first_bad(layout, converters or {}):
+                    raise ValueError(bad) from None
+        else:
+            raise ValueError(f"{path} is not a table of numbers.")
     if not len(table):
         raise ValueError(f"{path} has a header but no epochs.")
     return table * [layout.factors.get(name, 1.0) for name in layout.columns]
@@ -153,7 +159,7 @@ def _too_wide(line, cells, width):
 
 
 def _first_bad(layout, converters):
-    """A sentence on the first row that is none of numbers."""
+    """A sentence on the first row that is none of numbers; empty where there is no such row."""
     for line, cells in read_rows(layout):
         if cells[0].startswith("#"):
             continue
@@ -165,4 +171,4 @@ def _first_bad(layout, converters):
                 place = f"where a number belongs (column {column + 1})."
                 way_out = " It seems to be a date or a time of day: give seconds."
                 return f"{line} has '{shown(cell)}' {place}{way_out * bool(DATE.match(cell))}"
-    return f"{layout.path} is not a table of numbers."
+    return ""

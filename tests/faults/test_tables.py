@@ -134,6 +134,16 @@ def test_a_table_cut_in_its_last_cell_is_told(cut, tmp_path):
         read_toml(tmp_path / "a.toml", Section, "it")
 
 
+def test_rows_of_empty_cells_are_left_out(tmp_path):
+    "A spreadsheet leaves rows of commas alone at the end of a table; its epochs are read"
+    path = tmp_path / "trajectory.csv"
+    path.write_text(HEADER + "".join(epochs()) + 2 * ",,,,,,\n")
+    assert len(read_trajectory(path)) == 400
+    path.write_text(HEADER + "".join(epochs()) + "357704.5,,,,,,\n")
+    with pytest.raises(ValueError, match=r"Line 402 of .*trajectory\.csv has '' where a number"):
+        read_trajectory(path)
+
+
 def test_no_cell_of_a_result_is_a_formula(tmp_path):
     "A point named as a formula is text in a spreadsheet; negative numbers stay numbers"
     vectors = ("surveyed", "observed", "sigma", "before", "after", "left_out")
