@@ -12,6 +12,7 @@ from mlscorr.report.render.section import find_place
 from mlscorr.report.render.view import Mark, PictureOptions, View
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import nice
+from mlscorr.survey.summary import counted
 
 VIEWS = ("overview", "targets", "section")
 
@@ -61,19 +62,24 @@ def _along(plan):
 
 
 def _overview_title(rows):
-    """How far off the independent targets were and are."""
+    """How far off the independent targets were and are; of a fit there is nothing to boast."""
     role = "check" if any(row.role == "check" for row in rows) else "control"
     rows = [row for row in rows if row.role == role]
     if not rows:
         return "The whole survey; no target was seen"
-    before, after = (
-        np.sqrt(np.mean([np.sum(np.square(getattr(row, state))) for row in rows]))
-        for state in ("before", "after")
+    left_out = [row for row in rows if np.isfinite(row.left_out).all()]
+    state, words = ("after", "after") if role == "check" else ("left_out", "when left out in turn")
+    rows = left_out if role == "control" and left_out else rows
+    were, are = (
+        tables.length_in_words(np.sqrt(np.mean([np.sum(getattr(row, name) ** 2) for row in rows])))
+        for name in ("before", state)
     )
     points = len({row.name for row in rows})
     often = "" if points == len(rows) else f", seen {len(rows)} times"
-    were, are = tables.length_in_words(before), tables.length_in_words(after)
-    return f"{points} {role} points{often}: {were} off before, {are} after (3D RMSE)"
+    start = f"{counted(points, f'{role} point')}{often}: {were} off before"
+    if role == "control" and not left_out:
+        return f"{start} (3D RMSE); the correction was made with {'it' if points == 1 else 'them'}"
+    return f"{start}, {are} {words} (3D RMSE)"
 
 
 def _symbols(rows, state, times) -> Iterator[Mark]:

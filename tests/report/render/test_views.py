@@ -53,4 +53,18 @@ def test_the_title_counts_check_points_alone_where_there_are_some():
     check = replace(target("T2", (0, 0, 0)), role="check", after=np.array([0.1, 0.0, 0.0]))
     rows = [target("T1", (0, 0, 0), (5.0, 0.0, 0.0)), check, replace(check, gps_time=START)]
     title = overview(scouted([1, 1, 1]), rows, PictureOptions(SIZE)).title
-    assert title.startswith("1 check points, seen 2 times: 30.0 cm off before, 10.0 cm after")
+    assert title.startswith("1 check point, seen 2 times: 30.0 cm off before, 10.0 cm after")
+
+
+def test_the_title_does_not_boast_of_the_fit_of_control_points():
+    "What is left of those left out in turn, 0.05 m; of a single one only how far it was off"
+    rows = [replace(target(name, (0, 0, 0)), after=np.full(3, 1e-4)) for name in ("T1", "T2")]
+    left_out = [replace(row, left_out=np.array([0.0, 0.03, 0.04])) for row in rows]
+    titles = [
+        overview(scouted([1, 1, 1]), some, PictureOptions(SIZE)).title
+        for some in (left_out, rows[:1])
+    ]
+    assert titles == [
+        "2 control points: 30.0 cm off before, 5.0 cm when left out in turn (3D RMSE)",
+        "1 control point: 30.0 cm off before (3D RMSE); the correction was made with it",
+    ]
