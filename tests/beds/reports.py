@@ -104,7 +104,7 @@ def survey_of(trajectory):
 def score_of(rows, left_out=None):
     "Score of rows of one group"
     before, after = (Statistics.of(array(rows, name)) for name in ("before", "after"))
-    return Score(before, after, left_out)
+    return Score(before, after, left_out, np.full(3, 0.004))
 
 
 def report_of(trajectory, rows):

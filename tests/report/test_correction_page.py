@@ -84,7 +84,7 @@ def test_names_that_hold_html_are_shown_and_not_run(tmp_path):
         ({"checks": False}, r"no check points\. Control points, each left out in turn .* 8 points"),
         ({"sigma": False}, "Check points: RMSE"),
         ({"count": 1}, r"no independent check: every target used \(1 point\) made the correction"),
-        ({"count": 0}, "No target was found"),
+        ({"count": 0}, "There is no surveyed point that could tell"),
     ],
 )
 def test_says_plainly_what_the_verdict_rests_on(changes, expected, tmp_path):
