@@ -72,7 +72,7 @@ def write_report(
     """
     figures = target_drawings(report.targets, fitted or {})
     there = {"pictures": views is not None, "turn": views is not None, "targets": bool(figures)}
-    there["ties"] = ties is not None
+    there |= {"ties": ties is not None, "residuals": bool(report.targets)}
     content = _content(survey, correction, report, ties) | _model(report.model)
     content["target_figures"] = [(title, data_uri(picture, "png")) for title, picture in figures]
     if views is not None:

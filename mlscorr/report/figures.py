@@ -23,7 +23,7 @@ def draw_figure(
     Parameters
     ----------
     name : str
-        ``correction``, ``attitude``, ``map``, ``residuals``, and ``ties`` where there are some.
+        ``correction``, ``attitude``, ``map``, and ``residuals`` and ``ties`` where there are some.
     correction : Correction
         Its corrected trajectory may hold the sigmas after the estimate.
     report : CorrectionReport
@@ -60,11 +60,12 @@ def write_pictures(
     report: CorrectionReport,
     ties: TieResiduals | None = None,
 ) -> list[Path]:
-    """Write correction.png, map.png, residuals.png, and ties.png, into a folder that exists.
+    """Write correction.png, map.png and, where there are some, residuals.png and ties.png.
 
     Parameters
     ----------
     folder : path
+        Which exists.
     correction : Correction
         Its corrected trajectory may hold the sigmas after the estimate.
     report : CorrectionReport
@@ -88,6 +89,7 @@ def _figures(correction, report, ties):
         "correction": partial(correction_figure, correction, report),
         "attitude": partial(attitude_figure, correction, report),
         "map": partial(map_figure, correction, report),
-        "residuals": partial(residual_figure, report),
     }
+    if report.control.n or report.check.n:
+        figures["residuals"] = partial(residual_figure, report)
     return figures if ties is None else figures | {"ties": partial(tie_figure, correction, ties)}

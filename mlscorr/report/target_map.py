@@ -58,11 +58,12 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     write_names(axes, names, width)
     frame(axes, low, high)
     far = f" (far outside: {outside})" if outside else ""
-    axes.set_title(f"Where the targets lie, and their horizontal residuals{far}")
+    title = "Where the targets lie" if report.targets else "The trajectory"
+    axes.set_title(f"{title}{', and their horizontal residuals' * bool(times)}{far}")
     _key(axes, low, high, strip, times)
     handles = _legend(rows, len(arrows), times, short)
     handles += [Line2D([], [], label=NEXT_WORDS, **NEXT)] * bool(report.next_control)
-    style.legend_above(figure, handles)
+    style.legend_above(figure, handles, columns=2)
     return figure
 
 

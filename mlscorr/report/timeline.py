@@ -74,7 +74,7 @@ def _figure(height, correction, report, change, sigma, rows, words):
         _set_range(panel, values, change[:, axis])
         _unused(panel, new, [row for row in rows if row.group == "unused"], axis)
     panels[0].set_title(f"Correction of {words[0]}: corrected − recorded")
-    _shade(panels, new, span, report.support)
+    _shade(panels, new, span if report.control.n else (), report.support)
     handles = _legend(new, {row.group for row in rows}, report.support, sigma is not None)
     style.legend_above(figure, handles, columns=2)
     return figure

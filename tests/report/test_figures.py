@@ -3,7 +3,7 @@
 import pytest
 
 from mlscorr.report.figures import draw_figure, drawings, write_pictures
-from tests.beds.reports import drive, fabricate
+from tests.beds.reports import drive, fabricate, page, words
 from tests.beds.tied_reports import tied_report
 
 
@@ -36,3 +36,22 @@ def test_a_figure_by_name_shows_itself_in_a_notebook():
     assert draw_figure("map", correction, report)._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(ValueError, match="no figure 'ties' of this correction: correction, att"):
         draw_figure("ties", correction, report)
+
+
+def test_without_targets_no_figure_of_them_is_drawn():
+    "No residuals and no span of control where there is none; the rest is there"
+    correction, report = fabricate(drive(), count=0)[1:]
+    assert list(drawings(correction, report)) == ["correction", "attitude", "map"]
+    assert draw_figure("map", correction, report).axes[0].get_title(loc="left") == "The trajectory"
+    spans = [
+        sum(line.get_color() == "#8a6d00" for line in draw_figure("attitude", *case).axes[0].lines)
+        for case in ((correction, report), fabricate(drive())[1:])
+    ]
+    assert spans == [0, 2]
+
+
+@pytest.mark.long
+def test_without_targets_no_section_of_them_is_empty(tmp_path):
+    "No residuals and no statistics on the page where no target was seen; the rest is there"
+    text = words(page(tmp_path, *fabricate(drive(), count=0)))
+    assert "Over time" in text and "All statistics" not in text and "Every target" not in text

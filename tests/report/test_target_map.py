@@ -58,3 +58,16 @@ def test_a_point_far_away_does_not_shrink_the_drive():
     (axes,) = figure.axes
     assert "(far outside: 1)" in axes.get_title(loc="left")
     assert np.ptp(axes.get_xlim()) < 1e4  # m
+
+
+def test_the_legend_of_the_map_is_within_its_picture():
+    "With a place for the next control point, with check points and without"
+    for checks in (True, False):
+        _, correction, report = fabricate(drive(), checks=checks)
+        row = report.targets[0]
+        place = NextControl(row.gps_time, *row.surveyed[:2], *[0.1] * 6, 0.2, 1, "far off")
+        close = [replace(row, after=row.after * 1e-6) for row in report.targets]
+        figure = map_figure(correction, replace(report, targets=close, next_control=(place,)))
+        figure.draw_without_rendering()
+        box = figure.legends[0].get_window_extent()
+        assert box.x0 >= 0 and box.x1 <= figure.bbox.x1

@@ -8,6 +8,6 @@ for (const handle of handles) {
   handle.addEventListener("input", () => slide(handle, handle.value));
   slide(handle, handle.value);
 }
-document.getElementById("all").addEventListener("input", event => {
+document.getElementById("all")?.addEventListener("input", event => {
   for (const handle of handles) if (handle.closest(".close-ups")) slide(handle, 100 - event.target.value);
 });
