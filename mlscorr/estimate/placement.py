@@ -183,10 +183,11 @@ def _reason(observed, names, time, drive, share, limit, passes):
         side, near = ("Before the first", 0) if after == 0 else ("After the last", -1)
         where = f"{side} control point, {names[near]}, by {abs(time - times[near]):.0f} s"
     often = f", seen by {passes} passes" if passes > 1 else ""
+    before = "as before" if share[0] == share[1] else f"instead of {100 * share[0]:.1f} %"
     return (
         f"{where}{often}: along the drive the 3D sigma falls from {1e3 * drive[0]:.1f} to "
-        f"{1e3 * drive[1]:.1f} mm (RMS), and {100 * share[1]:.0f} % of it instead of "
-        f"{100 * share[0]:.0f} % are below {1e3 * limit:.1f} mm."
+        f"{1e3 * drive[1]:.1f} mm (RMS), and {100 * share[1]:.1f} % of it, {before}, are "
+        f"below {1e3 * limit:.1f} mm."
     )
 
 

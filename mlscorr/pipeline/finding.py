@@ -101,10 +101,14 @@ def _checked(survey, targets, candidates, near):
     finding = match_targets(targets, candidates, survey)
     if len(finding.matches.matched) == 0:
         reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
+        places = len(np.unique(survey.surveyed.position, axis=0))
+        is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS isn't what is wrong
+        question = "Is each point named twice?"
+        if not is_twice:
+            question = "Are control and cloud in the same CRS?"
         raise ValueError(
             f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
-            f"were found ({near.intensity_range} there). {reasons} Are control and cloud in the "
-            "same CRS?"
+            f"were found ({near.intensity_range} there). {reasons} {question}"
         )
     names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
     return replace(finding, scanned=names, warnings=sentences, uncovered=uncovered)

@@ -92,6 +92,8 @@ def init(
     ValueError
         Where survey.toml is there, where files are missing, ambiguous or do not fit, with what is
         to be added.
+    OSError
+        Where the folder of out is not there.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -106,6 +108,8 @@ def init(
         raise ValueError(f"{folder} is no folder; give the one that holds the clouds.")
     path = folder / FILE_NAME if out is None else Path(out)
     _check_free(path)
+    if not path.parent.is_dir():
+        raise OSError(f"{path.parent} is no folder, so {path.name} can't be written there.")
     try:
         with glance():
             text, roles = _text(folder, path, given, sort_files(folder))

@@ -7,6 +7,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from mlscorr.estimate import estimate_correction, place_control, predict_accuracy
+from mlscorr.estimate.placement import _reason
 from tests.estimate.test_outages import BELIEVED, START, TIME, survey
 
 GAPPED = np.concatenate([np.linspace(4.0, 76.0, 10), np.linspace(164.0, 236.0, 10)])  # s
@@ -16,6 +17,16 @@ def slow_error(seed):
     "An error of decimetres that changes over half a minute"
     wave = np.random.default_rng(seed).uniform(0, 6, 3)
     return 0.3 * np.sin(TIME[:, None] / [23.0, 29.0, 31.0] + wave)
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [((0.035, 0.04), "4.0 % of it, instead of 3.5 %,"), ((0.01, 0.01), "as bef")],
+)
+def test_a_gain_of_half_a_percent_is_told(share, words):
+    "From 3.5 to 4.0 % is no 4 % instead of 4 %, and what stays is said to"
+    why = _reason(np.array([10.0]), np.array(["T07"]), 35.0, (0.05, 0.04), share, 0.013, 1)
+    assert words in why and why.startswith("After the last control point, T07, by 25 s")
 
 
 @pytest.fixture(scope="module")

@@ -116,6 +116,20 @@ def test_a_verdict_knows_the_sigma_of_what_it_rests_on(corrected):
     np.testing.assert_allclose(result._control.sigma, np.sqrt((sigma**2).mean(axis=0)))
 
 
+@pytest.mark.long
+def test_points_that_are_control_and_check_at_once_are_no_matter_of_the_crs(copy):
+    "Each place has two names, so neither is believed: the way out is to leave one of them out"
+    header, *lines = (copy / "control.csv").read_text(encoding="utf-8").splitlines()
+    others = {"control": "check", "check": "control"}
+    twice = [line.rsplit(",", 1) for line in lines]
+    lines += [f"K{start},{others[role]}" for start, role in twice]
+    (copy / "control.csv").write_text("\n".join([header, *lines, ""]), encoding="utf-8")
+    with warnings.catch_warnings(action="ignore"), pytest.raises(ValueError) as caught:
+        mlscorr.correct(mlscorr.read_survey(copy))
+    assert str(caught.value).endswith("Is each point named twice?")
+    assert "CRS" not in str(caught.value)
+
+
 # ---- what is written
 
 

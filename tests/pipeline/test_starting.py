@@ -555,3 +555,13 @@ def test_the_rate_of_lines_is_seen_in_directions_over_time(folder):
     swinging = cloud(-np.pi / 2 + 0.5 * np.sin(turning))
     assert line_rate(swinging, survey.trajectory) is None
     assert line_rate(low[:50], survey.trajectory) is None
+
+
+def test_a_folder_that_is_not_there_is_a_failure_to_write(folder):
+    "Exit code 5 and a sentence that names it"
+    out = folder / "no" / "such" / "survey.toml"
+    result = CliRunner().invoke(app, ["init", str(folder), "-o", str(out)])
+    assert result.exit_code == 5 and not out.parent.exists()
+    assert f"{out.parent} is no folder, so survey.toml can't be written there." in " ".join(
+        result.output.split()
+    ).replace("- ", "-")

@@ -45,6 +45,11 @@ def planned_rows(survey: Survey) -> Rows:
     if survey.reference is not None:
         parts.append(_facets(survey, np.random.default_rng(0)))
     parts = [part for part in parts if len(part)]
+    if not parts and not len(targets) and survey.reference is None:
+        raise ValueError(
+            f"{survey.path} names no target and no [scene] reference, so there is nothing to plan "
+            "with. Give [control] with the points as they are planned."
+        )
     if not parts:
         raise ValueError(
             f"None of {len(targets)} targets will come within {SETTINGS.farthest:.0f} m before the "

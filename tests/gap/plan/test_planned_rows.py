@@ -45,3 +45,10 @@ def test_targets_out_of_sight_are_refused(survey):
     far = replace(survey.control, position=survey.control.position + 1000.0)
     with pytest.raises(ValueError, match="same CRS"):
         planned_rows(replace(survey, control=far, check=far[[]]))
+
+
+def test_without_a_target_none_is_said_to_be_out_of_sight(survey):
+    "Neither control nor a reference surface is named: the sentence asks for them, not for a CRS"
+    none = survey.control[[]]
+    with pytest.raises(ValueError, match=r"names no target and .* Give \[control\]"):
+        planned_rows(replace(survey, control=none, check=none))
