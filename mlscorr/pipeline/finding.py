@@ -103,12 +103,10 @@ def _checked(survey, targets, candidates, near):
         reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
         places = len(np.unique(survey.surveyed.position, axis=0))
         is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS isn't what is wrong
-        question = "Is each point named twice?"
-        if not is_twice:
-            question = "Are control and cloud in the same CRS?"
+        questions = "Are control and cloud in the same CRS?", "Is each point named twice?"
         raise ValueError(
             f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
-            f"were found ({near.intensity_range} there). {reasons} {question}"
+            f"were found ({near.intensity_range} there). {reasons} {questions[is_twice]}"
         )
     names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
     return replace(finding, scanned=names, warnings=sentences, uncovered=uncovered)

@@ -117,10 +117,7 @@ def _points_moved(report):
         f"{percent(left / total)} left as they were."
     )
     if left:
-        sentence += (
-            f" {left} of {total} points lie outside the trajectory or in its gaps and were left "
-            "as they were."
-        )
+        sentence += f" {left} of {total} points lie outside the trajectory or in its gaps."
     return Statement("Points", "red" if left or not held else "green", sentence)
 
 
@@ -201,9 +198,7 @@ def _uncontrolled(report):
 
 
 def _extrapolated(report):
-    """The parts of the drive that no control point holds: no matter where control holds others,
-    and their sigma is below the largest residual that the verdict rests on.
-    """
+    """The parts that no control point holds: green where they are as good as what is judged."""
     weak = report.support.weak
     if not weak and report.is_held_by_others:
         sentence = "Control points of other drives hold the whole drive, through ties."
@@ -220,13 +215,9 @@ def _extrapolated(report):
     )
     sigma = report.position_sigma
     if sigma is not None and not report.support.contains(np.array(sigma["time"])):
-        sentence += (
-            f" Between control points it is up to {length_in_words(sigma['largest'])}, at "
-            f"{sigma['time']:.1f} s."
-        )
-    is_partly_held = report.coverage.share_extrapolated < 1
-    is_small = is_partly_held and after is not None and largest <= after.maximum[4]
-    rating = "green" if is_small else "amber"
+        sentence += f" Between control points it is up to {length_in_words(sigma['largest'])}."
+    is_small = after is not None and largest <= after.maximum[4]
+    rating = "green" if is_small and report.coverage.share_extrapolated < 1 else "amber"
     return Statement("Extrapolated", rating, sentence, capped(_stretches(weak)))
 
 
