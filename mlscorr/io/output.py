@@ -25,7 +25,12 @@ except ImportError:  # Windows: no folder or run has a lock, and what killed run
 PART = ".part"  # ends the name of what isn't whole yet
 
 
-def check_output(out: str | Path, inputs: Iterable[str | Path], overwrite: bool = False) -> None:
+def check_output(
+    out: str | Path,
+    inputs: Iterable[str | Path],
+    overwrite: bool = False,
+    folders: Iterable[str] = (),
+) -> None:
     """Refuse an output folder that holds an input, or anything that may not be replaced.
 
     Parameters
@@ -35,6 +40,8 @@ def check_output(out: str | Path, inputs: Iterable[str | Path], overwrite: bool 
         Files that must stay as they are.
     overwrite : bool
         Whether files of the same name may be replaced.
+    folders : iterable of str
+        Names of folders in it that get results, too.
 
     Raises
     ------
@@ -60,7 +67,9 @@ def check_output(out: str | Path, inputs: Iterable[str | Path], overwrite: bool 
     files = [Path(path) for path in inputs if not is_remote(path)]
     # a link to an input counts where it stands and where it leads
     places = [(path.resolve().parent, path.parent.resolve()) for path in files]
-    held = [path.name for path, two in zip(files, places, strict=True) if out.resolve() in two]
+    own = {(out / name).resolve(): Path(name) for name in (*folders, "")}
+    pairs = zip(files, places, strict=True)
+    held = [str(own[where] / path.name) for path, two in pairs for where in two if where in own]
     check_contents(out, held, [] if overwrite else _entries(out))
     _place(out)
 
@@ -140,7 +149,10 @@ def output_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def output_folder(
-    out: str | Path, inputs: Sequence[InputFile] = (), overwrite: bool = False
+    out: str | Path,
+    inputs: Sequence[InputFile] = (),
+    overwrite: bool = False,
+    folders: Iterable[str] = (),
 ) -> Iterator[Path]:
     """A folder to write into, which takes its name only when all went well.
 
@@ -154,6 +166,8 @@ def output_folder(
         Files that must stay as they are, and be what they were when they were read.
     overwrite : bool
         Whether files of the same name are replaced; others stay.
+    folders : iterable of str
+        As of check_output.
 
     Yields
     ------
@@ -167,7 +181,7 @@ def output_folder(
     OSError
         When an input has changed, another run has written into the folder, or the disk refuses.
     """
-    check_output(out, [file.path for file in inputs], overwrite)
+    check_output(out, [file.path for file in inputs], overwrite, folders)
     check_unchanged(inputs)
     out = Path(out).resolve()
     out.parent.mkdir(parents=True, exist_ok=True)

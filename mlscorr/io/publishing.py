@@ -111,12 +111,14 @@ def write_text(path: Any, text: str) -> None:
         path.fs.pipe_file(path.path, text.encode())
 
 
-def check_store_output(out: Path, inputs: Iterable[Path], overwrite: bool) -> None:
+def check_store_output(
+    out: Path, inputs: Iterable[Path], overwrite: bool, folders: Iterable[str] = ()
+) -> None:
     """Refuse an output folder in a store that holds an input, or anything that may not be replaced.
 
     Parameters
     ----------
-    out, inputs, overwrite
+    out, inputs, overwrite, folders
         As of check_output.
 
     Raises
@@ -131,7 +133,8 @@ def check_store_output(out: Path, inputs: Iterable[Path], overwrite: bool) -> No
             f"{out} is of a web server, which takes no results: name a store or a disk."
         )
     present = names_in(out)
-    held = [path.name for path in inputs if is_remote(path) and path.parent == out]
+    own = {out: Path(), **{out / name: Path(name) for name in folders}}
+    held = [str(own[p.parent] / p.name) for p in inputs if is_remote(p) and p.parent in own]
     check_contents(out, held, [] if overwrite else present)
 
 
@@ -142,7 +145,7 @@ def check_contents(out: Path, held: Sequence[str], present: Sequence[str]) -> No
     ----------
     out : Path
     held : sequence of str
-        Names of the inputs in it.
+        Names of the inputs in it, or in folders of it.
     present : sequence of str
         Names that may not be replaced.
 

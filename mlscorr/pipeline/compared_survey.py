@@ -140,7 +140,7 @@ class ComparedSurvey(Summary):
             if why is not None:
                 raise ValueError(f"The method {name} has no cloud to write: {why}")
         content = self.document
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
+        with output_folder(out, self.survey.inputs, overwrite, clouds) as folder:
             content["files"] = self._write_clouds(folder, clouds, progress or silent)
             write_json(folder / "compare.json", content)
             write_comparison(folder / "compare.html", content)

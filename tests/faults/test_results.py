@@ -156,6 +156,16 @@ def test_an_input_that_changes_while_it_is_read_stops_the_run(change, tmp_path):
     assert not list(tmp_path.glob(".out*"))
 
 
+def test_an_input_in_a_folder_that_gets_results_is_refused(tmp_path):
+    "Below the output folder, too, where results go there: by overwriting as well"
+    path = tmp_path / "shift" / "pass-1.laz"
+    path.parent.mkdir()
+    path.write_text("old text")
+    check_output(tmp_path, [path], overwrite=True)
+    with pytest.raises(ValueError, match=r"holds the input shift/pass-1\.laz, which must stay"):
+        check_output(tmp_path, [path], True, ["shift"])
+
+
 def test_a_survey_knows_the_files_that_it_was_read_from(street, tmp_path):
     "survey.toml and all that it names are watched from before their first byte is read"
     folder = shutil.copytree(street, tmp_path / "survey")

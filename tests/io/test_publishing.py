@@ -152,6 +152,8 @@ def test_a_folder_with_other_things_is_refused(store):
         check_store_output(out, [], overwrite=False)
     with pytest.raises(ValueError, match=r"holds the input a\.laz, which must stay"):
         check_store_output(out, [out / "a.laz"], overwrite=True)
+    with pytest.raises(ValueError, match=r"holds the input first/a\.laz, which must stay"):
+        check_store_output(out, [out / "first" / "a.laz"], True, ["first"])
     with pytest.raises(ValueError, match="of a web server, which takes no results"):
         check_store_output(as_path("https://example.org/out"), [], overwrite=True)
     with pytest.raises(FileNotFoundError, match="there is no bucket nowhere"):

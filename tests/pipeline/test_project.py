@@ -241,6 +241,29 @@ def test_a_folder_of_others_is_wrong_use_as_of_a_survey(project, tmp_path):
             assert f"The output folder {out} holds" in ended.stderr and words in ended.stderr
 
 
+def test_an_input_in_a_folder_of_the_results_is_refused(project, tmp_path):
+    "A trajectory with the place and name of the corrected one stays as it is, by a link as well"
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    (tmp_path / "project").mkdir()
+    for name in ("project.toml", "control.csv"):
+        (folder / name).rename(tmp_path / "project" / name)
+    (folder / "second" / "tiles").mkdir()
+    for path in (folder / "second").glob("*.laz"):
+        path.rename(path.parent / "tiles" / path.name)
+    text = bed.PROJECT.replace('survey = "first"', 'name = "elsewhere"\nsurvey = "../city/first"')
+    text = text.replace('"second/*', '"../city/second/tiles/*').replace(
+        '"second/t', '"../city/second/t'
+    )
+    (tmp_path / "project" / "project.toml").write_text(text)
+    trajectory = folder / "second" / "trajectory.csv"
+    before = trajectory.read_bytes()
+    (tmp_path / "link").symlink_to(folder)
+    for out in ("city", "link"):
+        with pytest.raises(ValueError, match=r"holds the input second/trajectory\.csv, which must"):
+            correct_project(tmp_path / "project", tmp_path / out, Options(overwrite=True))
+    assert trajectory.read_bytes() == before
+
+
 @pytest.mark.parametrize("options", [Options(overwrite=True), Options(resume=True)])
 def test_a_folder_of_tasks_that_no_run_made_is_refused(project, tmp_path, options):
     "Neither --overwrite nor --resume touches anything beside a folder `tasks` without a plan"

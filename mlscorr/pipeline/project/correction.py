@@ -127,10 +127,10 @@ def check_project_output(project: ProjectParts, out: Path, options: Options) -> 
             "there, --overwrite does all again; or choose another folder."
         )
     check = check_store_output if is_remote(out) else check_output
-    check(out, project.files, options.overwrite or (options.resume and is_ours))
-    for drive in project.drives:
-        for folder in (drive.name, SHARED_TILES):
-            check(out / folder, drive.parts.files.clouds, overwrite=True)
+    folders = [*(drive.name for drive in project.drives), SHARED_TILES]
+    check(out, project.files, options.overwrite or (options.resume and is_ours), folders)
+    for name in folders:
+        check(out / name, [], overwrite=True)
 
 
 @dataclass(frozen=True)
