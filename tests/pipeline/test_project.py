@@ -178,6 +178,38 @@ def test_points_of_no_drive_are_refused_with_their_tile(project, tmp_path):
 
 
 @pytest.mark.long
+def test_a_drive_without_points_is_a_failure(project, tmp_path):
+    """By ids that no point has: it is named in red, in `faults`, by status and by the check, with
+    the ids there are; all else is corrected, and the exit code is 4.
+    """
+    folder, out = shutil.copytree(project.parent, tmp_path / "city"), tmp_path / "out"
+    bed.share_tiles(folder)
+    third = bed.PROJECT[bed.PROJECT.index('[[drive]]\nname = "second"') :]
+    third = third.replace('"second"', '"third"').replace('"second/*', '"tiles/*')
+    third = third.replace("]\n\n", "]\npoint_source_ids = [7, 9]\n\n", 1)
+    with open(folder / "project.toml", "a") as file:
+        file.write(f"\n{third}")
+    (fault,) = check_project(folder).faults
+    points = sum(len(laspy.read(path)) for path in (folder / "tiles").iterdir())
+    words = f"None of the {points} points in the 2 files of drive third has its point_source_id "
+    assert fault.sentence.startswith(words + "(7, 9); they have 1, 2.")
+    command = ["correct", str(folder), "-o", str(out), "--no-report"]
+    assert CliRunner().invoke(app, command).exit_code == 4
+    content = json.loads((out / "project.json").read_text())
+    named = {"drive": "third", "name": "third", "stage": "tiles", "fault": fault.sentence}
+    assert content["faults"] == [named]
+    (failures,) = (row for row in content["statements"] if row["what"] == "Failures")
+    assert failures["rating"] == "red" and failures["items"][0]["name"] == "third"
+    assert [row["name"] for row in content["drives"]] == ["first", "second"]
+    (line,) = project_status(out)["failures"]
+    assert line.endswith(f" Failed: third: {fault.sentence}")
+    cloud = folder / "tiles" / "tile-1.laz"
+    cloud.write_bytes(cloud.read_bytes()[:-2000])
+    (fault,) = check_project(folder).faults  # in which there may be points of any drive
+    assert "tile-1.laz" in fault.sentence
+
+
+@pytest.mark.long
 def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
     "A good project has none; a cut tile, a drive without points near and a far point are named"
     checked = check_project(project)

@@ -14,7 +14,12 @@ from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
 from mlscorr.pipeline.faults import Faults
 from mlscorr.pipeline.needs import Amount
 from mlscorr.pipeline.project.file_tasks import read_tile
-from mlscorr.pipeline.project.stages import check_control_near, planned_drive, tile_tasks
+from mlscorr.pipeline.project.stages import (
+    check_control_near,
+    drives_without_points,
+    planned_drive,
+    tile_tasks,
+)
 from mlscorr.survey import Survey
 
 NO_CONTROL = (
@@ -60,15 +65,14 @@ def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
     """Surveys of the drives, with the clouds that can be read."""
     tasks = [task.arguments for task in tile_tasks(project)]
     read = [(owners, faults.of("data", read_tile, path, owners)) for path, owners in tasks]
-    damaged = {owner.name for owners, tiles in read if tiles is None for owner in owners}
     surveys = []
     for drive in project.drives:
         own = [tiles[drive.name] for _, tiles in read if tiles and drive.name in tiles]
         planned = faults.of("data", planned_drive, project, drive, own) if own else None
         if planned is not None:
             surveys.append(planned.survey)
-        elif not own and drive.name not in damaged:  # of which these files say why
-            faults.add("data", f"No cloud of drive {drive.name} has points of it.")
+    for sentence in drives_without_points(project, read).values():
+        faults.add("data", sentence)
     return surveys
 
 

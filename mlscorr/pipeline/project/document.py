@@ -192,8 +192,8 @@ def _statements(project, rows, drives, faults):
         yield headline.Statement(
             "Failures",
             "red",
-            f"{counted(len(faults), 'file')} could not be corrected, and all else was. When "
-            "the cause is gone, --resume does what is missing.",
+            f"{counted(len(faults), 'failure')}: what is named was not corrected, and all else "
+            "was. When the cause is gone, --resume does what is missing.",
             tuple((fault["name"], fault["fault"]) for fault in faults),
         )
 

@@ -102,6 +102,21 @@ def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
     return tiles
 
 
+def refuse(sentence: str) -> None:
+    """Fail, as the task of what can't be worked on.
+
+    Parameters
+    ----------
+    sentence : str
+        Why.
+
+    Raises
+    ------
+    ValueError
+    """
+    raise ValueError(sentence)
+
+
 @lru_cache(maxsize=SETTINGS.cached)
 def _kept(folder: Path, kind: str, key: str) -> Any:
     """A result that many tasks need."""

@@ -20,6 +20,7 @@ from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey
 from mlscorr.pipeline.project.tasks import VERSION, Task
 from mlscorr.survey import CloudFile, ControlPoints, Survey
+from mlscorr.survey.summary import counted
 from mlscorr.targets import search_radius
 
 
@@ -43,6 +44,35 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
         name = task_name(folder, path)
         tasks.append(Task("tiles", key, folder, name, 0, file_tasks.read_tile, (path, tuple(own))))
     return tasks
+
+
+def drives_without_points(project: ProjectParts, read: Iterable[tuple]) -> dict[str, str]:
+    """Why drives have no points, by their names: ids that none of their files has.
+
+    Parameters
+    ----------
+    project : ProjectParts
+    read : iterable of (sequence of TileOwner, dict or None)
+        What read_tile was given and returned; None where a file can't be read, which says why.
+    """
+    read, sentences = list(read), {}
+    for drive in project.drives:
+        own = [tiles for owners, tiles in read if drive.name in [owner.name for owner in owners]]
+        if None in own or any(drive.name in tiles for tiles in own):
+            continue
+        files = [tile.file for tiles in own for tile in tiles.values()]
+        there = sorted({number for file in files for number in file.point_source_ids or ()})
+        sentences[drive.name] = (
+            f"None of the {sum(file.points for file in files)} points in the "
+            f"{counted(len(own), 'file')} of drive {drive.name} has its point_source_id "
+            f"({_listed(drive.ids)}); they have {_listed(there)}. Correct point_source_ids of its "
+            f"[[drive]] in {project.path}, or leave it out."
+        )
+    return sentences
+
+
+def _listed(numbers):
+    return ", ".join(map(str, numbers))
 
 
 def _folder(drives):
