@@ -1,5 +1,7 @@
 """project.toml: what is wrong in it or between its drives is said in a sentence."""
 
+import laspy
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -31,6 +33,13 @@ def city(tmp_path):
         (tmp_path / name / "way.csv").write_text(TRAJECTORY)
         (tmp_path / name / f"tile-{name}.laz").write_bytes(b"")
     return tmp_path
+
+
+def write_cloud(path, points):
+    "A cloud of some points, all in one place"
+    cloud = laspy.create(point_format=1, file_version="1.2")
+    cloud.x = cloud.gps_time = np.zeros(points)
+    cloud.write(path)
 
 
 def write(folder, *parts):
@@ -153,7 +162,7 @@ def test_the_key_of_a_drives_clouds_is_named(city):
 def test_a_copy_of_another_drives_cloud_is_refused(city):
     "Both files and drives are named; by point_source_ids of their own two drives may share copies"
     for name in ("a", "b"):
-        (city / name / f"tile-{name}.laz").write_bytes(b"the same")
+        write_cloud(city / name / f"tile-{name}.laz", points=9)
     words = r"tile-b.laz, of drive b, is a copy of .*tile-a.laz, of drive a: all .* twice"
     for parts in (
         [DRIVE.format("a"), DRIVE.format("b")],
@@ -163,6 +172,14 @@ def test_a_copy_of_another_drives_cloud_is_refused(city):
             read_project(write(city, *parts))
     parts = [IDS.format(n, f"[{i}]").replace('["a/', f'["{n}/') for i, n in enumerate("ab")]
     assert len(read_project(write(city, *parts)).drives) == 2
+
+
+def test_files_without_points_are_no_copies(city):
+    "No point counts twice where there is none, or none that can be read: each file says it itself"
+    for name in ("a", "b"):
+        write_cloud(city / name / f"tile-{name}.laz", points=0)
+        (city / name / f"half-{name}.laz").write_bytes(b"LASF and half a header")
+    assert len(read_project(write(city, DRIVE.format("a"), DRIVE.format("b"))).drives) == 2
 
 
 def test_drives_of_two_systems_are_refused(city):
