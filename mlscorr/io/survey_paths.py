@@ -232,10 +232,13 @@ def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> 
         "names the file": [str(resolved(cloud)) for cloud in clouds],
         "has files whose results would have the same name:": written,
     }
+    places = kinds["names the file"]
     for kind, values in kinds.items():
         value, count = Counter(values).most_common(1)[0]
         if count > 1:
-            raise ValueError(f"{key} of {path} {kind} {value} ({count} times). Rename one.")
+            alike = {place for place, own in zip(places, values, strict=True) if own == value}
+            named = ": " * (value not in alike) + ", ".join(sorted(alike - {value})[:4])
+            raise ValueError(f"{key} of {path} {kind} {value} ({count} times){named}. Rename one.")
     for copy, first in find_copies(clouds).items():
         raise ValueError(
             f"{key} of {path} names {copy}, which is a copy of {first}: all of its points "

@@ -292,11 +292,12 @@ def test_the_same_cloud_twice_is_refused(folder):
 
 
 def test_clouds_of_the_same_name_are_refused(folder):
-    "Outputs keep their names, so two folders can't hold one each"
+    "Outputs keep their names, so two folders can't hold one each: both are named"
     (folder / "other").mkdir()
     shutil.copy(folder / "pass-1.las", folder / "other" / "pass-1.las")
     toml(folder, '["pass-*.las"]', '["**/pass-1.las"]')
-    with pytest.raises(ValueError, match=r"results would have the same name.*pass-1.las"):
+    words = r"same name: pass-1\.las \(2 times\): .*/other/pass-1.las, .*/pass-1.las\. Rename"
+    with pytest.raises(ValueError, match=words):
         read_survey(folder)
 
 
