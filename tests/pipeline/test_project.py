@@ -191,8 +191,8 @@ def test_a_drive_without_points_is_a_failure(project, tmp_path):
         file.write(f"\n{third}")
     (fault,) = check_project(folder).faults
     points = sum(len(laspy.read(path)) for path in (folder / "tiles").iterdir())
-    words = f"None of the {points} points in the 2 files of drive third has its point_source_id "
-    assert fault.sentence.startswith(words + "(7, 9); they have 1, 2.")
+    words = f"None of the {points} points in the files of drive third has its point_source_id "
+    assert fault.sentence.startswith(words + "(7, 9): they have 1, 2.")
     command = ["correct", str(folder), "-o", str(out), "--no-report"]
     assert CliRunner().invoke(app, command).exit_code == 4
     content = json.loads((out / "project.json").read_text())

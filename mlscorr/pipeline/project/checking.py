@@ -13,13 +13,8 @@ from mlscorr.io.project_file import ProjectParts, read_project, stated_project
 from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
 from mlscorr.pipeline.faults import Faults
 from mlscorr.pipeline.needs import Amount
+from mlscorr.pipeline.project import stages
 from mlscorr.pipeline.project.file_tasks import read_tile
-from mlscorr.pipeline.project.stages import (
-    check_control_near,
-    drives_without_points,
-    planned_drive,
-    tile_tasks,
-)
 from mlscorr.survey import Survey
 
 NO_CONTROL = (
@@ -63,16 +58,16 @@ def check_project(path: str | Path) -> CheckedSurvey:
 
 def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
     """Surveys of the drives, with the clouds that can be read."""
-    tasks = [task.arguments for task in tile_tasks(project)]
+    tasks = [task.arguments for task in stages.tile_tasks(project)]
     read = [(owners, faults.of("data", read_tile, path, owners)) for path, owners in tasks]
     surveys = []
     for drive in project.drives:
         own = [tiles[drive.name] for _, tiles in read if tiles and drive.name in tiles]
-        planned = faults.of("data", planned_drive, project, drive, own) if own else None
+        planned = faults.of("data", stages.planned_drive, project, drive, own) if own else None
         if planned is not None:
             surveys.append(planned.survey)
-    for sentence in drives_without_points(project, read).values():
-        faults.add("data", sentence)
+    for task in stages.refusals(project, read):
+        faults.of("data", task.function, *task.arguments)
     return surveys
 
 
@@ -96,7 +91,7 @@ def _check_control(project, checked, faults):
     names = [*project.control.name, *project.check.name]
     held = near.intersection(project.control.name)
     faults.warn(*few_targets(len(held)))
-    faults.of("data", check_control_near, project, [survey for survey, _ in checked])
+    faults.of("data", stages.check_control_near, project, [survey for survey, _ in checked])
     if held and (far := [name for name in names if name not in near]):
         faults.warn(
             f"{len(far)} of the {len(names)} surveyed points of {project.path} lie near no cloud "

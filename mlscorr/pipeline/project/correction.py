@@ -27,10 +27,10 @@ from mlscorr.pipeline.project.document import (
     project_document,
 )
 from mlscorr.pipeline.project.engine import engine
-from mlscorr.pipeline.project.file_tasks import ReportInput, refuse
+from mlscorr.pipeline.project.file_tasks import ReportInput
 from mlscorr.pipeline.project.progress import Progress, logged
 from mlscorr.pipeline.project.running import Run
-from mlscorr.pipeline.project.tasks import VERSION, Task
+from mlscorr.pipeline.project.tasks import VERSION
 from mlscorr.pipeline.tying import TieUse, without_control
 
 STORE = "tasks"  # of the folder within the results
@@ -171,10 +171,7 @@ class _Work:
         self.progress.begin("tiles", tasks)
         tiles = self.run.results(tasks)
         read = [(task.arguments[1], tiles.get(task.name)) for task in tasks]
-        empty = [
-            Task("tiles", digest(why), name, name, 0, refuse, (why,))
-            for name, why in stages.drives_without_points(self.project, read).items()
-        ]
+        empty = stages.refusals(self.project, read)
         if empty:
             self.progress.begin("tiles", [*tasks, *empty])
             self.run.results(empty)

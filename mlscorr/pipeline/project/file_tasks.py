@@ -102,19 +102,28 @@ def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
     return tiles
 
 
-def refuse(sentence: str) -> None:
-    """Fail, as the task of what can't be worked on.
+def refuse(drive: str, ids: Sequence[int], files: Sequence[CloudFile]) -> None:
+    """Say that a drive has no points: the task of such a drive.
 
     Parameters
     ----------
-    sentence : str
-        Why.
+    drive : str
+    ids : sequence of int
+        The point_source_ids that none of its files has.
+    files : sequence of CloudFile
+        What its files have of other drives.
 
     Raises
     ------
     ValueError
     """
-    raise ValueError(sentence)
+    there = sorted({number for file in files for number in file.point_source_ids or ()})
+    own, others = (", ".join(map(str, numbers)) for numbers in (ids, there))
+    raise ValueError(
+        f"None of the {sum(file.points for file in files)} points in the files of drive {drive} "
+        f"has its point_source_id ({own}): they have {others}. Correct the point_source_ids of its "
+        "[[drive]], or leave it out."
+    )
 
 
 @lru_cache(maxsize=SETTINGS.cached)

@@ -20,7 +20,6 @@ from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey
 from mlscorr.pipeline.project.tasks import VERSION, Task
 from mlscorr.survey import CloudFile, ControlPoints, Survey
-from mlscorr.survey.summary import counted
 from mlscorr.targets import search_radius
 
 
@@ -40,39 +39,32 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
             tiles.setdefault(resolved(path), (path, []))[1].append(owner)
     tasks = []
     for path, own in tiles.values():
-        key, folder = digest(VERSION, FileIdentity.of(path), path, own), _folder(own)
+        try:
+            identity = FileIdentity.of(path)
+        except OSError:  # its task says why
+            identity = None
+        key, folder = digest(VERSION, identity, path, own), _folder(own)
         name = task_name(folder, path)
         tasks.append(Task("tiles", key, folder, name, 0, file_tasks.read_tile, (path, tuple(own))))
     return tasks
 
 
-def drives_without_points(project: ProjectParts, read: Iterable[tuple]) -> dict[str, str]:
-    """Why drives have no points, by their names: ids that none of their files has.
+def refusals(project: ProjectParts, read: Sequence[tuple]) -> list[Task]:
+    """Tasks of drives without a point in any of their files, all of which can be read: they fail.
 
     Parameters
     ----------
     project : ProjectParts
-    read : iterable of (sequence of TileOwner, dict or None)
-        What read_tile was given and returned; None where a file can't be read, which says why.
+    read : sequence of (sequence of TileOwner, dict or None)
+        What read_tile was given, and its result if it has any.
     """
-    read, sentences = list(read), {}
-    for drive in project.drives:
-        own = [tiles for owners, tiles in read if drive.name in [owner.name for owner in owners]]
-        if None in own or any(drive.name in tiles for tiles in own):
-            continue
-        files = [tile.file for tiles in own for tile in tiles.values()]
-        there = sorted({number for file in files for number in file.point_source_ids or ()})
-        sentences[drive.name] = (
-            f"None of the {sum(file.points for file in files)} points in the "
-            f"{counted(len(own), 'file')} of drive {drive.name} has its point_source_id "
-            f"({_listed(drive.ids)}); they have {_listed(there)}. Correct point_source_ids of its "
-            f"[[drive]] in {project.path}, or leave it out."
-        )
-    return sentences
-
-
-def _listed(numbers):
-    return ", ".join(map(str, numbers))
+    tasks = []
+    for name, ids in ((drive.name, drive.ids) for drive in project.drives):
+        own = [tiles for owners, tiles in read if name in [owner.name for owner in owners]]
+        if None not in own and not any(name in tiles for tiles in own):
+            given = name, ids, [tile.file for tiles in own for tile in tiles.values()]
+            tasks.append(Task("tiles", digest(*given), name, name, 0, file_tasks.refuse, given))
+    return tasks
 
 
 def _folder(drives):
@@ -116,11 +108,8 @@ class PlannedDrive:
         ----------
         lost : collection of Path
         """
-        survey = self.survey
-        clouds = [file for file in survey.clouds if file.path not in lost]
-        if len(clouds) == len(survey.clouds):
-            return self
-        return replace(self, survey=file_tasks.with_clouds(survey, clouds))
+        clouds = [file for file in self.survey.clouds if file.path not in lost]
+        return replace(self, survey=file_tasks.with_clouds(self.survey, clouds))
 
 
 def planned_drive(
@@ -270,9 +259,8 @@ def cloud_tasks(
         key = digest(VERSION, used, parts, path.name, identity, with_sigma)
         points = sum(file.points for some in files for file in some)
         inputs = store.folder, used, path, identity, out / folder, with_sigma
-        task = Task(
-            "clouds", key, folder, task_name(folder, path), points, file_tasks.write, inputs
-        )
+        named = key, folder, task_name(folder, path)
+        task = Task("clouds", *named, points, file_tasks.write, inputs)
         tasks.append((task, [survey.name for survey in surveys]))
     return tasks
 
@@ -307,7 +295,5 @@ def report_task(inputs: file_tasks.ReportInput, drive: PlannedDrive) -> Task:
     """
     written: WrittenClouds = inputs.written
     key = digest(VERSION, inputs.corrected, written, inputs.page, inputs.trajectories)
-    points = drive.survey.points if inputs.page else 0
-    return Task(
-        "reports", key, drive.survey.name, drive.survey.name, points, file_tasks.report, (inputs,)
-    )
+    points, name = drive.survey.points if inputs.page else 0, drive.survey.name
+    return Task("reports", key, name, name, points, file_tasks.report, (inputs,))
