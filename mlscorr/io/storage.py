@@ -180,7 +180,8 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
         stem, end = posixpath.splitext(pattern)  # endings in capitals are as good
         names = {pattern, stem + end.lower(), stem + end.upper()}
         matches = (glob.glob(name, root_dir=folder, recursive=True) for name in names)
-        return sorted({folder / name for some in matches for name in some})
+        paths = {folder / name for some in matches for name in some}
+        return sorted(path for path in paths if not path.is_dir())
     path: Any = as_path(pattern) if is_url(pattern) else resolved(folder / pattern)
     if path.protocol in WEB:
         raise ValueError(
@@ -188,7 +189,8 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
         )
     with asking(path):
         path.fs.invalidate_cache()
-        names = sorted(path.fs.glob(path.path))
+        infos = path.fs.glob(path.path, detail=True)
+        names = sorted(name for name, info in infos.items() if info["type"] != "directory")
     if not names:
         check_bucket(path)
     return [as_path(path.fs.unstrip_protocol(name)) for name in names]

@@ -261,3 +261,10 @@ def test_endings_in_capitals_are_as_good(tmp_path):
     for name in ("a.laz", "b.LAZ", "c.las"):
         (tmp_path / name).touch()
     assert [path.name for path in files_like(tmp_path, "*.laz")] == ["a.laz", "b.LAZ"]
+
+
+def test_a_folder_is_like_no_pattern(tmp_path):
+    "Only files are clouds: a folder that is named like a file is left out"
+    (tmp_path / "a.laz").touch()
+    (tmp_path / "old.laz").mkdir()
+    assert files_like(tmp_path, "*.laz") == [tmp_path / "a.laz"]

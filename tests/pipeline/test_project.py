@@ -15,7 +15,10 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
+from mlscorr.io.project_file import read_project
 from mlscorr.pipeline.project import Options, check_project, correct_project, project_status
+from mlscorr.pipeline.project.stages import tile_tasks
+from mlscorr.pipeline.project.tasks import carry_out
 from tests.beds import project_street as bed
 from tests.beds.documents import undocumented
 
@@ -357,6 +360,17 @@ def test_resume_does_what_is_missing_or_damaged(project, copy):
     assert same == before
     kinds = [kind for kind, _ in worked(out)]
     assert sorted(kinds) == ["clouds", "tiles"]
+
+
+def test_a_cloud_that_cannot_be_opened_is_a_fault_of_its_own(project, tmp_path):
+    "A link that leads nowhere fails the task of its file alone; a folder of that name is none"
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    (folder / "second" / "late.laz").symlink_to("nowhere")
+    (folder / "second" / "old.laz").mkdir()
+    tasks = tile_tasks(read_project(folder))
+    faults = {task.name: carry_out(task, tmp_path / "tasks")[0] for task in tasks}
+    assert "There is no file" in faults.pop("second/late.laz")
+    assert [*faults.values()] == [""] * 4
 
 
 @pytest.mark.long
