@@ -26,11 +26,9 @@ PART = ".part"  # ends the name of what isn't whole yet
 
 
 def check_output(
-    out: str | Path,
-    inputs: Iterable[str | Path],
-    overwrite: bool = False,
+    out: str | Path, inputs: Iterable[str | Path], overwrite: bool = False,
     folders: Iterable[str] = (),
-) -> None:
+) -> None:  # fmt: skip
     """Refuse an output folder that holds an input, or anything that may not be replaced.
 
     Parameters
@@ -149,11 +147,9 @@ def output_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def output_folder(
-    out: str | Path,
-    inputs: Sequence[InputFile] = (),
-    overwrite: bool = False,
+    out: str | Path, inputs: Sequence[InputFile] = (), overwrite: bool = False,
     folders: Iterable[str] = (),
-) -> Iterator[Path]:
+) -> Iterator[Path]:  # fmt: skip
     """A folder to write into, which takes its name only when all went well.
 
     It stands beside its place until then, locked by this process. What processes left there that

@@ -362,6 +362,18 @@ def test_resume_does_what_is_missing_or_damaged(project, copy):
     assert sorted(kinds) == ["clouds", "tiles"]
 
 
+def test_what_is_gone_or_cut_off_is_not_done(copy):
+    "Of four clouds, two are left, and of two reports one: status says so, and how to go on"
+    (copy / "first" / "tile-2.laz").unlink()
+    (copy / "second" / "report.json").unlink()
+    with open(copy / "first" / "tile-1.laz", "r+b") as file:
+        file.truncate(1000)
+    rows = {row["stage"]: (row["done"], row["tasks"]) for row in project_status(copy)["all"]}
+    assert (rows["findings"], rows["clouds"], rows["reports"]) == ((4, 4), (2, 4), (1, 2))
+    said = CliRunner().invoke(app, ["status", str(copy)]).stderr
+    assert "Not running: the same command with --resume goes on." in said
+
+
 def test_a_cloud_that_cannot_be_opened_is_a_fault_of_its_own(project, tmp_path):
     "A link that leads nowhere fails the task of its file alone; a folder of that name is none"
     folder = shutil.copytree(project.parent, tmp_path / "city")

@@ -20,6 +20,24 @@ LOSS = (
 FAILED = "{} of {} parts needed together failed ({}): {.fault} --resume works on these alone."
 
 
+def present(store: TaskStore, kind: str, key: str) -> tuple[Any, tuple[str, ...]] | None:
+    """The result of a task with its warnings; None where it, or what it wrote, lacks or is damaged.
+
+    Parameters
+    ----------
+    store : TaskStore
+    kind, key : str
+        Of the task.
+    """
+    try:
+        result, texts = store.get(kind, key)
+    except KeyError:
+        return None
+    if isinstance(result, Written) and not result.is_whole(store.folder.parent):
+        return None
+    return result, texts
+
+
 @dataclass
 class Run:
     """Works on tasks and counts what happens.
@@ -50,7 +68,7 @@ class Run:
         results: dict[str, Any] = {}
         rest = []
         for task in tasks:
-            result = self._present(task)
+            result = present(self.store, task.kind, task.key)
             if result is None:
                 rest.append(task)
                 continue
@@ -82,16 +100,6 @@ class Run:
         if left := [task.name for task in tasks if task.name not in results]:
             raise ValueError(FAILED.format(len(left), len(tasks), ", ".join(left), self.faults[-1]))
         return list(results.values())
-
-    def _present(self, task):
-        """The result of a task with its warnings, None where it is lacking or damaged."""
-        try:
-            result, texts = self.store.get(task.kind, task.key)
-        except KeyError:
-            return None
-        if isinstance(result, Written) and not result.is_whole(self.store.folder.parent):
-            return None
-        return result, texts
 
     def _outcomes(self, tasks) -> Iterator[Outcome]:
         """The Outcome of each task, as they end; long ones are begun first, so that all workers

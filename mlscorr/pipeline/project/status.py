@@ -7,10 +7,11 @@ from pathlib import Path
 
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.output import document
-from mlscorr.io.storage import as_path, is_there
+from mlscorr.io.storage import as_path, is_remote, is_there
 from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.project.correction import STORE
 from mlscorr.pipeline.project.progress import TITLES
+from mlscorr.pipeline.project.running import present
 
 
 def project_status(out: str | Path) -> dict:
@@ -43,7 +44,11 @@ def project_status(out: str | Path) -> dict:
     stages = json.loads(read_bytes(store.plan))
     done = {kind: store.keys(kind) for kind in stages}
     tasks = [
-        {**task, "kind": kind, "is_done": task["key"] in done[kind]}
+        {
+            **task,
+            "kind": kind,
+            "is_done": task["key"] in done[kind] and _is_left(store, kind, task["key"]),
+        }
         for kind in TITLES
         for task in stages.get(kind, ())
     ]
@@ -62,6 +67,12 @@ def project_status(out: str | Path) -> dict:
             "is_running": is_running,
         },
     )
+
+
+def _is_left(store, kind, key):
+    """Whether what a task wrote is there as it was written; nothing of this is asked of a store."""
+    is_asked = kind in ("clouds", "reports") and not is_remote(store.folder)
+    return not is_asked or present(store, kind, key) is not None
 
 
 def _failures(tasks, lines):
