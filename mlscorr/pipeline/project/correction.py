@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.io.identity import FileIdentity
 from mlscorr.io.output import check_output, output_file, write_json
 from mlscorr.io.project_file import ProjectParts, read_project
 from mlscorr.io.project_sections import SHARED_TILES
@@ -204,7 +205,7 @@ class _Work:
         planned[:] = [drive for drive in planned if drive.survey.clouds]
         files = [task.key for task in every]
         surveys = [d.survey for d in planned]  # what results keep of them, paths and notes too
-        kept = [(s.control, s.check, s.crs, s.notes, s.inputs, s.clouds) for s in surveys]
+        kept = [(s.control, s.check, s.crs, s.notes, _contents(s), s.clouds) for s in surveys]
         key = digest(VERSION, files, kept, self.options.order, self.ties, self.options.sigma)
         keys = {d.survey.name: digest(key, d.survey.name) for d in planned}
         if not all(_is_there(store, own) for own in keys.values()):
@@ -282,6 +283,12 @@ class _Work:
 def _path(task):
     """Path of the cloud that a task reads."""
     return task.arguments[0].path
+
+
+def _contents(survey):
+    """What the files of a survey are and hold; of clouds the keys of their tasks tell that."""
+    pairs = [(file.what, file.path) for file in survey.inputs]
+    return pairs, [FileIdentity.of(path).content for what, path in pairs if what != "cloud"]
 
 
 def _is_there(store, key):
