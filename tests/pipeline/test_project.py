@@ -341,11 +341,12 @@ def test_resume_does_what_is_missing_or_damaged(project, copy):
     """A cloud that is gone, and a result of which a bit fell over, are made again; nothing else.
 
     A list and a project.toml that are newer, but say the same, change nothing. A cloud of a drive
-    that is no more is named.
+    that is no more is named, a page that is not asked for is gone.
     """
     out, before = copy, outputs(copy)
     for path in (project, project.parent / "control.csv"):
         path.write_bytes(path.read_bytes())
+    (out / "project.html").write_text("of the run before")
     (out / "first" / "tile-2.laz").unlink()
     damaged = next((out / "tasks" / "tiles").glob("*.result"))
     content = bytearray(damaged.read_bytes())
@@ -355,7 +356,7 @@ def test_resume_does_what_is_missing_or_damaged(project, copy):
     shutil.copy(out / "first" / "tile-1.laz", out / "third" / "tile-1.laz")
     document = correct_project(project, out, Options(page=False, resume=True)).document
     (older,) = [row for row in document["statements"] if row["what"] == "Older results"]
-    assert older["sentence"].startswith("1 corrected cloud is left of an earlier run")
+    assert older["sentence"].startswith("1 file is left of an earlier run: of clouds or ")
     assert older["items"] == [{"name": "third/tile-1.laz", "text": "not of this run"}]
     shutil.rmtree(out / "third")
     same = outputs(out)
@@ -363,6 +364,7 @@ def test_resume_does_what_is_missing_or_damaged(project, copy):
     assert same == before
     kinds = [kind for kind, _ in worked(out)]
     assert sorted(kinds) == ["clouds", "tiles"]
+    assert not (out / "project.html").exists()
 
 
 def test_what_is_gone_or_cut_off_is_not_done(copy):

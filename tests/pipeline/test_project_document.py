@@ -7,7 +7,10 @@ import pytest
 
 from mlscorr.estimate import Support
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.pipeline.project.document import _reason
+from mlscorr.io.identity import FileIdentity
+from mlscorr.io.task_store import TaskStore, digest
+from mlscorr.pipeline.project.document import _reason, older_results
+from mlscorr.pipeline.project.tasks import Written
 from mlscorr.report.headline import first_screen
 from tests.beds.reports import drive, fabricate
 
@@ -34,6 +37,24 @@ def test_a_doubt_is_told_by_its_reason(lack):
     content = first_screen(report)
     assert content["rating"] != "green"
     assert CHANGES[lack] in _reason({"rating": content["rating"], "meaning": ""}, content)
+
+
+def test_files_of_earlier_reports_are_named(tmp_path):
+    "Of other results, as they were written: no file that was replaced or changed, none of the same"
+
+    def report(name, *files):
+        outputs = tuple((file, FileIdentity.of(tmp_path / file)) for file in files)
+        return Written({"name": name, "outputs": list(files)}, outputs)
+
+    for name in ("page.html", "old.sbet", "new.csv", "notes.txt", "map.png"):
+        (tmp_path / name).write_text(name)
+    before = report("before", "old.sbet", "new.csv", "notes.txt")
+    same, now = report("now", "new.csv", "map.png"), report("now", "new.csv")
+    (tmp_path / "notes.txt").write_text("of somebody, by now")
+    store = TaskStore(tmp_path / "tasks")
+    for number, each in enumerate((before, same, now)):
+        store.put("reports", digest(number), (each, ()))
+    assert older_results(store, [now]) == ["old.sbet"]
 
 
 def test_the_first_warning_of_a_drive_is_told_beside_its_doubt():

@@ -13,7 +13,7 @@ from mlscorr.io.identity import FileIdentity
 from mlscorr.io.output import check_output, output_file, write_json
 from mlscorr.io.project_file import ProjectParts, read_project
 from mlscorr.io.project_sections import SHARED_TILES
-from mlscorr.io.publishing import check_store_output
+from mlscorr.io.publishing import check_store_output, remove_files
 from mlscorr.io.storage import as_path, is_folder, is_remote
 from mlscorr.io.task_store import TaskStore, digest
 from mlscorr.io.trajectory_exports import check_exports
@@ -25,6 +25,7 @@ from mlscorr.pipeline.project.document import (
     ProjectResult,
     drive_result,
     older_clouds,
+    older_results,
     project_document,
 )
 from mlscorr.pipeline.project.engine import engine
@@ -155,10 +156,13 @@ class _Work:
         planned = self._planned()
         keys = self._estimated(planned, np.floor(planned[0].survey.trajectory.position[0]))
         clouds = self._clouds(planned, keys)
-        drives = self._reports(planned, keys, clouds)
-        older = older_clouds(self.out, clouds)
+        reports = self._reports(planned, keys, clouds)
+        store, written = self.run.store, [*reports.values()]
+        drives = [(store.get("states", keys[name]), own.value) for name, own in reports.items()]
+        older = [*older_clouds(self.out, clouds), *older_results(store, written)]
         result = project_document(self.project, drives, self.run, older)
         write_json(self.out / "project.json", result.document)
+        remove_files(self.out, "project.html")
         if self.options.page:
             from mlscorr.report.project_page import write_project
 
@@ -256,7 +260,7 @@ class _Work:
         return {name: WrittenClouds.join(own) for name, own in clouds.items()}
 
     def _reports(self, planned, keys, clouds):
-        """DriveResult and report.json of each drive."""
+        """What each drive's report wrote, by the drive's name."""
         tasks = [
             stages.report_task(
                 ReportInput(
@@ -272,12 +276,7 @@ class _Work:
             for d in planned
         ]
         self.progress.begin("reports", tasks)
-        reports = self.run.results(tasks)
-        return [
-            (self.run.store.get("states", keys[task.drive]), reports[task.name].value)
-            for task in tasks
-            if task.name in reports
-        ]
+        return self.run.results(tasks)
 
 
 def _path(task):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from posixpath import normpath
@@ -12,10 +13,12 @@ import numpy as np
 from mlscorr.evaluate.model import largest_sigma
 from mlscorr.io.output import document
 from mlscorr.io.project_file import ProjectParts
+from mlscorr.io.task_store import TaskStore
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.corrected import STATES, DriveState
 from mlscorr.pipeline.project.running import Run
+from mlscorr.pipeline.project.tasks import Written
 from mlscorr.report import headline
 from mlscorr.survey.summary import counted
 
@@ -97,6 +100,27 @@ def older_clouds(out: Path, clouds: Mapping[str, WrittenClouds]) -> list[str]:
     return sorted({f"{path.parent.name}/{path.name}" for path in there} - made)
 
 
+def older_results(store: TaskStore, reports: Sequence[Written]) -> list[str]:
+    """Files that reports of an earlier run wrote, of other results, and that none replaced.
+
+    Parameters
+    ----------
+    store : TaskStore
+        That keeps what they wrote.
+    reports : sequence of Written
+        Of this run.
+    """
+    made = {name for each in reports for name, _ in each.outputs}
+    now, older = [each.value | {"outputs": ()} for each in reports], set()
+    for key in store.keys("reports"):
+        with suppress(KeyError):  # of another version, or damaged
+            each: Written = store.get("reports", key)[0]
+            if each.value | {"outputs": ()} not in now:
+                left = {file[0]: Written(None, (file,)) for file in each.outputs}
+                older |= {n for n in left.keys() - made if left[n].is_whole(store.folder.parent)}
+    return sorted(older)
+
+
 def project_document(
     project: ProjectParts,
     drives: Sequence[tuple[DriveResult, dict]],
@@ -112,7 +136,7 @@ def project_document(
         With the report.json of each.
     run : Run
     older : sequence of str
-        Clouds of an earlier run.
+        Files of an earlier run.
     """
     rows = [_row(result, report) for result, report in drives]
     faults = [
@@ -237,11 +261,12 @@ def _lost(number):
 
 
 def _left(older):
-    """A statement on clouds of an earlier run, where there are any."""
+    """A statement on files of an earlier run, where there are any."""
     if older:
         sentence = (
-            f"{len(older)} corrected cloud{'s are' if len(older) > 1 else ' is'} left of an "
-            "earlier run, of files or drives that are no more or failed now. Delete what is old."
+            f"{len(older)} file{'s are' if len(older) > 1 else ' is'} left of an earlier run: of "
+            "clouds or drives that are no more or failed now, or of reports that were not asked "
+            "for again. Delete what is old."
         )
         items = headline.capped((name, "not of this run") for name in older)
         yield headline.Statement("Older results", "amber", sentence, items)
