@@ -224,8 +224,7 @@ def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
     ValueError
         Where another run is at work.
     """
-    owner = f"{socket.gethostname()}, process {os.getpid()}"
-    ended = threading.Event()
+    owner, ended = f"{socket.gethostname()}, process {os.getpid()}", threading.Event()
 
     def sign():
         return f"{owner}\n{secrets.token_hex(8)}"
@@ -283,8 +282,7 @@ def _wait_for_end(lock, beat):
     first, end = _content(lock), monotonic() + 3 * beat
     while monotonic() < end:
         sleep(beat / 4)
-        now = _content(lock)
-        if not now:
+        if not (now := _content(lock)):
             return
         if now != first:
             raise ValueError(

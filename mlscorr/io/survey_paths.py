@@ -236,8 +236,8 @@ def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> 
     for kind, values in kinds.items():
         value, count = Counter(values).most_common(1)[0]
         if count > 1:
-            alike = {place for place, own in zip(places, values, strict=True) if own == value}
-            named = ": " * (value not in alike) + ", ".join(sorted(alike - {value})[:4])
+            homonyms = {place for place, own in zip(places, values, strict=True) if own == value}
+            named = ": " * (value not in homonyms) + ", ".join(sorted(homonyms - {value})[:4])
             raise ValueError(f"{key} of {path} {kind} {value} ({count} times){named}. Rename one.")
     for copy, first in find_copies(clouds).items():
         raise ValueError(
