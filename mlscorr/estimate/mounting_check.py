@@ -51,8 +51,8 @@ def mounting_warnings(check: AddedUnknowns | None) -> tuple[str, ...]:
         "Passes disagree by their direction of travel (arrows of opposite passes are "
         f"opposite), as a wrong mounting makes them: it lacks {lacks} "
         f"(chi-squared {check.statistic:.0f}, critical {check.critical:.0f}). "
-        "This correction takes that for drift. Run mlscorr calibrate first, and correct with "
-        "the mounting that it writes.",
+        "This correction takes that for drift. Run mlscorr calibrate --clouds first, and "
+        "correct the survey that it writes.",
     )
 
 
@@ -119,6 +119,6 @@ def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
             yield (
                 f"{who} its lever arm lacks {arm} mm to the right, forward, up, and its boresight "
                 f"{turn} deg about them. No drift is made of it, "
-                "but its points keep it. Run mlscorr calibrate first, and correct with the "
-                "mountings that it writes."
+                "but its points keep it. Run mlscorr calibrate --clouds first, and correct "
+                "the survey that it writes."
             )

@@ -42,7 +42,8 @@ def write_survey_copy(
     mountings : sequence of Mounting, optional
         Of each scanner, to 0.01 mm and 1e-6 deg.
     clouds : sequence of sequences of str, optional
-        New files of each scanner, in the folder.
+        New files of each scanner, in the folder. Without them, new mountings are not yet those of
+        the clouds, and the copy says so.
     trajectory : str, optional
         New trajectory.file of all sessions, in the folder.
     control : sequence of str, optional
@@ -66,6 +67,8 @@ def write_survey_copy(
         for section in (document["cloud"], *sessions, *scanners):
             for number, name in enumerate(section.get("files", ())):  # keeps comments between
                 section["files"][number] = _moved(there, name, source.parent)
+        if mountings:  # a further calibration would count the same correction twice
+            document["cloud"]["mounting"] = "recorded"
     if trajectory is not None:
         _set_trajectory(document, trajectory, sorted(set(control)))
     sections, notes = scanners or [document], notes or [""] * len(mountings)

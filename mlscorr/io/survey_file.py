@@ -139,6 +139,7 @@ class SurveyParts:
             notes=tuple(notes), layouts=tuple(layouts), inputs=self.inputs,
             scanners=() if is_one else scanners,
             corrected_by=tuple(n for part in settings.trajectories for n in part.corrected_by),
+            is_remounted=settings.cloud is not None and settings.cloud.mounting == "recorded",
         )  # fmt: skip
 
 

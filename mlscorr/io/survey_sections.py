@@ -40,6 +40,7 @@ class CloudSection(TomlSection):
 
     files: Annotated[list[str], Field(min_length=1)]
     gps_time: Literal["auto", "week", "standard"] = "auto"
+    mounting: Literal["stated", "recorded"] = "stated"  # by which the points are georeferenced
 
 
 class PlaceColumns(ColumnsSection):

@@ -20,6 +20,7 @@ from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.near_points import remounting_fault
 from mlscorr.survey import Survey, check_survey
 from mlscorr.survey.summary import Summary
 
@@ -49,7 +50,7 @@ def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
     ------
     ValueError
         For what is no effect, effects that nothing can take out, and for a mounting where there is
-        none, or several.
+        none, or several, or where the clouds are not as it puts them.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.effects import make_effect
@@ -83,6 +84,8 @@ def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
         )
     if any(effect.name in MOUNTING for effect in effects):
         survey.check_one_scanner("a mounting that is applied")
+        if fault := remounting_fault(survey):
+            raise ValueError(fault)
         if survey.mounting is None:
             raise ValueError(
                 f"{survey.path} has no [mounting], which {joined(MOUNTING, 'or')} could change. "

@@ -89,7 +89,6 @@ class CalibrationResult(Summary):
         calibrations = {name: part.calibration for name, part in parts.items()}
         files = [[written_name(file.path) for file in p.survey.clouds] for p in parts.values()]
         with output_folder(out, survey.inputs, overwrite) as folder:
-            calibration_page(content).write(folder / "calibration.html")
             if with_drift:  # the one of all
                 drift = next(iter(calibrations.values())).drift
                 write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
@@ -102,6 +101,7 @@ class CalibrationResult(Summary):
                 for path, points, outside in write_clouds(survey, folder, moved, done):
                     row = {"name": path.name, "points": points, "untouched": outside}
                     content["files"].append(row)
+            calibration_page(content).write(folder / "calibration.html")
             write_json(folder / "calibration.json", content)
             write_survey_copy(
                 survey.path,

@@ -16,7 +16,7 @@ from mlscorr.evaluate.ties import misfit_section
 from mlscorr.io.las import sample_gps_times
 from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
-from mlscorr.pipeline.near_points import reuse_warnings
+from mlscorr.pipeline.near_points import remounting_fault, reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
 from mlscorr.survey import Survey, check_survey
@@ -51,7 +51,7 @@ def calibrate(
     Raises
     ------
     ValueError
-        Without a mounting, and as ``estimate_site``.
+        Without a mounting, for clouds that are not as it puts them, and as ``estimate_site``.
 
     >>> import mlscorr, numpy as np, tempfile, warnings
     >>> from mlscorr.simulate import Scenario, simulate
@@ -70,6 +70,8 @@ def calibrate(
     0.2
     """
     check_survey(survey)
+    if fault := remounting_fault(survey):
+        raise ValueError(fault)
     for name, part in survey.by_scanner.items():
         if part.mounting is None:
             raise ValueError(

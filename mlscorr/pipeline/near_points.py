@@ -100,12 +100,13 @@ def check_control(survey: Survey | ProjectParts) -> None:
 
 
 def reuse_warnings(survey: Survey) -> Iterator[str]:
-    """A sentence on control points by which the trajectory was corrected before.
+    """Sentences on control points and on a mounting that corrected a survey before.
 
     Parameters
     ----------
     survey : Survey
     """
+    yield from filter(None, [remounting_fault(survey)])
     names = [name for name in survey.control.name if name in survey.corrected_by]
     if names:
         yield (
@@ -115,6 +116,24 @@ def reuse_warnings(survey: Survey) -> Iterator[str]:
             "points alone can judge the result. Give calibrate --clouds without --with-drift and "
             "correct that survey, or other control points."
         )
+
+
+def remounting_fault(survey: Survey) -> str:
+    """A sentence where clouds are as another mounting put them than is stated; else empty.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    if not survey.is_remounted:
+        return ""
+    return (
+        f"The clouds of {survey.path} are still as the recorded mounting put them, not as its "
+        "calibrated one does ([cloud] mounting): a correction takes the difference for drift, and "
+        "a further calibration would count it twice. Run mlscorr calibrate --clouds on the survey "
+        "before, and take what that writes; where the clouds were georeferenced anew since, remove "
+        "that line."
+    )
 
 
 def no_control(survey: Survey, observations: int) -> str:

@@ -209,7 +209,8 @@ def calibration_page(content: dict[str, Any]) -> Page:
         summary="calibration-summary.html",
         sections=SECTIONS,
         content={"name": content["name"], "scanners": parts, "shared": shared,
-                 "components": MOUNTING_COMPONENTS, "norm3": _norm},
+                 "components": MOUNTING_COMPONENTS, "norm3": _norm,
+                 "files": content.get("files")},
         prefix="calibration-",
     )  # fmt: skip
 

@@ -90,6 +90,8 @@ class Survey(Summary):
         several is among the clouds once for each.
     corrected_by : tuple of str
         Names of the control points by which the trajectory, and the clouds, were corrected before.
+    is_remounted : bool
+        Whether a calibration changed the mounting, and the clouds are as it was recorded before.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Survey(Summary):
     inputs: tuple[InputFile, ...] = ()
     scanners: tuple[MountedScanner, ...] = ()
     corrected_by: tuple[str, ...] = ()
+    is_remounted: bool = False
 
     @cached_property
     def surveyed(self) -> ControlPoints:

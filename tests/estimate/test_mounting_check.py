@@ -51,7 +51,7 @@ def test_a_boresight_of_a_degree_is_named():
     "The sentence says by how much, and which command finds it"
     check = checked(1, [0.0, 1.0, 0.0])
     (sentence,) = mounting_warnings(check)
-    assert "mlscorr calibrate" in sentence
+    assert "mlscorr calibrate --clouds" in sentence
     error = np.degrees(check.correction[3:]) - [0.0, 1.0, 0.0]
     assert (np.abs(error) < 3 * np.degrees(check.sigma[3:])).all()
     assert abs(error[1]) < 0.2  # deg

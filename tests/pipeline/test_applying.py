@@ -13,7 +13,9 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
+from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.pipeline.applying import read_effects
+from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.documents import undocumented
 
@@ -126,6 +128,28 @@ def test_a_wrong_size_is_refused_by_the_command(found, sentence, site, tmp_path)
     assert done.exit_code == 2
     assert sentence in " ".join(done.output.split())
     assert not out.exists()
+
+
+def test_a_mounting_is_not_taken_out_twice(site, tmp_path):
+    """A survey with a new mounting and the old clouds says so: no calibration counts it again.
+
+    A clock offset can be taken out; the clouds are not as the mounting puts them after it either.
+    """
+    with warnings.catch_warnings(action="ignore"):
+        old = mlscorr.read_survey(site)
+        write_survey_copy(old.path, tmp_path / "survey.toml", tmp_path, [old.mounting])
+        survey = mlscorr.read_survey(tmp_path)
+        assert not list(reuse_warnings(old)) and not old.is_remounted
+        for work in (
+            mlscorr.calibrate,
+            lambda survey: mlscorr.apply(survey, make_effect("boresight", magnitude=[0, 0, 0.1])),
+        ):
+            with pytest.raises(ValueError, match="Run mlscorr calibrate --clouds on the survey"):
+                work(survey)
+        late = mlscorr.apply(survey, make_effect("time_offset", magnitude=0.01))
+        late.write(tmp_path / "out")
+        (sentence,) = reuse_warnings(mlscorr.read_survey(tmp_path / "out"))
+    assert "still as the recorded mounting put them" in sentence
 
 
 def test_what_cannot_be_taken_out_is_named(site):

@@ -57,6 +57,15 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
     assert all(row["sentence"] in text for row in content["statements"])
 
 
+def test_the_page_says_next_what_fits_its_clouds():
+    "Clouds that are as the recorded mounting put them are written anew before they are corrected"
+    content = {"name": "site", **calibrated()}
+    still = words(calibration_page(content | {"files": []}).html())
+    assert "still as the recorded mounting put them. Next: run mlscorr calibrate --clouds" in still
+    done = words(calibration_page(content | {"files": [{"name": "pass-1.laz"}]}).html())
+    assert "Next: run mlscorr correct with the survey.toml beside this page." in done
+
+
 def test_least_squares_without_control_has_no_result():
     "It takes nothing but control: a dash, not the nought ± 5 deg of its prior, and no row of RMSE"
     content = calibrated()
