@@ -18,7 +18,7 @@ from mlscorr.estimate.screening import Screening
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tied import TieResiduals
-from mlscorr.survey import Mounting, Trajectory
+from mlscorr.survey import Mounting, Ties, Trajectory
 from mlscorr.survey.summary import Summary
 
 SCANNER_COMPONENTS = ("range offset", "encoder scale")
@@ -95,8 +95,9 @@ class Calibration(Summary):
         average, so the farther from a control point, the less of it is corrected.
     notes : tuple of str
         Of warnings, those on the inputs.
-    ties : TieResiduals, optional
-        What two passes both saw, and what the mounting and the POS error leave of it.
+    ties, ties_with_drift : TieResiduals, optional
+        What two passes both saw, and what the mountings leave of it, by themselves and with the POS
+        error.
     scanner : ScannerErrors, optional
         What ranges and encoder lack.
     """
@@ -113,6 +114,7 @@ class Calibration(Summary):
     drift: Correction
     notes: tuple[str, ...] = ()
     ties: TieResiduals | None = None
+    ties_with_drift: TieResiduals | None = None
     scanner: ScannerErrors | None = None
 
     @property
@@ -183,6 +185,20 @@ class Calibration(Summary):
         """That of the first scanner."""
         return self.corrections_with_drift[0]
 
+    def with_residuals(self, ties: Ties, used: np.ndarray) -> Calibration:
+        """The same with what it leaves of ties.
+
+        Parameters
+        ----------
+        ties : Ties
+        used : (n,) bool array
+        """
+        still = Correction(self.trajectory, self.trajectory)
+        mounted = mounted_corrections(still, self.recorded, self.lsc.mountings)
+        both = mounted, self.corrections_with_drift
+        bare, drifted = (TieResiduals.of(ties, used, corrections) for corrections in both)
+        return replace(self, ties=bare, ties_with_drift=drifted)
+
     def fit_sigma(self, number: int) -> float | None:
         """How far apart the first scanner and another put what both saw on one pass. Units: m.
 
@@ -220,7 +236,8 @@ class Calibration(Summary):
             ls=self.ls.of(number),
             determined=self.determined[6 * number : 6 * number + 6],
             used=self.used[scanner == number],
-            ties=None if self.ties is None else self.ties.of_scanner(number),
+            ties=self.ties and self.ties.of_scanner(number),
+            ties_with_drift=self.ties_with_drift and self.ties_with_drift.of_scanner(number),
             scanner=None if self.scanner is None else self.scanner.of(number),
         )
 

@@ -47,13 +47,15 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
     lacks = AddedUnknowns.of(equations, parameters, columns, prior[is_wrong])
     equations = with_added(equations, -columns @ lacks.correction)
     pose_error = predict_pose_error(equations, calibration.posterior)
-    return replace(
+    freed = replace(
         calibration,
         equations=equations,
         drift=Correction.by_pose_error(calibration.trajectory, *pose_error),
         lsc=_without(calibration.recorded, calibration.lsc, lacks),
         scanner=errors,
     )
+    residuals = calibration.ties
+    return freed if residuals is None else freed.with_residuals(residuals.ties, residuals.used)
 
 
 def _columns(calibration, targets):

@@ -23,7 +23,7 @@ from mlscorr.estimate.prediction import pose_rows
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.estimate.tie_weights import WeighedTies, graduated
-from mlscorr.estimate.tied import TieResiduals, screen_with_ties
+from mlscorr.estimate.tied import screen_with_ties
 from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import Matched, Mounting, Ties
 
@@ -49,15 +49,13 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     bare = replace(tied.equations, ties=None)
     predictions, screening, is_used = screen_with_ties(bare, calibration.screening, rows)
     if not is_used.any():
-        residuals = TieResiduals.of(ties, is_used, calibration.corrections_with_drift)
-        return replace(calibration, ties=residuals)
+        return calibration.with_residuals(ties, is_used)
     used = calibration.used & ~np.isin(matched.name, [o.name for o in screening.outliers])
     changed = calibration_by(
         calibration.trajectory, calibration.recorded, predictions.equations, screening,
         (correction, calibration.ls), used, calibration.notes,
     )  # fmt: skip
-    residuals = TieResiduals.of(ties, is_used, changed.corrections_with_drift)
-    return replace(changed, ties=residuals)
+    return changed.with_residuals(ties, is_used)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")

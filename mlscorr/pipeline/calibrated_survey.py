@@ -205,6 +205,7 @@ class CalibratedSurvey(CalibrationResult):
             content["with_drift"] = {
                 "control": self._statistics("control", drift),
                 "check": self._statistics("check", drift),
+                "ties": misfit_section(calibration.ties_with_drift),
                 "position_rms": np.sqrt(np.mean(change**2, axis=0)).tolist(),
                 "position_largest": np.abs(change).max(axis=0).tolist(),
             }

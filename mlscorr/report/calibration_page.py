@@ -188,9 +188,12 @@ def _ties(content) -> Iterator[Statement]:
         views = "two passes, or two scanners of one," if is_between else "two passes"
         sentence = (
             f"{ties['used']} of {ties['n']} places that {views} both saw are used: {before} "
-            f"apart before, {after} after (median)."
+            f"apart before, {after} after (median)"
         )
-        yield Statement("Two passes", "green", sentence)
+        if "with_drift" in content:
+            median = content["with_drift"]["ties"]["after"]["median"]
+            sentence += f", {length_in_words(median)} without the drift"
+        yield Statement("Two passes", "green", f"{sentence}.")
 
 
 def calibration_page(content: dict[str, Any]) -> Page:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_mounting
+from mlscorr.frames import georeferenced_anew
 from tests.beds.tied_site import RECORDED, tied_site
 
 
@@ -34,3 +35,16 @@ def test_a_correction_by_least_squares_is_another_than_by_collocation(calibratio
         correction = calibration.correction(method)
         assert correction.recorded is correction.corrected is calibration.trajectory
         assert correction.corrected_mounting is getattr(calibration, method).mounting
+
+
+def test_what_the_drift_explains_of_ties_is_not_credited_to_the_mounting(calibration):
+    "Two views are as far apart as the mounting alone puts them; with the drift stands beside"
+    ties = tied_site(1, number=30).ties
+    left = calibration.with_residuals(ties, np.ones(len(ties), bool))
+    sightings = ties.place, ties.gps_time, ties.scanner
+    mountings = [RECORDED], calibration.lsc.mountings
+    place = georeferenced_anew(calibration.trajectory, *mountings, *sightings)
+    apart = np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
+    assert np.allclose(left.ties.after, apart, atol=1e-5)  # m
+    assert np.abs(left.ties_with_drift.after - apart).max() > 1e-3  # m
+    assert left.of(0, np.zeros(len(left.used), int)).ties_with_drift.used.all()

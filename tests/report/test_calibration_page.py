@@ -107,6 +107,18 @@ def test_a_scanner_that_is_off_is_amber():
         assert (row["rating"], row["sentence"]) == (rating, sentence + end)
 
 
+def test_what_the_drift_explains_between_passes_is_said_apart():
+    "1.6 cm by the mounting that is written; 2 mm where the drift is written, too"
+    away = {state: {"median": size} for state, size in (("before", 0.015), ("after", 0.016))}
+    ties = {"n": 90, "used": 80, "pairs": [], **away}
+    content, sentences = calibrated() | {"ties": ties}, []
+    for more in ({}, {"with_drift": {"ties": {"after": {"median": 0.002}}}}):
+        rows = calibration_screen(content | more, [])["statements"]
+        sentences += [row["sentence"] for row in rows if row["what"] == "Two passes"]
+    assert sentences[0].endswith("are used: 1.5 cm apart before, 1.6 cm after (median).")
+    assert sentences[1] == sentences[0][:-1] + ", 2 mm without the drift."
+
+
 def calibrated_together(fit=0.0018):
     "Content of calibration.json of a left and a right scanner, which fit each other to as much (m)"
     misfit = {"median": 0.02, "rms": 0.03}
