@@ -112,9 +112,13 @@ def _lack(content):
     limit = SETTINGS.setup_sigmas
     lacks = [
         f"{row['name']} {_size(row['lsc'], row['lsc_sigma'], row['unit'])}"
+        f"{'' if row['determined'] else ' (not determined)'}"
         for row in component_rows(content)
-        if abs(row["lsc"]) > limit * row["lsc_sigma"] and row["determined"]
+        if abs(row["lsc"]) > limit * row["lsc_sigma"]
     ]
+    if not lacks and not any(content["determined"]):
+        sentence = "This geometry does not tell whether the recorded mounting holds."
+        return Statement("Mounting", "amber", sentence)
     if not lacks:
         sentence = f"The recorded mounting holds: it lacks nothing beyond {limit:g} sigmas."
         return Statement("Mounting", "green", sentence)

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 from mlscorr.evaluate.rows import SEEN_BY_OTHERS, TargetRow
 from mlscorr.report.calibration_page import (
     calibration_page,
@@ -55,6 +57,26 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
     assert content["rating"] == "amber"
     assert text.index(lacks) < text.index("How far the cloud is")
     assert all(row["sentence"] in text for row in content["statements"])
+
+
+@pytest.mark.parametrize(
+    ("determined", "lack", "rating", "sentence"),
+    [
+        (5, 0.424, "amber", "mounting lacks lever arm up 424 ± 41 mm (not determined)."),
+        (5, 0.024, "green", "mounting holds: it lacks nothing beyond 3 sigmas."),
+        (0, 0.024, "amber", "This geometry does not tell whether the recorded mounting holds."),
+    ],
+)
+def test_a_mounting_holds_where_nothing_else_is_seen(determined, lack, rating, sentence):
+    "Ten sigmas of an undetermined part are named as such; where no part is told, none is cleared"
+    content = calibrated()
+    zero = {"correction": [0.0, 0.0, 0.0], "sigma": [0.01, 0.01, 0.041]}
+    arm = zero | {"correction": [0.0, 0.0, lack]}
+    content["lsc"] = content["lsc"] | {"lever_arm": arm, "boresight": zero}
+    content["determined"] = [bool(determined)] * 2 + [False] + [bool(determined)] * 3
+    mounting = calibration_screen(content, [])["statements"][0]
+    assert mounting["rating"] == rating
+    assert mounting["sentence"].endswith(sentence)
 
 
 def test_the_page_says_next_what_fits_its_clouds():
