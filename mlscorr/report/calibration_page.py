@@ -107,20 +107,25 @@ def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _lack(content):
-    """What the recorded mounting lacks beyond its sigma."""
-    limit = SETTINGS.setup_sigmas
-    lacks = [
+def _lacks(content):
+    """What the recorded mounting lacks beyond its sigma, in words of each part."""
+    return [
         f"{row['name']} {_size(row['lsc'], row['lsc_sigma'], row['unit'])}"
         f"{'' if row['determined'] else ' (not determined)'}"
         for row in component_rows(content)
-        if abs(row["lsc"]) > limit * row["lsc_sigma"]
+        if abs(row["lsc"]) > SETTINGS.setup_sigmas * row["lsc_sigma"]
     ]
+
+
+def _lack(content):
+    """Whether the recorded mounting holds."""
+    lacks = _lacks(content)
     if not lacks and not any(content["determined"]):
         sentence = "This geometry does not tell whether the recorded mounting holds."
         return Statement("Mounting", "amber", sentence)
     if not lacks:
-        sentence = f"The recorded mounting holds: it lacks nothing beyond {limit:g} sigmas."
+        sigmas = f"{SETTINGS.setup_sigmas:g} sigmas"
+        sentence = f"The recorded mounting holds: it lacks nothing beyond {sigmas}."
         return Statement("Mounting", "green", sentence)
     return Statement("Mounting", "amber", f"The recorded mounting lacks {', '.join(lacks)}.")
 
@@ -160,8 +165,19 @@ def _remainder(content):
     sentence = f"3D RMSE of {role} points {length_in_words(before)} → {length_in_words(after)}"
     if role == "control":
         return Statement("Result", "amber", f"{sentence}: the fit alone, which proves little.")
-    rating = "green" if after <= before else "red"
-    return Statement("Result", rating, f"{sentence}; they took no part.")
+    sentence = f"{sentence}; they took no part"
+    if after <= before:
+        return Statement("Result", "green", f"{sentence}.")
+    if _is_off(content["scanner_errors"]):
+        return Statement("Result", "amber", f"{sentence}, and keep what the scanner itself lacks.")
+    if not _lacks(content):
+        return Statement("Result", "amber", f"{sentence}. No part changed significantly.")
+    return Statement("Result", "red", f"{sentence}.")
+
+
+def _is_off(errors):
+    """Whether the scanner itself is; it is not where nobody looked."""
+    return any(row["significant"] for row in (errors or {}).values())
 
 
 def _scanner(content) -> Iterator[Statement]:
@@ -175,7 +191,7 @@ def _scanner(content) -> Iterator[Statement]:
         f"scan angles {1e3 * encoder['correction']:.2f} ± {1e3 * encoder['sigma']:.2f} mrad per "
         "rad"
     )
-    if any(row["significant"] for row in errors.values()):
+    if _is_off(errors):
         yield Statement("Scanner", "amber", f"{sentence}; the mounting is free of it.")
     elif all(row["determined"] for row in errors.values()):
         yield Statement("Scanner", "green", f"{sentence}: nothing significant.")

@@ -117,6 +117,21 @@ def test_a_calibration_that_makes_check_points_worse_is_red():
     assert calibrated(worse=True)["rating"] == "red"
 
 
+def test_check_points_that_chance_or_the_scanner_makes_worse_are_amber():
+    "A mounting without a significant change does no harm; what ranges lack is not the mounting's"
+    content, none = calibrated(worse=True), {"correction": [0.0] * 3, "sigma": [0.01] * 3}
+    right = content["lsc"] | {"lever_arm": none, "boresight": none}
+    screens = [
+        calibration_screen(content | {"lsc": right}, []),
+        calibrated(worse=True, significant=True),
+    ]
+    ends = "No part changed significantly.", "and keep what the scanner itself lacks."
+    for screen, end in zip(screens, ends, strict=True):
+        (result,) = (row for row in screen["statements"] if row["what"] == "Result")
+        assert result["rating"] == "amber"
+        assert result["sentence"].endswith(end)
+
+
 def test_a_scanner_that_is_off_is_amber():
     "Ranges that lack 12 mm, and an encoder that lacks nothing, are said with their sigmas"
     sentence = "Ranges lack 12 ± 1.0 mm, scan angles 0.10 ± 0.20 mrad per rad"
