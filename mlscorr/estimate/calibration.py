@@ -31,7 +31,8 @@ class ScannerErrors:
     Parameters
     ----------
     correction, sigma : (2 k,) array
-        To be added to each range (m), and to each scan angle by its size (ratio).
+        To be added to each range (m), and to each scan angle by its size (ratio). Held to what is
+        known without any measurement where it is not significant.
     determined, significant : (2 k,) bool array
         Whether this geometry can tell it at all; whether the mounting is free of it.
     """
@@ -55,10 +56,11 @@ class ScannerErrors:
     @property
     def warnings(self) -> tuple[str, ...]:
         """A sentence where something is significant, of one scanner."""
-        rows = zip(SCANNER_COMPONENTS, self.correction, self.sigma, self.significant, strict=True)
+        units = "mm", "mrad per rad"
+        rows = zip(SCANNER_COMPONENTS, units, *vars(self).values(), strict=True)
         lacks = [
-            f"{part} {1000 * a:.1f} ± {1000 * s:.1f} {unit}"
-            for (part, a, s, wrong), unit in zip(rows, ("mm", "mrad per rad"), strict=True)
+            f"{part} {1000 * a:.1f} ± {1000 * s:.1f} {unit}{'' if known else ' (not determined)'}"
+            for part, unit, a, s, known, wrong in rows
             if wrong
         ]
         if not lacks:

@@ -39,12 +39,14 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
     known = SETTINGS.unmeasured_scanner, SETTINGS.least_scanner_error
     prior, least = (np.tile(sigma, len(calibration.recorded)) for sigma in known)
     lacks = AddedUnknowns.of(equations, parameters, columns, prior)
-    is_wrong = lacks.is_wrong(least)
-    errors = ScannerErrors(lacks.correction, lacks.sigma, lacks.sigma < least, is_wrong)
+    is_wrong, correction, sigma = lacks.is_wrong(least), lacks.correction, lacks.sigma
     if not is_wrong.any():
+        errors = ScannerErrors(correction, sigma, sigma < least, is_wrong)
         return replace(calibration, scanner=errors)
     columns = columns[:, is_wrong]
-    lacks = AddedUnknowns.of(equations, parameters, columns, prior[is_wrong])
+    # An error that data sheets rule out is no draw from what they state: it is not held to that
+    lacks = AddedUnknowns.of(equations, parameters, columns, np.full(is_wrong.sum(), np.inf))
+    correction[is_wrong], sigma[is_wrong] = lacks.correction, lacks.sigma
     equations = with_added(equations, -columns @ lacks.correction)
     pose_error = predict_pose_error(equations, calibration.posterior)
     freed = replace(
@@ -52,7 +54,7 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
         equations=equations,
         drift=Correction.by_pose_error(calibration.trajectory, *pose_error),
         lsc=_without(calibration.recorded, calibration.lsc, lacks),
-        scanner=errors,
+        scanner=ScannerErrors(correction, sigma, sigma < least, is_wrong),
     )
     residuals = calibration.ties
     return freed if residuals is None else freed.with_residuals(residuals.ties, residuals.used)

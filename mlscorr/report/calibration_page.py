@@ -186,10 +186,14 @@ def _scanner(content) -> Iterator[Statement]:
     if errors is None:
         return
     ranges, encoder = errors["range_offset"], errors["encoder_scale"]
+    open_ranges, open_encoder = (
+        " (not determined)" if row["significant"] and not row["determined"] else ""
+        for row in (ranges, encoder)
+    )
     sentence = (
-        f"Ranges lack {millimetres(ranges['correction'])} ± {millimetres(ranges['sigma'])} mm, "
-        f"scan angles {1e3 * encoder['correction']:.2f} ± {1e3 * encoder['sigma']:.2f} mrad per "
-        "rad"
+        f"Ranges lack {millimetres(ranges['correction'])} ± {millimetres(ranges['sigma'])} mm"
+        f"{open_ranges}, scan angles {1e3 * encoder['correction']:.2f} ± "
+        f"{1e3 * encoder['sigma']:.2f} mrad per rad{open_encoder}"
     )
     if _is_off(errors):
         yield Statement("Scanner", "amber", f"{sentence}; the mounting is free of it.")

@@ -54,6 +54,21 @@ def test_what_ranges_or_encoder_lack_is_found_and_the_mounting_freed_of_it(range
     assert (errors[1] < 3 * freed.lsc.sigma).all()
     assert np.degrees(errors[1][3:].max()) < 0.02  # deg
     assert "The scanner itself is off" in freed.warnings[-1]
+    anew = freed.with_residuals(tied.ties.ties, tied.ties.used).ties.after
+    assert np.array_equal(freed.ties.after, anew) and not np.array_equal(tied.ties.after, anew)
+
+
+@pytest.mark.long
+def test_an_encoder_beyond_any_data_sheet_is_not_pulled_to_it():
+    "5 mrad per rad by 8 targets: within two sigmas, not determined, as the mounting is"
+    site = tied_site(2, targets=8, number=3)
+    matched, _ = distorted(site, 0.0, -0.005)
+    freed = with_scanner_errors(estimate_mounting(site.trajectory, [RECORDED], matched), matched)
+    lacks = freed.scanner
+    assert lacks.significant.tolist() == [False, True] and not lacks.determined[1]
+    assert abs(lacks.correction[1] + 0.005) < 2 * lacks.sigma[1]
+    assert (np.abs(freed.lsc.correction - site.lacks) < 2 * freed.lsc.sigma).all()
+    assert "mrad per rad (not determined)." in freed.warnings[-1]
 
 
 @pytest.mark.long

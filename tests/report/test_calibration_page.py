@@ -144,6 +144,14 @@ def test_a_scanner_that_is_off_is_amber():
         assert (row["rating"], row["sentence"]) == (rating, sentence + end)
 
 
+def test_a_scanner_error_that_is_not_determined_is_called_so():
+    "Significant, but with a sigma that no site should leave"
+    off = RANGES | {"significant": True, "determined": False}
+    content = calibrated() | {"scanner_errors": SCANNER | {"range_offset": off}}
+    (row,) = (r for r in calibration_screen(content, [])["statements"] if r["what"] == "Scanner")
+    assert row["sentence"].startswith("Ranges lack 12 ± 1.0 mm (not determined), scan angles 0.10")
+
+
 def test_what_the_drift_explains_between_passes_is_said_apart():
     "1.6 cm by the mounting that is written; 2 mm where the drift is written, too"
     away = {state: {"median": size} for state, size in (("before", 0.015), ("after", 0.016))}
