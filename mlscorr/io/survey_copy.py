@@ -107,7 +107,12 @@ def _listed(section):
 
 def _set_mounting(section, mounting, note):
     """Lever arm and boresight, and how well they are known."""
-    section["lever_arm"], section["boresight"] = mounting_values(mounting)
+    values = dict(zip(("lever_arm", "boresight"), mounting_values(mounting), strict=True))
+    if mounting.covariance is None:  # a calibration's sigmas hold together, measured ones apart
+        is_calibrated = section.pop("correlation", None) is not None
+        for key in [key for key in values if is_calibrated or values[key] != section[key]]:
+            section.pop(f"{key}_sigma", None)
+    section.update(values)
     if mounting.covariance is not None:
         _set_covariance(section, mounting.covariance)
         if isinstance(section, InlineTable):  # in which TOML has no comments

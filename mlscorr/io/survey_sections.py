@@ -108,7 +108,7 @@ class MountingSection(TomlSection):
 
 
 class CalibratedMountingSection(MountingSection):
-    """The same, and how well a calibration knows it, or a tape one of both."""
+    """The same, and how well a calibration knows it, or who measured either."""
 
     lever_arm_sigma: Annotated[list[Positive], Three] | None = None  # m
     boresight_sigma: Annotated[list[Positive], Three] | None = None  # deg: right, forward, up
@@ -126,14 +126,17 @@ class CalibratedMountingSection(MountingSection):
         return self
 
     def mounting(self) -> Mounting:
-        """The Mounting with its covariance, or with the sigmas of what was measured."""
+        """The Mounting with its covariance, and the sigmas of what was measured."""
         mounting, unknown = super().mounting(), [np.nan] * 3
         sigma = np.append(self.lever_arm_sigma or unknown, self.boresight_sigma or unknown)
         sigma[3:] = np.radians(sigma[3:])
+        if np.isnan(sigma).all():
+            return mounting
+        measured, correlation = sigma if self.correlation is None else None, self.correlation
         if np.isnan(sigma).any():
-            return mounting if np.isnan(sigma).all() else replace(mounting, measured=sigma)
-        correlation = np.eye(6) if self.correlation is None else np.array(self.correlation)
-        return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
+            return replace(mounting, measured=measured)
+        covariance = np.outer(sigma, sigma) * (np.eye(6) if correlation is None else correlation)
+        return replace(mounting, covariance=covariance, measured=measured)
 
 
 class ControlColumns(PlaceColumns):

@@ -246,10 +246,10 @@ class Mounting:
         R_L^P.
     covariance : (6, 6) array, optional
         Of the lever arm (m) and of a small rotation of the boresight about the body axes (rad), as
-        a calibration left it.
+        a calibration left it, or by both sigmas that were measured.
     measured : (6,) array, optional
-        One sigma of both where either was measured without a calibration; NaN for the other. Units:
-        m, rad.
+        One sigma of both where either was measured without a calibration; NaN for what was not.
+        Units: m, rad.
     """
 
     lever_arm: np.ndarray

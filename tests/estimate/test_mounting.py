@@ -27,6 +27,7 @@ from mlscorr.frames import (
 )
 from mlscorr.io.survey_copy import write_survey_copy
 from mlscorr.io.survey_file import read_survey_file
+from mlscorr.io.survey_sections import CalibratedMountingSection
 from mlscorr.pipeline.calibration import warn_of_scanners
 from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.simulate import Scenario, simulate
@@ -355,6 +356,38 @@ def test_a_sigma_says_in_the_file_what_it_rests_on(tmp_path):
     assert "lever_arm_sigma = [0.001, 0.001, 0.001]  # as the POS states\n" in new.read_text()
     write_survey_copy(new, old, tmp_path, [mounting])
     assert "lever_arm_sigma = [0.001, 0.001, 0.001]\n" in old.read_text()
+
+
+def test_sigmas_without_a_correlation_were_measured():
+    """Either or both are what a calibration starts from; those that a calibration wrote are not.
+
+    Both count in the sigmas of points, whoever found them.
+    """
+    arm, turn = [0.01, 0.02, 0.03], [0.5, 0.5, 1.0]
+    sigma = np.append(arm, np.radians(turn))
+    section = {"lever_arm": [0.1, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0]}
+    both = {"lever_arm_sigma": arm, "boresight_sigma": turn}
+    taped = CalibratedMountingSection(**section, lever_arm_sigma=arm).mounting()
+    assert np.allclose(prior_sigma(taped)[:3], arm) and taped.covariance is None
+    measured = CalibratedMountingSection(**section, **both).mounting()
+    assert np.allclose(prior_sigma(measured), sigma)
+    assert np.allclose(measured.covariance, np.diag(sigma**2))
+    written = CalibratedMountingSection(**section, **both, correlation=np.eye(6).tolist())
+    assert np.array_equal(prior_sigma(written.mounting()), prior_sigma(RECORDED))
+    assert np.allclose(written.mounting().covariance, measured.covariance)
+
+
+@pytest.mark.parametrize("correlation", [False, True])
+def test_a_changed_part_leaves_no_sigma_of_the_one_before(correlation, tmp_path):
+    "What a tape measured of the other part holds; a calibration's sigmas go with either"
+    old, new = tmp_path / "survey.toml", tmp_path / "new.toml"
+    lines = "lever_arm_sigma = [0.01, 0.01, 0.01]\nboresight_sigma = [0.1, 0.1, 0.1]\n"
+    lines += f"correlation = {np.eye(6).tolist()}\n" * correlation
+    old.write_text(SURVEY + lines)
+    turned = replace(RECORDED, boresight=Rotation.from_rotvec([0, 0, 0.01]) * RECORDED.boresight)
+    write_survey_copy(old, new, tmp_path, [turned])
+    left = {key for key in tomllib.loads(new.read_text())["mounting"] if key != "boresight"}
+    assert left == {"lever_arm"} | ({"lever_arm_sigma"} if not correlation else set())
 
 
 @pytest.mark.parametrize(
