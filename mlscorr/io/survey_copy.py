@@ -2,6 +2,7 @@
 
 import glob
 import os
+import warnings
 from collections.abc import Sequence
 from pathlib import Path, PurePath
 
@@ -73,7 +74,8 @@ def write_survey_copy(
         _set_trajectory(document, trajectory, sorted(set(control)))
     sections, notes = scanners or [document], notes or [""] * len(mountings)
     for section, mounting, note in zip(sections, mountings, notes, strict=bool(mountings)):
-        _set_mounting(section["mounting"], mounting, note)
+        is_inside = isinstance(section, InlineTable)  # where no comment can stand
+        _set_mounting(section["mounting"], mounting, "" if is_inside else note)
     Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
 
 
@@ -114,22 +116,24 @@ def _set_mounting(section, mounting, note):
             section.pop(f"{key}_sigma", None)
     section.update(values)
     if mounting.covariance is not None:
-        _set_covariance(section, mounting.covariance)
-        if isinstance(section, InlineTable):  # in which TOML has no comments
-            return
-        trivia = section["lever_arm_sigma"].trivia  # has the comment on sigmas that were there
-        trivia.comment_ws, trivia.comment = ("  ", f"# {note}") if note else ("", "")
+        sigma = _set_covariance(section, mounting.covariance)
+        is_line = isinstance(section, InlineTable)  # TOML has comments behind it alone
+        if note or not is_line:
+            trivia = section.trivia if is_line else sigma.trivia
+            trivia.comment_ws, trivia.comment = ("  ", f"# {note}") if note else ("", "")
 
 
 def _set_covariance(section, covariance):
-    """Sigmas to 0.01 mm and 1e-6 deg, and correlations to 1e-6."""
+    """Sigmas to 0.01 mm and 1e-6 deg, and correlations to 1e-6; the TOML item of the first."""
     sigma = np.sqrt(np.diag(covariance))
-    section["lever_arm_sigma"] = np.maximum(np.round(sigma[:3], 5), 1e-5).tolist()
+    first = tomlkit.item(np.maximum(np.round(sigma[:3], 5), 1e-5).tolist())
+    section["lever_arm_sigma"] = first
     section["boresight_sigma"] = np.maximum(np.round(np.degrees(sigma[3:]), 6), 1e-6).tolist()
     rows = tomlkit.array()
     for row in (covariance / np.outer(sigma, sigma)).round(6).clip(-1, 1).tolist():
         rows.add_line(row)
     section["correlation"] = rows.multiline(True)
+    return first
 
 
 def mounting_values(mounting: Mounting) -> tuple[list[float], list[float]]:
@@ -146,7 +150,8 @@ def mounting_values(mounting: Mounting) -> tuple[list[float], list[float]]:
     boresight : list of three float
         Units: deg.
     """
-    boresight = mounting.boresight.as_euler("xyz", degrees=True)
+    with warnings.catch_warnings(action="ignore"):  # of angles that are not unique: any will do
+        boresight = mounting.boresight.as_euler("xyz", degrees=True)
     lever_arm = np.round(mounting.lever_arm, 5) + 0.0
     return lever_arm.tolist(), (np.round(boresight, 6) + 0.0).tolist()
 

@@ -25,7 +25,7 @@ from mlscorr.frames import (
     mounting_partials,
     to_scanner,
 )
-from mlscorr.io.survey_copy import write_survey_copy
+from mlscorr.io.survey_copy import mounting_values, write_survey_copy
 from mlscorr.io.survey_file import read_survey_file
 from mlscorr.io.survey_sections import CalibratedMountingSection
 from mlscorr.pipeline.calibration import warn_of_scanners
@@ -583,12 +583,32 @@ def test_no_target_makes_a_mounting_worse_than_it_is_without_any(count):
     assert (estimate.sigma0 == 1.0) == (count < 2)
 
 
-def test_a_mounting_in_one_line_stays_readable(tmp_path):
-    "An inline table has no room for a comment: sigmas are written without one"
+@pytest.mark.parametrize(
+    ("lines", "has_room"),
+    [
+        ("mounting = {{ {}, {} }}", True),
+        ("mounting.{}\nmounting.{}", True),
+        ("scanner = [{{ files = ['a'], mounting = {{ {}, {} }} }}]", False),
+    ],
+)
+def test_a_mounting_in_one_line_stays_readable(lines, has_room, tmp_path):
+    "Sigmas are written, and behind the line what they rest on: TOML has no comment inside of it"
     old, new = tmp_path / "survey.toml", tmp_path / "new.toml"
     head, _, _ = SURVEY.partition("[mounting]")
-    line = "mounting = { lever_arm = [0.1, -0.6, 0.4], boresight = [90.0, 0.0, 35.0] }"
-    old.write_text(f"{line}\n{head}")
+    text = lines.format("lever_arm = [0.1, -0.6, 0.4]", "boresight = [90.0, 0.0, 35.0]")
+    old.write_text(f"{text}\n{head}")
     mounting = replace(RECORDED, covariance=1e-6 * np.eye(6))
     write_survey_copy(old, new, tmp_path, [mounting], notes=["as the POS states"])
-    assert tomllib.loads(new.read_text())["mounting"]["lever_arm_sigma"] == [0.001] * 3
+    content = tomllib.loads(new.read_text())
+    section = content if has_room else content["scanner"][0]
+    assert section["mounting"]["lever_arm_sigma"] == [0.001] * 3
+    assert ("  # as the POS states\n" in new.read_text()) == has_room
+
+
+def test_a_beam_along_the_vehicle_keeps_its_turn():
+    "At b = 90 deg many angles are one rotation: those that are written are it, without a warning"
+    boresight = Rotation.from_euler("xyz", [0.0, -90.0, 30.0], degrees=True)
+    with warnings.catch_warnings(action="error"):
+        angles = mounting_values(replace(RECORDED, boresight=boresight))[1]
+    turn = Rotation.from_euler("xyz", angles, degrees=True) * boresight.inv()
+    assert turn.magnitude() < 1e-8
