@@ -163,14 +163,14 @@ def _least_squares(equations, matched, recorded):
 
     Iterated, as a rotation is not linear; the targets are georeferenced anew each time.
     """
-    correction = np.zeros(6 * len(recorded))
+    correction, step = np.zeros(6 * len(recorded)), 0.0
     for _ in range(SETTINGS.iterations):
+        correction = correction + step  # here, so that the last equations are about the last one
         mountings, about = linearized(equations, matched, recorded, correction)
         solved = about.solve(None)
         step = combined_correction(correction, solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
             break
-        correction = correction + step
     # What the weak hold of the mounting adds to the redundancy is what it adds to the estimate
     held = solved.trend_covariance / _weak(recorded) ** 2
     observed, sigma0 = 3 * len(matched), 1.0

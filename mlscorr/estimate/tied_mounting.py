@@ -84,16 +84,16 @@ def previewed_mounting(
 
 def _converged(calibration, matched, ties, parameters) -> tuple[WeighedTies, np.ndarray]:
     """Equations with robust weights about the mountings that they give, and these' correction."""
-    recorded, targets = calibration.recorded, matched[calibration.used]
+    recorded, targets, step = calibration.recorded, matched[calibration.used], 0.0
     correction, equations = calibration.lsc.correction, calibration.equations
     for _ in range(SETTINGS.iterations):
+        correction = correction + step  # here, so that the last equations are about the last one
         mountings, about = linearized(equations, targets, recorded, correction)
         moved = georeferenced_ties(about, recorded, mountings, ties)
         tied = graduated(about, parameters, moved)
         step = combined_correction(correction, tied.solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
             break
-        correction = correction + step
     return tied, correction
 
 
