@@ -12,7 +12,11 @@ import numpy as np
 from mlscorr.correction import Correction
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.guards import Guards, few_targets, global_test_warnings
-from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS, MountingEstimate
+from mlscorr.estimate.mounting_estimate import (
+    MOUNTING_COMPONENTS,
+    MountingEstimate,
+    clock_warnings,
+)
 from mlscorr.estimate.posterior import Posterior
 from mlscorr.estimate.screening import Screening
 from mlscorr.estimate.signals import SignalParameters
@@ -139,21 +143,14 @@ class Calibration(Summary):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what this geometry can't tell, and what is doubtful."""
-        return (
-            *self.notes,
-            *_few_control(self.equations),
-            *_warnings(self.lsc, self.determined),
-            *global_test_warnings(self.guards),
-            *self.screening.warnings,
-            *(() if self.ties is None else self.ties.warnings),
-            *(() if self.scanner is None else self.scanner.warnings),
-        )
+        return *self.shared_warnings, *self.own_warnings
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
         """Those of the sentences that concern the one scanner."""
         scanner = () if self.scanner is None else self.scanner.warnings
-        return (*_warnings(self.lsc, self.determined), *scanner)
+        clock = clock_warnings(self.lsc, self.trajectory)
+        return (*_warnings(self.lsc, self.determined), *clock, *scanner)
 
     @property
     def shared_warnings(self) -> tuple[str, ...]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.survey import Mounting
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.survey import Mounting, Trajectory
 
 MOUNTING_COMPONENTS = (
     "lever arm right",
@@ -149,3 +150,23 @@ def combined_correction(correction: np.ndarray, more: np.ndarray) -> np.ndarray:
     first, second = correction.reshape(-1, 6), more.reshape(-1, 6)
     turn = Rotation.from_rotvec(second[:, 3:]) * Rotation.from_rotvec(first[:, 3:])
     return np.hstack([first[:, :3] + second[:, :3], turn.as_rotvec()]).ravel()
+
+
+def clock_warnings(estimate: MountingEstimate, trajectory: Trajectory) -> Iterator[str]:
+    """A sentence on the clock offset that a lever arm's lack forward may be as well.
+
+    Parameters
+    ----------
+    estimate : MountingEstimate
+        Of a scanner.
+    trajectory : Trajectory
+    """
+    lack = estimate.correction[1]
+    if abs(lack) > SETTINGS.setup_sigmas * estimate.sigma[1]:
+        way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+        speed = way @ (way / np.diff(trajectory.gps_time)) / way.sum()  # where it drives, no halts
+        yield (
+            f"The lever arm lacks {1e3 * lack:.0f} mm forward. A clock offset of "
+            f"{1e3 * abs(lack) / speed:.0f} ms at this survey's speed ({speed:.1f} m/s) looks the "
+            "same; other speeds tell them apart."
+        )

@@ -1,9 +1,12 @@
 "What a calibrated mounting says of itself."
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_mounting
+from mlscorr.estimate.mounting_estimate import MountingEstimate
 from mlscorr.frames import georeferenced_anew
 from tests.beds.tied_site import RECORDED, tied_site
 
@@ -27,6 +30,16 @@ def test_what_is_not_determined_is_named_with_its_sigma(calibration):
     assert calibration.determined.tolist() == [True, True, False, True, True, True]
     sigma = f"lever arm up (sigma {calibration.lsc.sigma[2]:.3f} m)"
     assert f"does not determine {sigma}:" in calibration.warnings[0]
+
+
+def test_a_lever_arm_that_lacks_something_forward_may_be_a_clock(calibration):
+    "10 cm at 5 m/s are 20 ms; up and right no clock explains, nor is what is within 3 sigmas said"
+    for axis, sigma, number in ((1, 0.01, 1), (1, 0.05, 0), (2, 0.01, 0)):
+        lacks, covariance = -0.1 * np.eye(6)[axis], sigma**2 * np.eye(6)
+        estimate = MountingEstimate.about([RECORDED], lacks, covariance, 1.0)
+        warnings = replace(calibration, lsc=estimate).warnings
+        sentence = "lacks -100 mm forward. A clock offset of 20 ms at this survey's speed (5.0 m/s)"
+        assert sum(sentence in warning for warning in warnings) == number
 
 
 def test_a_correction_by_least_squares_is_another_than_by_collocation(calibration):

@@ -44,7 +44,8 @@ def commanded(tmp_path_factory):
     "The command on a site of half a degree with 3 control points: what it lacks, its document"
     folder = tmp_path_factory.mktemp("half")
     lacks = site(folder / "survey", [0.3, -0.3, 0.4], 3)
-    command = [MLSCORR, "calibrate", folder / "survey", "-o", folder / "out", "--json"]
+    options = "--json", "--with-drift"
+    command = [MLSCORR, "calibrate", folder / "survey", "-o", folder / "out", *options]
     process = subprocess.run(map(str, command), capture_output=True, text=True)
     assert process.returncode == 0, process.stderr
     assert "that two passes both saw are used" in process.stderr
@@ -72,13 +73,15 @@ def test_planes_sharpen_what_few_targets_tell(commanded):
 
 
 def test_the_document_has_the_misfit_of_each_two_passes(commanded):
-    "Planes of both passes lie centimetres apart as recorded, and millimetres as calibrated"
+    "Planes of both passes lie centimetres apart as recorded, and millimetres without the drift too"
     ties = commanded[1]["ties"]
     assert ties["used"] > 0.9 * ties["n"] > 50
     (pair,) = ties["pairs"]
     assert pair["passes"] == [1, 2]
     assert pair["before"]["median"] > 0.02  # m
-    assert pair["after"]["median"] < 0.004  # m
+    assert pair["after"]["median"] < 0.5 * pair["before"]["median"]
+    (drifted,) = commanded[1]["with_drift"]["ties"]["pairs"]
+    assert drifted["after"]["median"] < 0.004  # m
 
 
 def test_degrees_of_boresight_are_found_without_any_control(uncontrolled):
@@ -89,9 +92,10 @@ def test_degrees_of_boresight_are_found_without_any_control(uncontrolled):
     assert np.abs(error[:2]).max() < 0.03  # m
     known = result.calibration.determined
     assert (np.abs(error) < 3 * sigma)[known].all()
-    ties = result.report()["ties"]
-    assert ties["before"]["median"] > 0.1  # m
-    assert ties["after"]["median"] < 0.005  # m
+    content = result.report(with_drift=True)
+    assert content["ties"]["before"]["median"] > 0.1  # m
+    assert content["ties"]["after"]["median"] < 0.01  # m
+    assert content["with_drift"]["ties"]["after"]["median"] < 0.005  # m
 
 
 def test_what_ties_alone_cannot_tell_is_named(uncontrolled):
