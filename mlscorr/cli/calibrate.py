@@ -41,10 +41,7 @@ def calibrate(
     say(f"Page:        {out / 'calibration.html'}")
     say(f"Survey:      {out / 'survey.toml'}, with the calibrated mounting")
     if not clouds:
-        say(
-            "Its clouds are still as the recorded mounting put them; --clouds writes them anew, "
-            "for mlscorr correct."
-        )
+        say("Its clouds are still as the recorded mounting put them; --clouds writes them anew.")
     if untouched := sum(file["untouched"] for file in content["files"]):
         say(f"{untouched} points outside the trajectory were left as they were.")
         raise typer.Exit(terminal.Exit.IN_PART)

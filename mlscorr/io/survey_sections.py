@@ -130,13 +130,12 @@ class CalibratedMountingSection(MountingSection):
         mounting, unknown = super().mounting(), [np.nan] * 3
         sigma = np.append(self.lever_arm_sigma or unknown, self.boresight_sigma or unknown)
         sigma[3:] = np.radians(sigma[3:])
-        if np.isnan(sigma).all():
-            return mounting
-        measured, correlation = sigma if self.correlation is None else None, self.correlation
+        if self.correlation is None and not np.isnan(sigma).all():
+            mounting = replace(mounting, measured=sigma)
         if np.isnan(sigma).any():
-            return replace(mounting, measured=measured)
-        covariance = np.outer(sigma, sigma) * (np.eye(6) if correlation is None else correlation)
-        return replace(mounting, covariance=covariance, measured=measured)
+            return mounting
+        correlation = np.eye(6) if self.correlation is None else np.array(self.correlation)
+        return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
 
 
 class ControlColumns(PlaceColumns):

@@ -603,7 +603,7 @@ def test_one_in_the_list_is_one_scanner(mounted):
 
 
 def test_a_measured_lever_arm_needs_no_boresight_sigma(mounted):
-    "Its sigmas alone are those of a measurement; with both they are a calibration's covariance"
+    "Sigmas of either are those of a measurement, and of both, which have a covariance as well"
     lever_arm = read_survey(mounted).scanners[0].mounting
     assert lever_arm.covariance is None
     assert lever_arm.measured[:3].tolist() == [0.01, 0.02, 0.03]
@@ -612,7 +612,8 @@ def test_a_measured_lever_arm_needs_no_boresight_sigma(mounted):
     assert np.degrees(read_survey(mounted).scanners[0].mounting.measured[5]) == pytest.approx(2.0)
     toml(mounted, "boresight_sigma", "lever_arm_sigma = [0.1, 0.1, 0.1]\nboresight_sigma")
     both = read_survey(mounted).scanners[0].mounting
-    assert both.measured is None and both.covariance.shape == (6, 6)
+    assert np.allclose(both.measured[:3], 0.1) and not np.isnan(both.measured).any()
+    assert np.allclose(both.covariance, np.diag(both.measured**2))
 
 
 @pytest.mark.parametrize(
