@@ -272,13 +272,9 @@ def scanner_partials(
 
 
 def partials_by_scanner(
-    partials: Callable,
-    trajectory: Trajectory,
-    mountings: Mapping[int, Mounting],
-    position: np.ndarray,
-    gps_time: np.ndarray,
-    scanner: np.ndarray,
-) -> np.ndarray:
+    partials: Callable, trajectory: Trajectory, mountings: Mapping[int, Mounting],
+    position: np.ndarray, gps_time: np.ndarray, scanner: np.ndarray,
+) -> np.ndarray:  # fmt: skip
     """Partial derivatives (n, 3, q k) by q unknowns of each of k scanners; zero by another's.
 
     Parameters

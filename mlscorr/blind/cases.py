@@ -22,12 +22,9 @@ TRUTH = ("truth.json", "truth.npz")
 
 
 def make_case(
-    folder: Path,
-    case: Case,
-    entropy: tuple[int, ...],
-    find_targets: Callable,
+    folder: Path, case: Case, entropy: tuple[int, ...], find_targets: Callable,
     mechanisms: Path | None = None,
-) -> dict:
+) -> dict:  # fmt: skip
     """Write the survey of a Case into a folder, without its truth; returns its label.
 
     Parameters

@@ -6,12 +6,9 @@ from mlscorr.cli.work import print_json, work
 
 
 def extract(
-    survey: SurveyArgument,
-    out: Out,
-    overwrite: Overwrite = False,
-    as_json: Json = False,
+    survey: SurveyArgument, out: Out, overwrite: Overwrite = False, as_json: Json = False,
     quiet: Quiet = False,
-) -> None:
+) -> None:  # fmt: skip
     """List all target-like objects in the cloud of a survey, with or without control points."""
     with work(out, overwrite, survey) as progress:
         from mlscorr.survey.summary import counted

@@ -6,12 +6,9 @@ from mlscorr.cli.work import print_json, work
 
 
 def plan(
-    survey: SurveyArgument,
-    out: Out,
-    overwrite: Overwrite = False,
-    as_json: Json = False,
+    survey: SurveyArgument, out: Out, overwrite: Overwrite = False, as_json: Json = False,
     quiet: Quiet = False,
-) -> None:
+) -> None:  # fmt: skip
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
     with work(out, overwrite, survey, planned=True):
         content = mlscorr.plan(mlscorr.read_survey(survey, planned=True)).write(out, overwrite)

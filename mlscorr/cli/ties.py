@@ -6,12 +6,9 @@ from mlscorr.cli.work import print_json, work
 
 
 def ties(
-    survey: SurveyArgument,
-    out: Out,
-    overwrite: Overwrite = False,
-    as_json: Json = False,
+    survey: SurveyArgument, out: Out, overwrite: Overwrite = False, as_json: Json = False,
     quiet: Quiet = False,
-) -> None:
+) -> None:  # fmt: skip
     """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)

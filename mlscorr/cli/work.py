@@ -12,12 +12,9 @@ from mlscorr.cli.terminal import Exit, deafen, exit_code
 
 @contextmanager
 def work(
-    out: Path,
-    overwrite: bool,
-    survey: Path | None = None,
-    inputs: Sequence[Path] = (),
+    out: Path, overwrite: bool, survey: Path | None = None, inputs: Sequence[Path] = (),
     planned: bool = False,
-) -> Iterator[Progress]:
+) -> Iterator[Progress]:  # fmt: skip
     """Check where results go, then show progress; bad data end with a sentence and their code.
 
     Parameters

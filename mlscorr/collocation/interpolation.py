@@ -63,14 +63,9 @@ def _gather(layout, i, states, same, following, columns, joint):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def interpolate(
-    nodes: np.ndarray,
-    clocks: np.ndarray,
-    layout: Layout,
-    states: np.ndarray,
-    same: np.ndarray,
-    following: np.ndarray,
-    epochs: Epochs,
-) -> None:
+    nodes: np.ndarray, clocks: np.ndarray, layout: Layout, states: np.ndarray, same: np.ndarray,
+    following: np.ndarray, epochs: Epochs,
+) -> None:  # fmt: skip
     """Fill epochs with trend plus signal.
 
     Parameters
@@ -142,14 +137,9 @@ def _gather_knots(pattern, nodes, slots, states, inverse, about):
 
 @njit(cache=True, nogil=True)
 def interpolate_knots(
-    layout: Layout,
-    knots: Knots,
-    pattern: Pattern,
-    cells: np.ndarray,
-    states: np.ndarray,
-    inverse: np.ndarray,
-    epochs: Epochs,
-) -> None:
+    layout: Layout, knots: Knots, pattern: Pattern, cells: np.ndarray, states: np.ndarray,
+    inverse: np.ndarray, epochs: Epochs,
+) -> None:  # fmt: skip
     """Fill epochs with trend plus signal.
 
     Parameters

@@ -164,13 +164,9 @@ def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(cache=True, nogil=True)
 def add_prior(
-    layout: Layout,
-    knots: Knots,
-    pattern: Pattern,
-    roots: np.ndarray,
-    carried: np.ndarray,
+    layout: Layout, knots: Knots, pattern: Pattern, roots: np.ndarray, carried: np.ndarray,
     values: np.ndarray,
-) -> None:
+) -> None:  # fmt: skip
     """Add L0 to the values of a matrix: of the knots, and one for each state of other nodes.
 
     Parameters

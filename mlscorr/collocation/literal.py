@@ -137,12 +137,9 @@ def _select(signal, epochs):
 
 
 def collocate_literal(
-    gps_time: np.ndarray,
-    misclosure: np.ndarray,
-    noise: Noise,
-    design: np.ndarray,
+    gps_time: np.ndarray, misclosure: np.ndarray, noise: Noise, design: np.ndarray,
     signals: Sequence[LiteralSignal],
-) -> LiteralCollocation:
+) -> LiteralCollocation:  # fmt: skip
     """Collocation as the paper prints it; for its experiments, not for surveys.
 
     Without signals, or with C0 = 0, it is least squares of the trend: with weights

@@ -23,13 +23,9 @@ from mlscorr.collocation.states import Layout
 
 
 def collocate(
-    gps_time: np.ndarray,
-    misclosure: np.ndarray,
-    noise: Noise,
-    design: np.ndarray,
-    signals: Sequence[Signal],
-    believed: np.ndarray | None = None,
-) -> Collocation:
+    gps_time: np.ndarray, misclosure: np.ndarray, noise: Noise, design: np.ndarray,
+    signals: Sequence[Signal], believed: np.ndarray | None = None,
+) -> Collocation:  # fmt: skip
     r"""Separate misclosures into trend, signal and noise.
 
     Solves l = A x + B s + n with one covariance function throughout (Mao et al. 2015,

@@ -97,12 +97,9 @@ class Collocation:
         return self._solved_columns @ np.append(-self.trend, 1.0)
 
     def predict(
-        self,
-        gps_time: np.ndarray,
-        design: np.ndarray,
-        mixings: Sequence[np.ndarray],
+        self, gps_time: np.ndarray, design: np.ndarray, mixings: Sequence[np.ndarray],
         clocks: Sequence[np.ndarray | None] | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
         """Trend plus signal at other epochs, with covariance  (Eq. 15).
 
         Parameters
@@ -129,12 +126,9 @@ class Collocation:
         return self._predictor(gps_time, clocks, design, mixings)
 
     def predict_mean(
-        self,
-        gps_time: np.ndarray,
-        design: np.ndarray,
-        mixings: Sequence[np.ndarray],
+        self, gps_time: np.ndarray, design: np.ndarray, mixings: Sequence[np.ndarray],
         clocks: Sequence[np.ndarray | None] | None = None,
-    ) -> np.ndarray:
+    ) -> np.ndarray:  # fmt: skip
         """The mean (q, r) of ``predict`` by itself, which sparse rows know without an inverse."""
         return replace(self, trend_root=None).predict(gps_time, design, mixings, clocks)[0]
 

@@ -81,15 +81,9 @@ def _increment(x, y, z, weight, a, b):
 
 @njit(cache=True, nogil=True)
 def fill_increments(
-    gps_time: np.ndarray,
-    xyz: np.ndarray,
-    epochs: np.ndarray,
-    step: float,
-    is_gap: np.ndarray,
-    table: np.ndarray,
-    increments: np.ndarray,
-    inside: np.ndarray,
-) -> None:
+    gps_time: np.ndarray, xyz: np.ndarray, epochs: np.ndarray, step: float, is_gap: np.ndarray,
+    table: np.ndarray, increments: np.ndarray, inside: np.ndarray,
+) -> None:  # fmt: skip
     """Fill increments (n, 3) and inside (n,) of points.
 
     Parameters
@@ -117,18 +111,10 @@ def fill_increments(
 
 @njit(cache=True, nogil=True)
 def move_integers(
-    xs: np.ndarray,
-    ys: np.ndarray,
-    zs: np.ndarray,
-    scale: np.ndarray,
-    offset: np.ndarray,
-    gps_time: np.ndarray,
-    constant: float,
-    epochs: np.ndarray,
-    step: float,
-    is_gap: np.ndarray,
+    xs: np.ndarray, ys: np.ndarray, zs: np.ndarray, scale: np.ndarray, offset: np.ndarray,
+    gps_time: np.ndarray, constant: float, epochs: np.ndarray, step: float, is_gap: np.ndarray,
     table: np.ndarray,
-) -> tuple[int, int]:
+) -> tuple[int, int]:  # fmt: skip
     """Move the scaled integers of points by whole increments, in place.
 
     Parameters

@@ -54,13 +54,9 @@ class Correction(Summary):
 
     @classmethod
     def by_pose_error(
-        cls,
-        trajectory: Trajectory,
-        pose: np.ndarray,
-        covariance: np.ndarray | None = None,
-        recorded_mounting: Mounting | None = None,
-        corrected_mounting: Mounting | None = None,
-    ) -> Correction:
+        cls, trajectory: Trajectory, pose: np.ndarray, covariance: np.ndarray | None = None,
+        recorded_mounting: Mounting | None = None, corrected_mounting: Mounting | None = None,
+    ) -> Correction:  # fmt: skip
         """The correction that takes a POS error away, and a mounting's if both are given.
 
         Parameters
@@ -140,13 +136,9 @@ class Correction(Summary):
         return PointCloud(np.add(cloud.xyz, moved, out=moved), cloud.gps_time, cloud.intensity)
 
     def shift_integers(
-        self,
-        xyz: np.ndarray | Sequence[np.ndarray],
-        scale: np.ndarray,
-        offset: np.ndarray,
-        gps_time: np.ndarray,
-        time_constant: float = 0.0,
-    ) -> int:
+        self, xyz: np.ndarray | Sequence[np.ndarray], scale: np.ndarray, offset: np.ndarray,
+        gps_time: np.ndarray, time_constant: float = 0.0,
+    ) -> int:  # fmt: skip
         """Correct the scaled integers of a LAS record in place, as x' = scale * X' + offset.
 
         Only whole increments are added, so that a correction of zero changes no bit.

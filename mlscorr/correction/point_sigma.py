@@ -94,13 +94,9 @@ class PointSigma:
         )
 
     def of_integers(
-        self,
-        xyz: np.ndarray | Sequence[np.ndarray],
-        scale: np.ndarray,
-        offset: np.ndarray,
-        gps_time: np.ndarray,
-        time_constant: float = 0.0,
-    ) -> np.ndarray:
+        self, xyz: np.ndarray | Sequence[np.ndarray], scale: np.ndarray, offset: np.ndarray,
+        gps_time: np.ndarray, time_constant: float = 0.0,
+    ) -> np.ndarray:  # fmt: skip
         """The same for the scaled integers of a LAS record, when they are corrected.
 
         Parameters

@@ -194,12 +194,9 @@ def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
 
 
 def apply_effects(
-    effects: Iterable[Effect],
-    stage: str,
-    value: Any,
-    reference: Reference,
+    effects: Iterable[Effect], stage: str, value: Any, reference: Reference,
     streams: dict[str, np.random.Generator],
-) -> Any:
+) -> Any:  # fmt: skip
     """A stage's value after all effects of that stage, in their fixed order.
 
     Parameters

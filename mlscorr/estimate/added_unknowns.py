@@ -39,12 +39,9 @@ class AddedUnknowns:
 
     @classmethod
     def of(
-        cls,
-        equations: Equations,
-        parameters: SignalParameters,
-        columns: np.ndarray,
+        cls, equations: Equations, parameters: SignalParameters, columns: np.ndarray,
         prior_sigma: np.ndarray,
-    ) -> AddedUnknowns:
+    ) -> AddedUnknowns:  # fmt: skip
         """Estimate the unknowns.
 
         Parameters

@@ -74,12 +74,9 @@ def _is_much_larger(sigma, other):
 
 
 def mounting_equations(
-    equations: Equations,
-    matched: Matched,
-    mountings: Sequence[Mounting],
-    corrected: np.ndarray,
+    equations: Equations, matched: Matched, mountings: Sequence[Mounting], corrected: np.ndarray,
     weak: np.ndarray,
-) -> Equations:
+) -> Equations:  # fmt: skip
     """The equations of what k mountings lack  (Eq. 16-18), from those of the POS error.
 
     Below the targets two epochs of three rows hold each mounting weakly.

@@ -98,14 +98,10 @@ def believed_mounting(
 
 
 def calibration_by(
-    trajectory: Trajectory,
-    recorded: Sequence[Mounting],
-    equations: Equations,
-    screening: Screening,
-    least_squares: tuple[np.ndarray, MountingEstimate],
-    used: np.ndarray,
+    trajectory: Trajectory, recorded: Sequence[Mounting], equations: Equations,
+    screening: Screening, least_squares: tuple[np.ndarray, MountingEstimate], used: np.ndarray,
     notes: tuple[str, ...],
-) -> Calibration:
+) -> Calibration:  # fmt: skip
     """The Calibration by equations, and the parameters that were chosen for them.
 
     Parameters

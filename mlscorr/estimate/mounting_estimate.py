@@ -59,12 +59,9 @@ class MountingEstimate:
 
     @classmethod
     def about(
-        cls,
-        recorded: Sequence[Mounting],
-        correction: np.ndarray,
-        covariance: np.ndarray,
+        cls, recorded: Sequence[Mounting], correction: np.ndarray, covariance: np.ndarray,
         sigma0: float,
-    ) -> MountingEstimate:
+    ) -> MountingEstimate:  # fmt: skip
         """The estimate by corrections of recorded mountings; the calibrated ones know their sigmas.
 
         Parameters

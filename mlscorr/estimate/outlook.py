@@ -41,12 +41,9 @@ class Outlook:
 
     @classmethod
     def of(
-        cls,
-        equations: Equations,
-        families: list[tuple[SignalParameters, float]],
-        rows: np.ndarray,
+        cls, equations: Equations, families: list[tuple[SignalParameters, float]], rows: np.ndarray,
         sights: list[list[int]],
-    ) -> Outlook:
+    ) -> Outlook:  # fmt: skip
         """Before any of them is observed.
 
         Parameters

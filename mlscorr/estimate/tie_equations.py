@@ -52,13 +52,9 @@ class TieEquations:
 
     @classmethod
     def of(
-        cls,
-        trajectory: Trajectory,
-        pos: Pos,
-        ties: Ties,
-        stated: StatedSigma,
+        cls, trajectory: Trajectory, pos: Pos, ties: Ties, stated: StatedSigma,
         mountings: Mapping[int, Mounting] | None = None,
-    ) -> TieEquations:
+    ) -> TieEquations:  # fmt: skip
         """The equations of ties.
 
         Parameters

@@ -148,15 +148,9 @@ class TargetRow:
 
     @classmethod
     def unobserved(
-        cls,
-        name: str,
-        pass_number: int | None,
-        role: str,
-        surveyed: np.ndarray,
-        reason: str,
-        scanned: bool = True,
-        gps_time: float | None = None,
-    ) -> TargetRow:
+        cls, name: str, pass_number: int | None, role: str, surveyed: np.ndarray, reason: str,
+        scanned: bool = True, gps_time: float | None = None,
+    ) -> TargetRow:  # fmt: skip
         """The row of a surveyed point that was not observed, or has an observation refused then."""
         nan = np.full(3, np.nan)
         vectors = {"observed": nan, "sigma": nan, "before": nan, "after": nan, "left_out": nan}

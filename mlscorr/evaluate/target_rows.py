@@ -13,12 +13,9 @@ from mlscorr.targets import Candidates, search_radius
 
 
 def surveyed_rows(
-    control: Matched,
-    check: Matched,
-    correction: Correcting,
-    outliers: Iterable[TargetTest],
+    control: Matched, check: Matched, correction: Correcting, outliers: Iterable[TargetTest],
     left_out: np.ndarray | None = None,
-) -> list[TargetRow]:
+) -> list[TargetRow]:  # fmt: skip
     """Rows of all observed points, control before check.
 
     Parameters
@@ -40,12 +37,9 @@ def surveyed_rows(
 
 
 def target_rows(
-    matched: Matched,
-    correction: Correcting,
-    role: str,
-    reasons: Sequence[str | None],
+    matched: Matched, correction: Correcting, role: str, reasons: Sequence[str | None],
     left_out: np.ndarray | None = None,
-) -> list[TargetRow]:
+) -> list[TargetRow]:  # fmt: skip
     """One row for each observation of some surveyed points.
 
     Parameters

@@ -24,16 +24,10 @@ LISTED = 1e-4  # probability from which on a pair is listed in the evidence
 
 
 def gap_document(
-    survey: Survey,
-    rows: Rows,
-    inference: Inference,
-    closure: Closure,
-    next_data: Sequence[NextData],
-    effects: Iterable[Effect],
-    left_out: Mapping[str, str],
-    warnings: Iterable[str],
-    absence: Absence,
-) -> dict:
+    survey: Survey, rows: Rows, inference: Inference, closure: Closure,
+    next_data: Sequence[NextData], effects: Iterable[Effect], left_out: Mapping[str, str],
+    warnings: Iterable[str], absence: Absence,
+) -> dict:  # fmt: skip
     """Content of gap.json.
 
     Parameters

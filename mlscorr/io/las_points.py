@@ -159,12 +159,9 @@ def decoding_points(layout: LasLayout, first: int, end: int) -> AbstractContextM
 
 
 def read_records(
-    layout: LasLayout,
-    chunk_size: int,
-    first: int = 0,
-    end: int | None = None,
+    layout: LasLayout, chunk_size: int, first: int = 0, end: int | None = None,
     is_brief: bool = False,
-) -> Iterator[np.ndarray]:
+) -> Iterator[np.ndarray]:  # fmt: skip
     """Records chunk by chunk, each in the memory of the one before.
 
     Parameters

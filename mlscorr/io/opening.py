@@ -11,12 +11,9 @@ from mlscorr.io.storage import asking, is_remote
 
 
 def open_file(
-    path: str | Path,
-    encoding: str | None = None,
-    newline: str | None = None,
-    errors: str = "strict",
-    is_scattered: bool = False,
-) -> Any:
+    path: str | Path, encoding: str | None = None, newline: str | None = None,
+    errors: str = "strict", is_scattered: bool = False,
+) -> Any:  # fmt: skip
     """A file open for reading, of text where its encoding is given; of a store by ranges.
 
     Parameters

@@ -21,15 +21,10 @@ PATHS = (("control", "file"), ("scene", "reference"))
 
 
 def write_survey_copy(
-    source: str | Path,
-    target: str | Path,
-    folder: str | Path,
-    mountings: Sequence[Mounting] = (),
-    clouds: Sequence[Sequence[str]] = (),
-    trajectory: str | None = None,
-    control: Sequence[str] = (),
-    notes: Sequence[str] = (),
-) -> None:
+    source: str | Path, target: str | Path, folder: str | Path, mountings: Sequence[Mounting] = (),
+    clouds: Sequence[Sequence[str]] = (), trajectory: str | None = None,
+    control: Sequence[str] = (), notes: Sequence[str] = (),
+) -> None:  # fmt: skip
     """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
 
     Parameters

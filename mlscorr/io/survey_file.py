@@ -244,12 +244,9 @@ def survey_toml(path: str | Path) -> Path:
 
 
 def cloud_file(
-    path: Path,
-    trajectory: Trajectory,
-    setting: str,
-    crs: str | None,
+    path: Path, trajectory: Trajectory, setting: str, crs: str | None,
     ids: tuple[int, ...] | None = None,
-) -> tuple[CloudFile, str]:
+) -> tuple[CloudFile, str]:  # fmt: skip
     """CloudFile of a path, and the sentence on its time system.
 
     Parameters

@@ -138,12 +138,9 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
 
 
 def own_clouds(
-    path: Path,
-    key: str,
-    patterns: Sequence[str] | None,
-    clouds: Sequence[CloudFile],
+    path: Path, key: str, patterns: Sequence[str] | None, clouds: Sequence[CloudFile],
     owner: str = "",
-) -> list[CloudFile]:
+) -> list[CloudFile]:  # fmt: skip
     """Those of a survey's clouds that patterns name; all without patterns.
 
     Parameters

@@ -92,15 +92,12 @@ def find_columns(
 
 
 def read_layout(
-    path: str | Path,
-    required: Sequence[str],
-    groups: Sequence[Sequence[str]],
-    names: Mapping[str, str],
-    lacking: Callable[[Collection[str]], list[str]],
+    path: str | Path, required: Sequence[str], groups: Sequence[Sequence[str]],
+    names: Mapping[str, str], lacking: Callable[[Collection[str]], list[str]],
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
     hints: Mapping[tuple[str, str], str] | None = None,
-) -> TableLayout:
+) -> TableLayout:  # fmt: skip
     """The layout of a table in our own columns, or of one as others write them.
 
     Parameters
@@ -198,13 +195,9 @@ def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
 
 
 def missing_sentence(
-    path: str | Path,
-    header: Sequence[str],
-    missing: Sequence[str],
-    used: Collection[str],
-    names: Mapping[str, str],
-    seeming: Mapping[str, str] | None = None,
-) -> str:
+    path: str | Path, header: Sequence[str], missing: Sequence[str], used: Collection[str],
+    names: Mapping[str, str], seeming: Mapping[str, str] | None = None,
+) -> str:  # fmt: skip
     """A sentence on columns that are missing, and on the one that may be meant, if one is like it.
 
     Parameters

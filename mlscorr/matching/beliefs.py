@@ -100,13 +100,9 @@ def transition(chain: Chain, start: int, end: int) -> np.ndarray:
 
 
 def build_chain(
-    observations: TargetObservations,
-    control: ControlPoints,
-    pose: Trajectory,
-    stated: StatedSigma,
-    pairs: CandidatePairs,
-    pos: Pos,
-) -> Chain:
+    observations: TargetObservations, control: ControlPoints, pose: Trajectory, stated: StatedSigma,
+    pairs: CandidatePairs, pos: Pos,
+) -> Chain:  # fmt: skip
     """Chain of observations in order of time.
 
     Parameters

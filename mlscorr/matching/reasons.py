@@ -103,12 +103,9 @@ class _Case:
 
 
 def explain(
-    observations: TargetObservations,
-    control: ControlPoints,
-    pairs: CandidatePairs,
-    decision: Decision,
-    search_radius: float,
-) -> tuple[tuple[Refusal, ...], list[str | None]]:
+    observations: TargetObservations, control: ControlPoints, pairs: CandidatePairs,
+    decision: Decision, search_radius: float,
+) -> tuple[tuple[Refusal, ...], list[str | None]]:  # fmt: skip
     """Say why control points have no observation, and observations no name.
 
     Parameters

@@ -29,13 +29,9 @@ SECRET = ("truth*", "key*")  # names of files that no diagnosis may see
 
 
 def make_blind(
-    out: Path,
-    cases: int,
-    seed: int,
-    workers: int,
-    mechanisms: Path | None = None,
+    out: Path, cases: int, seed: int, workers: int, mechanisms: Path | None = None,
     progress: Callable | None = None,
-) -> int:
+) -> int:  # fmt: skip
     """Make the surveys of a blind check: OUT/cases, seals.json (public) and key.json (labels).
 
     What was interrupted goes on where it stopped. Returns the number of cases that are there.

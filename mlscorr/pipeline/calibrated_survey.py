@@ -51,13 +51,9 @@ class CalibrationResult(Summary):
         raise NotImplementedError
 
     def write(
-        self,
-        out: str | Path,
-        with_drift: bool = False,
-        clouds: bool = False,
-        overwrite: bool = False,
-        progress: Callable | None = None,
-    ) -> dict:
+        self, out: str | Path, with_drift: bool = False, clouds: bool = False,
+        overwrite: bool = False, progress: Callable | None = None,
+    ) -> dict:  # fmt: skip
         """Write calibration.json, its page, and survey.toml with the calibrated mountings.
 
         Parameters

@@ -65,13 +65,9 @@ class ComparedRows:
 
 
 def compare_with_belief(
-    survey: Survey,
-    believed: Survey,
-    effects: tuple[Effect, ...],
-    library: Iterable[type[Effect]],
-    rng: np.random.Generator,
-    progress: Callable,
-) -> ComparedRows:
+    survey: Survey, believed: Survey, effects: tuple[Effect, ...], library: Iterable[type[Effect]],
+    rng: np.random.Generator, progress: Callable,
+) -> ComparedRows:  # fmt: skip
     """ComparedRows against what is believed; the simulator runs again on the survey's own pulses.
 
     Parameters
@@ -111,13 +107,9 @@ def _loss(effects):
 
 
 def compare_with_clouds(
-    survey: Survey,
-    believed: Survey,
-    folders: Sequence[Path],
-    library: Iterable[type[Effect]],
-    rng: np.random.Generator,
-    progress: Callable,
-) -> ComparedRows:
+    survey: Survey, believed: Survey, folders: Sequence[Path], library: Iterable[type[Effect]],
+    rng: np.random.Generator, progress: Callable,
+) -> ComparedRows:  # fmt: skip
     """ComparedRows against simulated clouds: those of the first folder.
 
     What a second folder's differ by is what the simulator's next run changed.

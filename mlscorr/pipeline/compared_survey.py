@@ -104,12 +104,9 @@ class ComparedSurvey(Summary):
         return [(title,), ("method", "east", "north", "height", ""), *rows]
 
     def write(
-        self,
-        out: str | Path,
-        clouds: Sequence[str] = (),
-        overwrite: bool = False,
+        self, out: str | Path, clouds: Sequence[str] = (), overwrite: bool = False,
         progress: Callable | None = None,
-    ) -> dict:
+    ) -> dict:  # fmt: skip
         """Write compare.json and compare.html, and the clouds as some methods correct them.
 
         Parameters

@@ -146,14 +146,9 @@ class CorrectedSurvey(Summary):
         return [(self.survey.name,), ("RMSE of the misclosures",), *rows]
 
     def write(
-        self,
-        out: str | Path,
-        overwrite: bool = False,
-        progress: Callable | None = None,
-        sigma: bool = False,
-        page: bool = True,
-        trajectories: Sequence[str] = (),
-    ) -> dict:
+        self, out: str | Path, overwrite: bool = False, progress: Callable | None = None,
+        sigma: bool = False, page: bool = True, trajectories: Sequence[str] = (),
+    ) -> dict:  # fmt: skip
         """Write corrected clouds, trajectory, targets and report into a folder.
 
         Parameters
@@ -198,13 +193,9 @@ class CorrectedSurvey(Summary):
         return span, self.estimate.support
 
     def write_beside(
-        self,
-        folder: Path,
-        written: WrittenClouds,
-        progress: Callable | None = None,
-        page: bool = True,
-        trajectories: Sequence[str] = (),
-    ) -> dict:
+        self, folder: Path, written: WrittenClouds, progress: Callable | None = None,
+        page: bool = True, trajectories: Sequence[str] = (),
+    ) -> dict:  # fmt: skip
         """Write all but the clouds into a folder that is there, as ``write`` does."""
         from mlscorr.report.headline import first_screen
 

@@ -36,14 +36,10 @@ STEPS = 5  # of the progress beside reading: the inference, closure, plan
 
 
 def diagnose(
-    survey: Survey,
-    simulator: Simulator | None = None,
-    library: Iterable[type[Effect]] | None = None,
-    rng: np.random.Generator | None = None,
-    progress: Callable | None = None,
-    simulated: Sequence[Path] = (),
-    costs: Costs | None = None,
-) -> DiagnosedSurvey:
+    survey: Survey, simulator: Simulator | None = None,
+    library: Iterable[type[Effect]] | None = None, rng: np.random.Generator | None = None,
+    progress: Callable | None = None, simulated: Sequence[Path] = (), costs: Costs | None = None,
+) -> DiagnosedSurvey:  # fmt: skip
     """Find where a survey differs from its simulation, why, and how far the gap can be closed.
 
     Parameters

@@ -113,12 +113,9 @@ def _checked(survey, targets, candidates, near):
 
 
 def fit_while_reading(
-    survey: Survey,
-    read: Callable,
-    rng: np.random.Generator | None = None,
-    progress: Callable | None = None,
-    settle: Callable | None = None,
-) -> tuple[list[PassTarget], Candidates, NearPoints]:
+    survey: Survey, read: Callable, rng: np.random.Generator | None = None,
+    progress: Callable | None = None, settle: Callable | None = None,
+) -> tuple[list[PassTarget], Candidates, NearPoints]:  # fmt: skip
     """Fit targets near surveyed points while the clouds are read.
 
     Parameters
@@ -243,12 +240,9 @@ def find_control(
 
 
 def find_or_compare_surfaces(
-    survey: Survey,
-    read: Callable = read_chunks,
-    settle: Callable | None = None,
-    progress: Callable | None = None,
-    rng: np.random.Generator | None = None,
-) -> tuple[Finding, tuple[str, ...]]:
+    survey: Survey, read: Callable = read_chunks, settle: Callable | None = None,
+    progress: Callable | None = None, rng: np.random.Generator | None = None,
+) -> tuple[Finding, tuple[str, ...]]:  # fmt: skip
     """Find the targets where there are any: a diagnosis can do without.
 
     Parameters

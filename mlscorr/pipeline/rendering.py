@@ -20,14 +20,10 @@ TIME_DIGITS = 1e-6  # s, to which a corrected trajectory is written
 
 
 def render(
-    survey: Survey,
-    out: str | Path,
-    corrected: str | Path | None = None,
-    size: tuple[int, int] = PAGE,
-    overwrite: bool = False,
-    progress: Callable | None = None,
+    survey: Survey, out: str | Path, corrected: str | Path | None = None,
+    size: tuple[int, int] = PAGE, overwrite: bool = False, progress: Callable | None = None,
     **options: Any,
-) -> dict:
+) -> dict:  # fmt: skip
     """Write before/after PNGs of a survey into a folder.
 
     Parameters

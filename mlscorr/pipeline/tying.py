@@ -51,12 +51,9 @@ LEFT_OUT = (
 
 
 def estimate_survey(
-    survey: Survey,
-    order: int,
-    ties: TieUse | None = None,
-    rng: np.random.Generator | None = None,
+    survey: Survey, order: int, ties: TieUse | None = None, rng: np.random.Generator | None = None,
     progress: Callable | None = None,
-) -> tuple[Survey, Matched, Matched, Finding, Estimate]:
+) -> tuple[Survey, Matched, Matched, Finding, Estimate]:  # fmt: skip
     """Read a survey's clouds once, and estimate the POS error from all that is in them.
 
     Parameters

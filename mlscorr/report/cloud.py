@@ -49,12 +49,9 @@ class CloudViews:
 
 
 def view_cloud(
-    survey: Survey,
-    correction: Correction,
-    targets: list[TargetRow],
-    progress: Progress,
+    survey: Survey, correction: Correction, targets: list[TargetRow], progress: Progress,
     ties: TieResiduals | None = None,
-) -> CloudViews:
+) -> CloudViews:  # fmt: skip
     """Draw a cloud before and after its correction, in one pass over it and flat memory.
 
     Parameters

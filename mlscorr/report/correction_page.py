@@ -45,14 +45,10 @@ WORDS = {
 
 
 def write_report(
-    path: str | Path,
-    survey: Survey,
-    correction: Correction,
-    report: CorrectionReport,
-    views: CloudViews | None = None,
-    fitted: dict[tuple[int, float], FittedTarget] | None = None,
+    path: str | Path, survey: Survey, correction: Correction, report: CorrectionReport,
+    views: CloudViews | None = None, fitted: dict[tuple[int, float], FittedTarget] | None = None,
     ties: TieResiduals | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Write the self-contained page of a correction.
 
     Parameters

@@ -120,13 +120,9 @@ class Ties(Columns):
 
     @classmethod
     def between(
-        cls,
-        features: TieFeatures,
-        pairs: np.ndarray,
-        direction: np.ndarray,
-        variance: np.ndarray,
+        cls, features: TieFeatures, pairs: np.ndarray, direction: np.ndarray, variance: np.ndarray,
         correction: np.ndarray | None = None,
-    ) -> Ties:
+    ) -> Ties:  # fmt: skip
         """The ties of pairs of features along directions.
 
         Parameters

@@ -43,14 +43,9 @@ class Assessment:
 
 
 def assess(
-    beams: tuple[np.ndarray, np.ndarray, np.ndarray],
-    outline: Outline,
-    kind: str,
-    seed: Seed,
-    echoes: Echoes,
-    blur: float,
-    hidden: bool = False,
-) -> Assessment:
+    beams: tuple[np.ndarray, np.ndarray, np.ndarray], outline: Outline, kind: str, seed: Seed,
+    echoes: Echoes, blur: float, hidden: bool = False,
+) -> Assessment:  # fmt: skip
     """Assess an outline.
 
     Parameters

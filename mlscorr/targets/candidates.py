@@ -120,13 +120,9 @@ class PointsInBalls:
 
 
 def collect(
-    survey: Survey,
-    read: Callable,
-    fit: Callable,
-    count: Callable,
-    settled: Callable,
+    survey: Survey, read: Callable, fit: Callable, count: Callable, settled: Callable,
     progress: Callable,
-) -> Candidates:
+) -> Candidates:  # fmt: skip
     """Stream a survey's cloud files and hand on the points near each of its surveyed points.
 
     Memory does not grow with a file, as long as its points come about in order of time: a surveyed

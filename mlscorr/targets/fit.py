@@ -87,15 +87,10 @@ class FittedTarget(Centre):
 
 
 def fit_targets(
-    cloud: PointCloud,
-    path: ScannerPath,
-    shapes: Sequence[tuple[str, float | None]],
-    scanner: Scanner,
-    rng: np.random.Generator,
-    region: BrightRegion | None = None,
-    origin: np.ndarray | None = None,
-    known: Sequence[FittedTarget] = (),
-) -> list[FittedTarget]:
+    cloud: PointCloud, path: ScannerPath, shapes: Sequence[tuple[str, float | None]],
+    scanner: Scanner, rng: np.random.Generator, region: BrightRegion | None = None,
+    origin: np.ndarray | None = None, known: Sequence[FittedTarget] = (),
+) -> list[FittedTarget]:  # fmt: skip
     """Fit targets of the given shapes in one piece of cloud of one pass and visit.
 
     Parameters

@@ -63,16 +63,9 @@ class Outline:
 
 
 def fit_outline(
-    points: np.ndarray,
-    state: np.ndarray,
-    kind: str,
-    size: Size,
-    blur: float,
-    start: np.ndarray,
-    by_edges: bool = False,
-    ring: bool = False,
-    rough: bool = False,
-) -> Outline:
+    points: np.ndarray, state: np.ndarray, kind: str, size: Size, blur: float, start: np.ndarray,
+    by_edges: bool = False, ring: bool = False, rough: bool = False,
+) -> Outline:  # fmt: skip
     """Fit an outline to beams that crossed its plane.
 
     Parameters

@@ -12,14 +12,10 @@ _, POLE, LINE, DASH = range(len(TIE_KINDS))
 
 
 def candidate_pairs(
-    features: TieFeatures,
-    correction: np.ndarray,
-    sigma: np.ndarray,
-    radius: float,
-    shift: np.ndarray | None = None,
-    pause: float = SETTINGS.pause,
+    features: TieFeatures, correction: np.ndarray, sigma: np.ndarray, radius: float,
+    shift: np.ndarray | None = None, pause: float = SETTINGS.pause,
     angle: float = SETTINGS.parallel,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Pairs (k, 2) of parallel features within their gates, and distances (k,) in such units.
 
     The earlier visit's stands first. Of each visit some nearest count, of either view.

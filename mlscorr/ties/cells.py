@@ -52,18 +52,10 @@ def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
 
 @njit(cache=True)
 def add_points(
-    xyz: np.ndarray,
-    gps_time: np.ndarray,
-    begin: int,
-    grid: np.ndarray,
-    passes: np.ndarray,
-    group: int,
-    starts: np.ndarray,
-    table: np.ndarray,
-    keys: np.ndarray,
-    moments: np.ndarray,
+    xyz: np.ndarray, gps_time: np.ndarray, begin: int, grid: np.ndarray, passes: np.ndarray,
+    group: int, starts: np.ndarray, table: np.ndarray, keys: np.ndarray, moments: np.ndarray,
     count: int,
-) -> tuple[int, int]:
+) -> tuple[int, int]:  # fmt: skip
     """Add points to the moments of their cells, until all are added or no row is left.
 
     Parameters

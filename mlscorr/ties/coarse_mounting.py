@@ -15,12 +15,9 @@ from mlscorr.ties.thinning import some_blocks
 
 
 def coarse_mounting(
-    features: TieFeatures,
-    trajectory: Trajectory,
-    mountings: Sequence[Mounting],
-    sigma: np.ndarray,
+    features: TieFeatures, trajectory: Trajectory, mountings: Sequence[Mounting], sigma: np.ndarray,
     radius: float,
-) -> tuple[Mounting, ...]:
+) -> tuple[Mounting, ...]:  # fmt: skip
     """Mountings of k scanners that put the planes of all visits on each other.
 
     One lever arm and one boresight of each scanner for the whole survey, and a shift of each pass,

@@ -12,13 +12,9 @@ from mlscorr.ties.thinning import direction_class, integer_hash, kind_number
 
 
 def pair_features(
-    features: TieFeatures,
-    correction: np.ndarray,
-    sigma: np.ndarray,
-    radius: float,
-    turned: np.ndarray | None = None,
-    pause: float = SETTINGS.pause,
-) -> Ties:
+    features: TieFeatures, correction: np.ndarray, sigma: np.ndarray, radius: float,
+    turned: np.ndarray | None = None, pause: float = SETTINGS.pause,
+) -> Ties:  # fmt: skip
     """Ties between features of two visits, or of two scanners that saw a thing on the same pass.
 
     A feature has at most one partner in each other pass of each scanner, one in its own at another

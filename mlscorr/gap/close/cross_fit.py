@@ -47,13 +47,9 @@ class CrossFit:
 
 
 def cross_fitted(
-    observations: Observations,
-    model: ErrorModel,
-    fold: np.ndarray,
-    number: int,
-    columns: np.ndarray,
-    residual: np.ndarray,
-) -> np.ndarray:
+    observations: Observations, model: ErrorModel, fold: np.ndarray, number: int,
+    columns: np.ndarray, residual: np.ndarray,
+) -> np.ndarray:  # fmt: skip
     """Sizes (f + 1, p) of columns by all folds but each, and last by all.
 
     Parameters

@@ -89,14 +89,9 @@ def predict_whole(case: FoundCause, simulated: Simulated) -> Predicted:
 
 
 def make_folds(
-    case: FoundCause,
-    whole: Predicted,
-    observations: Observations,
-    model: ErrorModel,
-    simulated: Simulated,
-    rng: np.random.Generator,
-    progress: Callable[[int], None] | None = None,
-) -> Folds:
+    case: FoundCause, whole: Predicted, observations: Observations, model: ErrorModel,
+    simulated: Simulated, rng: np.random.Generator, progress: Callable[[int], None] | None = None,
+) -> Folds:  # fmt: skip
     """Folds for a cause.
 
     Parameters

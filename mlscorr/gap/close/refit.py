@@ -11,14 +11,9 @@ from mlscorr.targets import SETTINGS as TARGETS
 
 
 def refit_targets(
-    residual: np.ndarray,
-    rows: Rows,
-    survey: Survey,
-    beams: Beams,
-    views: np.ndarray,
-    simulated: tuple,
-    rng: np.random.Generator,
-) -> None:
+    residual: np.ndarray, rows: Rows, survey: Survey, beams: Beams, views: np.ndarray,
+    simulated: tuple, rng: np.random.Generator,
+) -> None:  # fmt: skip
     """Fill the residuals of target rows: where the extraction finds the simulated targets.
 
     Parameters

@@ -94,12 +94,9 @@ def sightings_of(rows: Rows, finding: Any) -> list[Sighting]:
 
 
 def board_of(
-    target: FittedTarget,
-    origin: np.ndarray,
-    bright: float = 1.0,
-    dark: float = 0.0,
+    target: FittedTarget, origin: np.ndarray, bright: float = 1.0, dark: float = 0.0,
     speckle: float = 0.0,
-) -> Boards:
+) -> Boards:  # fmt: skip
     """Boards of one FittedTarget.
 
     Parameters

@@ -102,15 +102,9 @@ class SystematicGap:
 
     @classmethod
     def of(
-        cls,
-        observations: Observations,
-        model: ErrorModel,
-        table: ColumnTable,
-        residual: np.ndarray,
-        folds: Folds,
-        used: np.ndarray,
-        among: np.ndarray,
-    ) -> SystematicGap:
+        cls, observations: Observations, model: ErrorModel, table: ColumnTable,
+        residual: np.ndarray, folds: Folds, used: np.ndarray, among: np.ndarray,
+    ) -> SystematicGap:  # fmt: skip
         """Of some observations.
 
         Parameters

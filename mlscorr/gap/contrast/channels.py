@@ -206,12 +206,9 @@ def _of_means(channel, block, real, simulated, splits, weights):
 
 
 def _dropout(
-    survey: Survey,
-    patches: Patches | None,
-    simulated: Patches | None,
-    loss: float | None,
+    survey: Survey, patches: Patches | None, simulated: Patches | None, loss: float | None,
     rng: np.random.Generator,
-) -> Contrast | Measure:
+) -> Contrast | Measure:  # fmt: skip
     """Beams without a return, between those of a scan line that have one."""
     if patches is None or not patches.fired.any():
         return Contrast("dropout", SILENT["pulses"])

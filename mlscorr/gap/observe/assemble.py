@@ -10,22 +10,12 @@ from mlscorr.survey import Survey
 
 
 def assemble(
-    survey: Survey,
-    channel: str | list[str] | np.ndarray,
-    item: np.ndarray,
-    gps_time: np.ndarray,
-    position: np.ndarray,
-    direction: np.ndarray,
-    residual: np.ndarray,
-    noise: np.ndarray,
-    points: np.ndarray,
-    pulses: SamplePulses,
-    pass_number: np.ndarray,
-    gps_time_2: np.ndarray | None = None,
-    survey_item: np.ndarray | None = None,
-    survey_factor: np.ndarray | None = None,
-    believed: np.ndarray | None = None,
-) -> Rows:
+    survey: Survey, channel: str | list[str] | np.ndarray, item: np.ndarray, gps_time: np.ndarray,
+    position: np.ndarray, direction: np.ndarray, residual: np.ndarray, noise: np.ndarray,
+    points: np.ndarray, pulses: SamplePulses, pass_number: np.ndarray,
+    gps_time_2: np.ndarray | None = None, survey_item: np.ndarray | None = None,
+    survey_factor: np.ndarray | None = None, believed: np.ndarray | None = None,
+) -> Rows:  # fmt: skip
     """Rows of a survey, with partials and covariates.
 
     Parameters
@@ -60,14 +50,9 @@ def _partials(survey, position, gps_time, direction):
 
 
 def sample_pulses(
-    survey: Survey,
-    item: np.ndarray,
-    weight: np.ndarray,
-    xyz: np.ndarray,
-    gps_time: np.ndarray,
-    intensity: np.ndarray,
-    normal: np.ndarray,
-) -> SamplePulses:
+    survey: Survey, item: np.ndarray, weight: np.ndarray, xyz: np.ndarray, gps_time: np.ndarray,
+    intensity: np.ndarray, normal: np.ndarray,
+) -> SamplePulses:  # fmt: skip
     """Pulses that made points on surfaces.
 
     Parameters

@@ -48,14 +48,9 @@ def to_scanner_or_nan(survey: Survey, xyz: np.ndarray, gps_time: np.ndarray) -> 
 
 
 def covariates(
-    survey: Survey,
-    gps_time: np.ndarray,
-    position: np.ndarray,
-    pulses: SamplePulses,
-    item: np.ndarray,
-    pass_number: np.ndarray,
-    direction: np.ndarray,
-) -> dict[str, np.ndarray]:
+    survey: Survey, gps_time: np.ndarray, position: np.ndarray, pulses: SamplePulses,
+    item: np.ndarray, pass_number: np.ndarray, direction: np.ndarray,
+) -> dict[str, np.ndarray]:  # fmt: skip
     """Covariates (m,) of items or rows by their names; see Rows.
 
     Parameters

@@ -46,13 +46,9 @@ class Pairing:
 
 
 def build_rows(
-    survey: Survey,
-    matched: TargetObservations,
-    candidates: Candidates,
-    patches: Patches | None,
-    limit: int = SETTINGS.patches,
-    correction: Correction | None = None,
-) -> Pairing:
+    survey: Survey, matched: TargetObservations, candidates: Candidates, patches: Patches | None,
+    limit: int = SETTINGS.patches, correction: Correction | None = None,
+) -> Pairing:  # fmt: skip
     """Compare a survey with what its simulator believes: targets, surfaces, channels.
 
     The believed simulation puts targets where they were surveyed, surfaces where the reference

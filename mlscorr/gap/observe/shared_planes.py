@@ -13,12 +13,9 @@ from mlscorr.survey import Survey
 
 
 def shared_rows(
-    survey: Survey,
-    patches: Patches,
-    rng: np.random.Generator,
-    limit: int = SETTINGS.patches // 2,
+    survey: Survey, patches: Patches, rng: np.random.Generator, limit: int = SETTINGS.patches // 2,
     correction: Correction | None = None,
-) -> Rows | None:
+) -> Rows | None:  # fmt: skip
     """Rows of the planes that were seen twice, or None where there are none.
 
     The residual is how far the earlier look lies from the later one, along their mean normal.

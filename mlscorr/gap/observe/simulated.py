@@ -97,13 +97,9 @@ class SimulatedClouds:
 
 
 def rows_against(
-    survey: Survey,
-    matched: TargetObservations,
-    candidates: Candidates,
-    patches: Patches | None,
-    simulated: SimulatedClouds,
-    correction: Correction | None = None,
-) -> tuple[Rows, str]:
+    survey: Survey, matched: TargetObservations, candidates: Candidates, patches: Patches | None,
+    simulated: SimulatedClouds, correction: Correction | None = None,
+) -> tuple[Rows, str]:  # fmt: skip
     """Rows of observed minus simulated, NaN where nothing is paired, and a sentence on the pairs.
 
     Parameters

@@ -71,12 +71,9 @@ def additions(rows: Rows, survey: Survey) -> dict[str, tuple[Rows, Survey]]:
 
 
 def next_data(
-    rows: Rows,
-    survey: Survey,
-    kinds: Iterable[type[Effect]],
-    effects: Iterable[str],
+    rows: Rows, survey: Survey, kinds: Iterable[type[Effect]], effects: Iterable[str],
     compared: Separability,
-) -> tuple[NextData, ...]:
+) -> tuple[NextData, ...]:  # fmt: skip
     """Which additions tell effects apart that this survey can't, best first.
 
     Parameters

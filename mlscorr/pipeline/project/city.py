@@ -79,13 +79,10 @@ def in_turn(inputs: Iterable[AreaInput]) -> list[list[AreaResult]]:
 
 
 def project_drives(
-    drives: Sequence[FoundDrive],
-    order: int,
-    origin: np.ndarray,
-    with_ties: bool,
+    drives: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool,
     work: Callable[[Iterable[AreaInput]], list[list[AreaResult]]] = in_turn,
     limit: int = SETTINGS.area_seconds,
-) -> Iterator[tuple[CorrectedSurvey, DriveState]]:
+) -> Iterator[tuple[CorrectedSurvey, DriveState]]:  # fmt: skip
     """The results of all drives.
 
     Parameters
@@ -113,12 +110,9 @@ def project_drives(
 
 
 def drives_by_areas(
-    drives: Sequence[FoundDrive],
-    areas: Sequence[Area],
-    order: int,
-    origin: np.ndarray,
+    drives: Sequence[FoundDrive], areas: Sequence[Area], order: int, origin: np.ndarray,
     work: Callable[[Iterable[AreaInput]], list[list[AreaResult]]] = in_turn,
-) -> Iterator[tuple[CorrectedDrive, DriveState]]:
+) -> Iterator[tuple[CorrectedDrive, DriveState]]:  # fmt: skip
     """The results of drives, each merged of those of its pieces.
 
     Parameters

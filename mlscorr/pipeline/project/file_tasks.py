@@ -133,14 +133,9 @@ def _kept(folder: Path, kind: str, key: str) -> Any:
 
 
 def find(
-    file: CloudFile,
-    folder: Path,
-    drive: str,
-    identity: FileIdentity,
-    surveyed: ControlPoints,
-    origin: np.ndarray,
-    with_ties: bool,
-) -> FileFinding:
+    file: CloudFile, folder: Path, drive: str, identity: FileIdentity, surveyed: ControlPoints,
+    origin: np.ndarray, with_ties: bool,
+) -> FileFinding:  # fmt: skip
     """What a cloud file holds.
 
     Parameters
@@ -175,13 +170,9 @@ def _check_same(path, identity):
 
 
 def write(
-    folder: Path,
-    motions: tuple[str, ...],
-    path: Path,
-    identity: FileIdentity,
-    target: Path,
+    folder: Path, motions: tuple[str, ...], path: Path, identity: FileIdentity, target: Path,
     with_sigma: bool,
-) -> Written:
+) -> Written:  # fmt: skip
     """Write the corrected copy of a file, whole or not at all.
 
     Parameters

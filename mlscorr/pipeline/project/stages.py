@@ -228,12 +228,9 @@ def _share_near(survey, points, box):
 
 
 def cloud_tasks(
-    store: TaskStore,
-    drives: Sequence[PlannedDrive],
-    motions: Mapping[str, str],
-    out: Path,
+    store: TaskStore, drives: Sequence[PlannedDrive], motions: Mapping[str, str], out: Path,
     with_sigma: bool,
-) -> list[tuple[Task, list[str]]]:
+) -> list[tuple[Task, list[str]]]:  # fmt: skip
     """Tasks that write corrected clouds, each with the names of the drives whose points it holds.
 
     Parameters

@@ -25,16 +25,11 @@ ENGINES = ("zbuffer", "open3d")
 
 
 def draw(
-    survey: Survey,
-    correction: Correction,
-    targets: list[TargetRow],
-    options: PictureOptions,
-    views: Sequence[str] = VIEWS,
-    engine: str = "zbuffer",
-    chunks: Callable[[], Iterable[PointCloud]] | None = None,
-    progress: Callable | None = None,
+    survey: Survey, correction: Correction, targets: list[TargetRow], options: PictureOptions,
+    views: Sequence[str] = VIEWS, engine: str = "zbuffer",
+    chunks: Callable[[], Iterable[PointCloud]] | None = None, progress: Callable | None = None,
     ties: TieResiduals | None = None,
-) -> Iterator[Picture]:
+) -> Iterator[Picture]:  # fmt: skip
     """Draw a recorded survey before and after a correction, by the same cameras and colours.
 
     The cloud is streamed in flat memory: once to see where to look, and once to draw.

@@ -14,12 +14,9 @@ CHILD = Path(__file__).with_name("open3d_child.py")
 
 
 def draw_pair(
-    canvases: tuple[Canvas, Canvas],
-    colours: list[np.ndarray],
-    point_size: float,
-    reference: str | Path | None = None,
-    timeout: float = SETTINGS.open3d_timeout,
-) -> tuple[np.ndarray, ...]:
+    canvases: tuple[Canvas, Canvas], colours: list[np.ndarray], point_size: float,
+    reference: str | Path | None = None, timeout: float = SETTINGS.open3d_timeout,
+) -> tuple[np.ndarray, ...]:  # fmt: skip
     """Draw what two canvases show: two RGB arrays (h, w, 3) uint8.
 
     Only points that are nearest to the eye are sent, one for each pixel at most, so that time

@@ -10,12 +10,9 @@ from mlscorr.survey import ControlPoints, Trajectory
 
 
 def target_view(
-    rows: list[TargetRow],
-    normal: np.ndarray,
-    points: ControlPoints,
-    trajectory: Trajectory,
+    rows: list[TargetRow], normal: np.ndarray, points: ControlPoints, trajectory: Trajectory,
     options: PictureOptions,
-) -> View:
+) -> View:  # fmt: skip
     """A target close up, turned so that its misclosure is seen at full length.
 
     Parameters

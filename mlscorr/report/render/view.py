@@ -80,13 +80,9 @@ class PictureOptions:
     view_angle: float = 0.0
 
     def camera(
-        self,
-        focus: np.ndarray,
-        azimuth: float,
-        elevation: float,
-        scale: float,
+        self, focus: np.ndarray, azimuth: float, elevation: float, scale: float,
         size: tuple[int, int] | None = None,
-    ) -> Camera:
+    ) -> Camera:  # fmt: skip
         """The camera of a view that would look this way by itself."""
         size = self.size if size is None else size
         azimuth = azimuth if self.azimuth is None else self.azimuth

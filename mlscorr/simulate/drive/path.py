@@ -29,15 +29,9 @@ class Path:
 
 
 def draw(
-    line: CentreLine,
-    ground: Callable,
-    length: float,
-    leg: PassScenario,
-    speed: float,
-    vehicle: Vehicle,
-    phase: float,
-    u_turn: bool = False,
-) -> Path:
+    line: CentreLine, ground: Callable, length: float, leg: PassScenario, speed: float,
+    vehicle: Vehicle, phase: float, u_turn: bool = False,
+) -> Path:  # fmt: skip
     """Path of a PassScenario along a centre line.
 
     Parameters

@@ -19,12 +19,9 @@ from mlscorr.survey import Trajectory
 
 
 def pos_error(
-    trajectory: Trajectory,
-    scenario: PosScenario,
-    rng: Generator,
-    sky: np.ndarray | None = None,
+    trajectory: Trajectory, scenario: PosScenario, rng: Generator, sky: np.ndarray | None = None,
     start: float | None = None,
-) -> PosError:
+) -> PosError:  # fmt: skip
     """PosError at the epochs of one pass.
 
     Parameters

@@ -99,13 +99,9 @@ class Navigation:
 
 
 def navigate(
-    trajectory: Trajectory,
-    scenario: PosScenario,
-    imu: Imu,
-    rng: Generator,
-    sky: np.ndarray | None = None,
-    start: float | None = None,
-) -> Navigation:
+    trajectory: Trajectory, scenario: PosScenario, imu: Imu, rng: Generator,
+    sky: np.ndarray | None = None, start: float | None = None,
+) -> Navigation:  # fmt: skip
     """Navigation of a pass with an Imu; for the parameters see pos_error.
 
     Parameters

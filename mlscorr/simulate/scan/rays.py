@@ -154,13 +154,9 @@ class Platform:
         return rays
 
     def place(
-        self,
-        gps_time: np.ndarray,
-        angle: np.ndarray,
-        elevation: np.ndarray,
-        distance: np.ndarray,
+        self, gps_time: np.ndarray, angle: np.ndarray, elevation: np.ndarray, distance: np.ndarray,
         origin: np.ndarray,
-    ) -> np.ndarray:
+    ) -> np.ndarray:  # fmt: skip
         """Map coordinates (n, 3) of measurements, Eq. 1; all times must lie within the epochs.
 
         Parameters

@@ -139,15 +139,10 @@ def pulses_of_a_pass(trajectory: Trajectory, scanner: ScannerScenario) -> int:
 
 
 def shoot(
-    surfaces: Surfaces,
-    origin: np.ndarray,
-    trajectory: Trajectory,
-    mounting: Mounting,
-    scanner: ScannerScenario,
-    streams: tuple,
-    divergence: float | None = None,
+    surfaces: Surfaces, origin: np.ndarray, trajectory: Trajectory, mounting: Mounting,
+    scanner: ScannerScenario, streams: tuple, divergence: float | None = None,
     block: int | None = None,
-) -> Iterator[Shots]:
+) -> Iterator[Shots]:  # fmt: skip
     """Blocks of Shots of one pass, in time order, with the scanner's noise.
 
     Parameters

@@ -41,13 +41,9 @@ def target(kind: str, centre: np.ndarray, u: np.ndarray, v: np.ndarray, size: fl
 
 
 def facade(
-    corner: np.ndarray,
-    along: np.ndarray,
-    height: float,
-    inward: np.ndarray,
-    reflectance: float,
+    corner: np.ndarray, along: np.ndarray, height: float, inward: np.ndarray, reflectance: float,
     ground: float,
-) -> Mesh:
+) -> Mesh:  # fmt: skip
     """Mesh of a house front with a plain ground floor and rows of recessed windows above.
 
     Parameters
