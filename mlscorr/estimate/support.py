@@ -115,10 +115,11 @@ def find_support(
     corrected : Trajectory
         With its sigmas.
     """
-    codes = _reasons(equations, solved, parameters, corrected)
+    is_drifting = _is_drifting(equations, parameters)
+    codes = _reasons(equations, solved, parameters, corrected, is_drifting)
     history, starts = equations.stated.history, equations.stated.starts
     ends_by_step = np.isin(history.edges[1:], history.steps.middle)
-    drifting = equations.trajectory.gps_time[_is_drifting(equations, parameters)]
+    drifting = equations.trajectory.gps_time[is_drifting]
     epochs = [np.searchsorted(drifting, times) for times in (starts, history.edges[1:])]
     # a start without a fall-back behind it may be set off by the noise of GNSS
     shown = ends_by_step | (history.is_stated & (epochs[1] > epochs[0]))
@@ -133,7 +134,7 @@ def find_support(
     )
 
 
-def _reasons(equations, solved, parameters, corrected):
+def _reasons(equations, solved, parameters, corrected, is_drifting):
     """Number of the reason (n,) why each epoch of the trajectory is extrapolated; HELD where not.
 
     No control holds an epoch before the first or past the last control point of its pass, nor
@@ -149,7 +150,8 @@ def _reasons(equations, solved, parameters, corrected):
     time, control = trajectory.gps_time, np.sort(equations.observed)
     if len(control) == 0:
         return np.full(len(time), NO_CONTROL)
-    codes = np.where(_is_drift_open(equations, solved, parameters, corrected), DRIFT, HELD)
+    is_open = is_drifting & _is_drift_open(equations, solved, parameters, corrected)
+    codes = np.where(is_open, DRIFT, HELD)
     if equations.ties is not None:
         return codes
     for first, last in pairwise(equations.stated.history.edges):
@@ -171,7 +173,7 @@ def _reasons(equations, solved, parameters, corrected):
 
 
 def _is_drift_open(equations, solved, parameters, corrected):
-    """Where (n,) control tells less than half of a drift's variance, and GNSS doesn't hold it.
+    """Where (n,) control tells less than half of a drift's variance.
 
     Nor of the whole position error's: drift and a slow bias may stand for each other, so that
     neither is known where their sum is.
@@ -189,16 +191,15 @@ def _is_drift_open(equations, solved, parameters, corrected):
     covariance = solved.predict(time, np.zeros_like(trend), mixings, clocks)[1]
     after = np.einsum("qii->q", covariance[:, :3, :3])
     before = sum((mixing[:, :3] ** 2).sum(axis=(1, 2)) for mixing in mixings)
-    is_open &= after > SETTINGS.determined_ratio * before
-    return is_open & _is_drifting(equations, parameters)
+    return is_open & (after > SETTINGS.determined_ratio * before)
 
 
 def _is_drifting(equations, parameters):
     """Where (n,) the drift that may have come since it began is larger than the noise of GNSS."""
     stated = equations.stated_epochs
-    partials = np.broadcast_to(np.eye(6), (len(stated.gps_time), 6, 6))
+    partials = np.broadcast_to(np.eye(3, 6), (len(stated.gps_time), 3, 6))
     drift = pose_signals(stated, parameters, partials)[:-ERROR_SIGNALS]
-    size = sum((signal.mixing[:, :3] ** 2).sum(axis=(1, 2)) for signal in drift)
+    size = sum((signal.mixing**2).sum(axis=(1, 2)) for signal in drift)
     return size > (stated.gnss**2).sum(axis=1)
 
 
