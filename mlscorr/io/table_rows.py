@@ -105,35 +105,37 @@ def read_numbers(
     ValueError
         Names the first line that is no row of numbers; also for a file without rows.
     """
-    path, columns = layout.path, tuple(layout.columns.values())
+    path = layout.path
     if layout.header and layout.separator == ",":
         _check_width(path, layout.lines, len(layout.header))
     read: Any = dict(converters or {})
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*input contained no data")
-        # our own are read as they are, which is faster, unless there are rows of empty cells
-        for is_plain in range(not layout.is_own, 2):
-            try:
-                table = np.loadtxt(
-                    _plain_lines(layout)
-                    if is_plain
-                    else (open_file(path, ENCODING) if is_remote(path) else path),
-                    delimiter="\t" if is_plain else ",",
-                    skiprows=0 if is_plain else layout.lines,
-                    usecols=columns,
-                    encoding=ENCODING,
-                    ndmin=2,
-                    converters=read,
-                )
-                break
-            except ValueError:
-                if bad := _first_bad(layout, converters or {}):
-                    raise ValueError(bad) from None
-        else:
-            raise ValueError(f"{path} is not a table of numbers.")
+        try:
+            table = _loaded(layout, read, is_plain=not layout.is_own)
+        except ValueError:
+            if bad := _first_bad(layout, read):
+                raise ValueError(bad) from None
+            table = _loaded(layout, read, is_plain=True)  # without the rows of empty cells
     if not len(table):
         raise ValueError(f"{path} has a header but no epochs.")
     return table * [layout.factors.get(name, 1.0) for name in layout.columns]
+
+
+def _loaded(layout, converters, is_plain):
+    """The table of numbers, of its plain lines or, which is faster, as the file is."""
+    if is_plain:
+        source, form = _plain_lines(layout), {"delimiter": "\t"}
+    else:
+        source = open_file(layout.path, ENCODING) if is_remote(layout.path) else layout.path
+        form = {"delimiter": ",", "skiprows": layout.lines}
+    columns = tuple(layout.columns.values())
+    try:
+        return np.loadtxt(
+            source, usecols=columns, encoding=ENCODING, ndmin=2, converters=converters, **form
+        )
+    except ValueError:
+        raise ValueError(f"{layout.path} is not a table of numbers.") from None
 
 
 def _plain_lines(layout):
