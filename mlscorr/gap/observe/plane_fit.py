@@ -205,7 +205,8 @@ def moments(
         for j in range(i, 3):
             entry = np.add.reduceat(weight * centred[:, i] * centred[:, j], first) / total
             covariance[:, i, j] = covariance[:, j, i] = entry
-    return mean, *np.linalg.eigh(covariance)
+    values, axes = np.linalg.eigh(covariance)
+    return mean, np.maximum(values, 0.0), axes  # of points in a line rounding makes it negative
 
 
 def _between(away, weight, first, group):

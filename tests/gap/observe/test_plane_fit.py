@@ -1,5 +1,7 @@
 """Planes are found with their normal and noise; what is no plane is left."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,16 @@ def test_a_wall_on_a_whole_metre_has_all_of_its_noise(survey):
     patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
     assert np.sqrt(patches.variance) == pytest.approx([NOISE], rel=0.1)
     assert patches.centre[0, 0] == pytest.approx(cloud.xyz[:, 0].mean(), abs=NOISE / 20)  # m
+
+
+def test_points_in_a_line_are_no_wall(survey):
+    "Their least variance is zero, which rounding must not make less"
+    cloud = wall(survey, np.random.default_rng(1))
+    for seed in range(50):
+        along = np.random.default_rng(seed).uniform(-0.3, 0.3, len(cloud))
+        place = np.floor(cloud.xyz[:1]) + 0.4 + along[:, None] * [0.36, 0.48, 0.8]
+        line = replace(cloud, xyz=place)
+        assert fit_patches(survey, line, *[np.arange(len(line))] * 2) is None
 
 
 def test_a_wall_in_a_face_of_cells_is_left(survey):
