@@ -104,8 +104,14 @@ class DriftHistory:
     def turns(self) -> np.ndarray:
         """Times (j,) at which the level changes at once: another solution, of other errors. s."""
         time, size = self.trajectory.gps_time, np.linalg.norm(self.level, axis=1)
-        least, largest = np.sort([size[1:], size[:-1]], axis=0)
-        rows = np.flatnonzero(largest > SETTINGS.steady_ratio * least)
+        rows = np.arange(len(time) - 1)
+        # over as long as filters and resampling spread it, an epoch at least
+        later = np.searchsorted(time, time[:-1] + SETTINGS.step_duration, side="right") - 1
+        later = np.maximum(later, rows + 1)
+        least, largest = np.sort([size[later], size[:-1]], axis=0)
+        runs, changes = _runs(largest > SETTINGS.steady_ratio * least), np.abs(np.diff(size))
+        rows = [first + np.argmax(changes[first : later[last - 1]]) for first, last in runs]
+        rows = np.array(rows, int)
         return (time[rows] + time[rows + 1]) / 2
 
     def level_at(self, gps_time: np.ndarray) -> np.ndarray:
@@ -149,11 +155,17 @@ def _history(trajectory):
     is_raised = np.maximum(sigma**2 - held**2, 0.0).sum(axis=1) > held @ held
     returns = _returns(trajectory, _runs(is_raised), restarts)
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
-    grown = [np.inf]
-    for first, last in reversed(_runs(is_raised, np.searchsorted(time, edges))):
-        level[first:last] = np.minimum.accumulate(sigma[first:last], axis=0)
+    grown, size = [np.inf], np.linalg.norm(sigma, axis=1)
+    cuts = np.searchsorted(time, edges)
+    for first, last in reversed(_runs(is_raised, cuts)):
+        # what filters and resampling spread has come by then
+        settled = np.searchsorted(time, time[first] + SETTINGS.step_duration, side="right") - 1
+        settled = min(settled, last - 1)
+        if first in cuts or size[settled] > SETTINGS.steady_ratio * size[first - 1]:
+            level[settled:last] = np.minimum.accumulate(sigma[settled:last], axis=0)
+            level[first:settled] = level[settled]
         # what is raised at once and goes back is no drift, but what GNSS holds the POS to
-        if np.any((sigma[first:last] ** 2 - 2 * level[first:last] ** 2).sum(axis=1) > 0):
+        if np.any((sigma[settled:last] ** 2 - 2 * level[settled:last] ** 2).sum(axis=1) > 0):
             grown.append(time[first])
     grown = np.array(grown[::-1])
     first = grown[np.searchsorted(grown, edges)]

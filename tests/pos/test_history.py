@@ -102,6 +102,16 @@ def test_gnss_that_is_not_fixed_holds_the_pos_to_what_it_states():
     assert level == pytest.approx([0.02, 0.02, 0.5, 0.02], abs=0.01)  # m
 
 
+def test_what_falls_within_some_epochs_is_another_solution():
+    "GNSS comes back by 0.3 m and a second later by 2 cm, each spread over 0.1 s: two turns there"
+    sigma = np.interp(TIME, [119.9, 120.0, 121.0, 121.1], [1.0, 0.3, 0.3, 0.02])
+    sigma[TIME < 119.9] = (0.02 + grown(1.0))[TIME < 119.9]
+    history = drift_history(drive(sigma))
+    assert history.turns == pytest.approx([START + 120.0, START + 121.0], abs=0.11)
+    assert history.level_at(np.array([START + 120.5]))[0, 0] == pytest.approx(0.3)  # m
+    assert history.starts[0] == pytest.approx(START + 80.0, abs=5.0) and np.isinf(history.starts[1])
+
+
 def test_drift_grows_from_what_is_held():
     "A float solution of 0.3 m, lost after a while: drift grows to 3 m, beside what was held"
     floated = 0.28 * (TIME >= 60.0)
