@@ -109,9 +109,13 @@ class DriftHistory:
         later = np.searchsorted(time, time[:-1] + SETTINGS.step_duration, side="right") - 1
         later = np.maximum(later, rows + 1)
         least, largest = np.sort([size[later], size[:-1]], axis=0)
-        runs, changes = _runs(largest > SETTINGS.steady_ratio * least), np.abs(np.diff(size))
-        rows = [first + np.argmax(changes[first : later[last - 1]]) for first, last in runs]
-        rows = np.array(rows, int)
+        turned = []
+        for first, last in _runs(largest > SETTINGS.steady_ratio * least):
+            changes = np.abs(np.diff(size[first : later[last - 1] + 1]))
+            # the last large one: what is on the way is no larger than what was before
+            large = np.flatnonzero(changes >= SETTINGS.fall_ratio * changes.max())
+            turned.append(first + large[-1])
+        rows = np.array(turned, int)
         return (time[rows] + time[rows + 1]) / 2
 
     def level_at(self, gps_time: np.ndarray) -> np.ndarray:
