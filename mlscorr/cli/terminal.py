@@ -168,11 +168,13 @@ def _tell(error, code):
         raise error
     if isinstance(error, ImportError):
         _fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
+    from mlscorr.survey import SurveyFileError
+
     if isinstance(error, OSError):
         if isinstance(error, FileNotFoundError) and error.errno is None:  # survey.toml names it
             _fail(error, Exit.USAGE)
         _fail(f"Reading or writing failed: {error}", Exit.READ_OR_WRITE)
-    _fail(error, code)
+    _fail(error, Exit.USAGE if isinstance(error, SurveyFileError) else code)
 
 
 def _fail(message, code):

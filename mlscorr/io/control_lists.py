@@ -17,7 +17,7 @@ from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.table_rows import read_rows
 from mlscorr.io.tables import missing_sentence
 from mlscorr.io.text_files import shown
-from mlscorr.survey import Trajectory
+from mlscorr.survey import SurveyFileError, Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
 NORMAL = ("normal_e", "normal_n", "normal_h")
@@ -194,7 +194,7 @@ def with_check_points(
     """
     for pattern in patterns:
         if not any(fnmatchcase(row["name"], pattern) for row in rows):
-            raise ValueError(f"control.check names '{shown(pattern)}', no point of {path}.")
+            raise SurveyFileError(f"control.check names '{shown(pattern)}', no point of {path}.")
     return [
         row | {"role": "check"} if any(fnmatchcase(row["name"], p) for p in patterns) else row
         for row in rows

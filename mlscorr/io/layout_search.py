@@ -16,6 +16,7 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX, read_sheets
 from mlscorr.io.storage import as_path
 from mlscorr.io.text_files import shown
+from mlscorr.survey import SurveyFileError
 
 WORDS = ("name", "kind", "role")  # columns that hold no numbers
 BRACKETED = re.compile(r"[(\[].*[)\]]")
@@ -60,7 +61,7 @@ def find_layout(
     if is_numbered:
         positions = {name: int(number) - 1 for name, number in chosen.items()}
         if missing := lacking(positions):
-            raise ValueError(
+            raise SurveyFileError(
                 f"{path} has numbers of columns in survey.toml, but none for {', '.join(missing)}: "
                 "number all that are needed, or none."
             )
@@ -187,7 +188,7 @@ def check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str 
         Names the first.
     """
     for name in sorted(set(missing) & set(chosen)):
-        raise ValueError(
+        raise SurveyFileError(
             f"{path} has no column '{chosen[name]}', which survey.toml names the {name}."
         )
 

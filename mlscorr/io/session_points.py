@@ -12,7 +12,7 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_paths import own_clouds
 from mlscorr.io.survey_sections import SessionSection
 from mlscorr.io.trajectory_sessions import SessionFile
-from mlscorr.survey import CloudFile, Trajectory
+from mlscorr.survey import CloudFile, SurveyFileError, Trajectory
 
 
 def check_belongings(
@@ -75,7 +75,7 @@ def _say(path, cloud, names, times, outside, count):
         f"{times[np.argmax(outside)]:.3f} s)"
     )
     if outside.sum() > (1 - SETTINGS.covered_share) * count:
-        raise ValueError(
+        raise SurveyFileError(
             f"{sentence}: another trajectory is theirs, or it is of another time system. Correct "
             "files or point_source_ids under [[trajectory]], or leave them out: the time of a "
             "point tells its trajectory."

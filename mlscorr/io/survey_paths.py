@@ -13,7 +13,7 @@ from mlscorr.io.storage import beside, files_like, is_folder, is_remote, is_ther
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
 from mlscorr.io.text_files import nearest
 from mlscorr.io.trajectory_sessions import SessionFile
-from mlscorr.survey import CloudFile
+from mlscorr.survey import CloudFile, SurveyFileError
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def own_clouds(
         there = {resolved(file) for file in matching(path, key, pattern)}
         named = [cloud for cloud in clouds if resolved(cloud.path) in there]
         if not named:
-            raise ValueError(
+            raise SurveyFileError(
                 f"{key} of {path}: {pattern}{owner} is none of the {len(clouds)} files of [cloud]."
             )
         own += named

@@ -10,7 +10,7 @@ from mlscorr.io.las import count_sources
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.survey_paths import own_clouds
 from mlscorr.io.survey_sections import PlannedSurveyFile, ScannerSection
-from mlscorr.survey import CloudFile, MountedScanner
+from mlscorr.survey import CloudFile, MountedScanner, SurveyFileError
 
 
 def mounted_scanners(
@@ -80,7 +80,7 @@ def _measured(path, sections, clouds):
         if not own or (len(own) > 1 and None in own.values())
     ]
     if wrong:
-        raise ValueError(
+        raise SurveyFileError(
             f"{len(wrong)} of the {len(clouds)} files of [cloud] in {path} are not of exactly one "
             f"[[scanner]]: {', '.join(wrong)}. Name each in the files of the one that wrote it, or "
             "the point_source_ids of each scanner in it."
@@ -92,7 +92,7 @@ def _measured(path, sections, clouds):
     for name, section in sections:
         if not measured[name]:
             files = ", ".join(cloud.path.name for cloud, own in claims.items() if name in own)
-            raise ValueError(
+            raise SurveyFileError(
                 f"No point of {files} has a point_source_id of scanner {name} in {path} "
                 f"({_listed(section.point_source_ids)})."
             )
@@ -107,14 +107,14 @@ def _parts(path, cloud, own):
     doubled = sorted({number for number in ids if ids.count(number) > 1})
     if doubled:
         owners = [name for name, numbers in own.items() if doubled[0] in numbers]
-        raise ValueError(
+        raise SurveyFileError(
             f"point_source_id {doubled[0]} of {cloud.path.name} is of scanners "
             f"{' and '.join(owners)} in {path}: each point is of one."
         )
     counts = count_sources(read_layout(cloud.path))
     other = np.setdiff1d(np.flatnonzero(counts), ids)
     if len(other):
-        raise ValueError(
+        raise SurveyFileError(
             f"{counts[other].sum()} of the {cloud.points} points of {cloud.path.name} have a "
             f"point_source_id that no [[scanner]] of {path} names ({_listed(other)}; those named "
             f"are {_listed(ids)}). Add each to the scanner that measured these points."

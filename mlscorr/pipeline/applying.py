@@ -21,7 +21,7 @@ from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.near_points import remounting_fault
-from mlscorr.survey import Survey, check_survey
+from mlscorr.survey import Survey, SurveyFileError, check_survey
 from mlscorr.survey.summary import Summary
 
 CLOCK = "time_offset"
@@ -87,7 +87,7 @@ def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
         if fault := remounting_fault(survey):
             raise ValueError(fault)
         if survey.mounting is None:
-            raise ValueError(
+            raise SurveyFileError(
                 f"{survey.path} has no [mounting], which {joined(MOUNTING, 'or')} could change. "
                 "Add the lever_arm (m) and boresight (deg) that the cloud was georeferenced with."
             )

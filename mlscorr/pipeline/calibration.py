@@ -19,7 +19,7 @@ from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResu
 from mlscorr.pipeline.near_points import remounting_fault, reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
-from mlscorr.survey import Survey, check_survey
+from mlscorr.survey import Survey, SurveyFileError, check_survey
 
 
 def calibrate(
@@ -74,7 +74,7 @@ def calibrate(
         raise ValueError(fault)
     for name, part in survey.by_scanner.items():
         if part.mounting is None:
-            raise ValueError(
+            raise SurveyFileError(
                 f"{_title(name)}{survey.path} has no [mounting]: a calibration needs the lever_arm "
                 "(m) and boresight (deg) that the cloud was georeferenced with. Add that section."
             )

@@ -26,7 +26,7 @@ from mlscorr.io.survey_scanners import mounted_scanners
 from mlscorr.io.survey_sections import SurveyFile
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory_sessions import read_sessions
-from mlscorr.survey import Trajectory
+from mlscorr.survey import SurveyFileError, Trajectory
 
 Place = Literal["survey.toml", "data", "system"]
 
@@ -77,6 +77,7 @@ class Faults:
             try:
                 return function(*arguments)
             except ValueError as error:
+                where = "survey.toml" if isinstance(error, SurveyFileError) else where
                 self.add(where, str(error), error.number if isinstance(error, ListError) else 1)
             except OSError as error:  # survey.toml names a file that is not there, or ...
                 is_named = isinstance(error, FileNotFoundError) and error.errno is None

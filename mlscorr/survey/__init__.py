@@ -5,7 +5,14 @@ float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forwar
 
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Pos, Scanner
 from mlscorr.survey.clouds import CloudFile, Correcting, PointCloud
-from mlscorr.survey.recording import InputFile, MountedScanner, Survey, check_rng, check_survey
+from mlscorr.survey.recording import (
+    InputFile,
+    MountedScanner,
+    Survey,
+    SurveyFileError,
+    check_rng,
+    check_survey,
+)
 from mlscorr.survey.targets import KINDS, ControlPoints, Matched, TargetObservations
 from mlscorr.survey.ties import PAINTED, TIE_KINDS, TieFeatures, Ties
 from mlscorr.survey.trajectory import GAP_FACTOR, SAME_EPOCH, Mounting, Trajectory, control_epochs

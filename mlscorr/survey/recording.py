@@ -243,6 +243,10 @@ class Survey(Summary):
             )
 
 
+class SurveyFileError(ValueError):
+    """What survey.toml says or leaves out is at fault, though only the data or the work show it."""
+
+
 def check_survey(value: object) -> None:
     """Refuse what is no survey, as the path of one.
 

@@ -173,6 +173,18 @@ BAD = [
         ["control.file", "control.csv", "does not exist"],
     ),
     ("survey.toml missing", remove("survey.toml"), 2, ["survey.toml does not exist"]),
+    (
+        "check point unknown",
+        edit("survey.toml", '"control.csv"', '"control.csv"\ncheck = ["X*"]'),
+        2,
+        ["control.check names 'X*'"],
+    ),
+    (
+        "column unknown",
+        edit("survey.toml", '"control.csv"', '"control.csv"\ncolumns.easting = "X"'),
+        2,
+        ["control.csv has no column 'X'", "survey.toml names the easting"],
+    ),
     # the cloud: exit code 3
     ("cloud empty", empty("pass-1.laz"), 3, ["pass-1.laz", "0 bytes"]),
     ("cloud cut off", cut("pass-1.laz", 0.6), 3, ["pass-1.laz", "cut off", "copy it anew"]),
@@ -298,6 +310,16 @@ def test_bad_input_is_refused_in_a_sentence(spoil, code, words, survey):
     assert result.stdout == ""
     assert content(survey) == before
     assert list(survey.parent.iterdir()) == [survey]
+
+
+@pytest.mark.parametrize("command", ["calibrate", "plan"])
+def test_a_mounting_that_a_command_needs_is_a_fault_of_survey_toml(command, survey):
+    "Exit code 2, as for other keys that are missing there, and the section is named"
+    text = (survey / "survey.toml").read_text()
+    start, end = text.index("[mounting]"), text.index("[scanner]")
+    (survey / "survey.toml").write_text(text[:start] + text[end:])
+    ended = CliRunner().invoke(app, [command, str(survey), "-o", str(survey.parent / "out")])
+    assert ended.exit_code == 2 and "survey.toml has no [mounting]" in ended.stderr, ended.stderr
 
 
 @pytest.mark.parametrize("bad", [b for b in BAD if b[0] not in SEEN_IN_POINTS], ids=lambda b: b[0])

@@ -15,7 +15,7 @@ from mlscorr.gap.signatures.settings import SETTINGS as SIGNATURES
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.simulate.scenario import SceneScenario
 from mlscorr.simulate.scene import read_mesh, sees
-from mlscorr.survey import Survey
+from mlscorr.survey import Survey, SurveyFileError
 from mlscorr.targets import SETTINGS as TARGETS
 
 
@@ -36,7 +36,7 @@ def planned_rows(survey: Survey) -> Rows:
         Without a mounting, or when nothing will be seen.
     """
     if survey.mounting is None:
-        raise ValueError(
+        raise SurveyFileError(
             f"{survey.path} has no [mounting]: without it nobody knows where the scanner looks. "
             "Give lever_arm and boresight as they are planned."
         )

@@ -10,7 +10,7 @@ from mlscorr.effects import Effect, in_order
 from mlscorr.effects.mounting import Boresight, LeverArm
 from mlscorr.effects.ranging import Dropout
 from mlscorr.simulate.simulator_file import Simulator, beliefs_of
-from mlscorr.survey import Survey
+from mlscorr.survey import Survey, SurveyFileError
 
 
 def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Effect, ...]]:
@@ -34,7 +34,7 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
     recorded, believed = survey.mounting, simulator.mounting
     effects = list(simulator.effects)
     if believed is not None and recorded is None:
-        raise ValueError(
+        raise SurveyFileError(
             f"The simulator knows a [mounting], and {survey.path} has none: give it there, so that "
             "the beams are known."
         )
