@@ -222,13 +222,16 @@ def missing_sentence(
     near |= dict(seeming or {})
     candidates = [name for name in missing if name in near]
     hint, section = "", section_of(names)
-    if sum(NUMBER.fullmatch(cell) is not None for cell in header) > 2:
+    numbers = sum(NUMBER.fullmatch(cell) is not None for cell in header)
+    if numbers > 2:
         hint = (
             f" It has no header: number its columns under [{section}.columns] in survey.toml, as "
             "easting = 2."
         )
     elif {"easting", "northing", "height"} <= set(missing):
         hint = " It holds no coordinates: is another file meant?"
+        if numbers == 2:
+            hint = " It seems to hold a plan without heights: each point needs its own."
     elif candidates:
         name, column = candidates[0], shown(near[candidates[0]])
         hint = (

@@ -266,6 +266,7 @@ P1 = "P1;532012,49;3373991,48;44,48\n"
         ("name,easting,northing,elev (ft)\n" + P1.replace(";", ","), "height in 'ft'"),
         ("time,temperature\n1,2\n", "no column name, .* holds no coordinates: is another file"),
         ("name,lat,lon,h\nP1,30.4,114.4,20\n", "Latitude and longitude must be projected first"),
+        ("P1 532012.49 3373991.48\n", "no column name, .* to hold a plan without heights"),
         ("X;Y;Z\n1;2;3\n", "no column name; it has X, Y, Z"),
         ("Punkt;Est;Nord;Quota\n" + P1, r"no column height; .* as columns\.height = 'Quota'\."),
         ("Punkt;E;N;H\nP1;532012,49;3373991,48\n", "Line 2 .* 3 columns where 4 belong"),
