@@ -34,6 +34,7 @@ from mlscorr.survey import ControlPoints, Trajectory
 
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
 ROLES = tuple(WORDS["role"])
+SEXAGESIMAL = re.compile(r"-?\d{1,3}[°: ]\s*\d{1,2}['′: ]")  # degrees and minutes
 NOTHING_GIVEN = ControlSection(file="")
 
 
@@ -179,7 +180,11 @@ def _value(layout, name, cell):
     try:
         number = layout.number(cell) * layout.factors.get(name, 1.0)
     except ValueError:
-        raise ValueError(f"has the {name} '{shown(cell)}', which is not a number.") from None
+        angle = " It looks like an angle: project it to m, in the crs of survey.toml."
+        way_out = angle * bool(SEXAGESIMAL.match(cell))
+        raise ValueError(
+            f"has the {name} '{shown(cell)}', which is not a number.{way_out}"
+        ) from None
     if not np.isfinite(number) and name not in NORMAL:
         raise ValueError(f"has the {name} '{shown(cell)}', which is not a finite number.")
     return number

@@ -96,13 +96,11 @@ class TableLayout:
         Raises
         ------
         ValueError
-            For anything else, points in numbers with decimal commas too.
+            For anything else: points in numbers with decimal commas too, and 1_000.
         """
-        if self.decimal == ".":
-            return float(cell)
-        if "." in cell:
+        if any(mark in cell for mark in ("_" if self.decimal == "." else "_.")):
             raise ValueError(cell)
-        return float(cell.replace(",", "."))
+        return float(cell.replace(self.decimal, "."))
 
 
 def head(path: Path, encoding: str = ENCODING) -> list[tuple[int, str]]:

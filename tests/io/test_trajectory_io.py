@@ -136,6 +136,7 @@ def test_bad_epochs_are_refused(tmp_path, change, message):
         (HEADER + "\n1,2,3,4,5,6,7\n2,2,3,4\n", "Line 3 .* 4 columns .* cut off"),
         (HEADER + "\n1,2,3,4,5,6,7\n2,2,x,4,5,6,7\n", "Line 3 .*'x' where a number belongs"),
         (HEADER + "\n1,2,3,4,5,6,7\n2,2,,4,5,6,7\n", "Line 3 .*'' where a number belongs"),
+        (HEADER + "\n1,2,3,4,5,6,7\n2,2,1_0,4,5,6,7\n", "Line 3 .*'1_0' where a number belongs"),
     ],
 )
 def test_bad_csv_text_is_refused(tmp_path, text, message):
