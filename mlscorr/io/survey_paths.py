@@ -2,12 +2,14 @@
 
 import glob
 import os
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from mlscorr.io.conversion import written_name
+from mlscorr.io.folder_roles import RESULTS
 from mlscorr.io.identity import find_copies
 from mlscorr.io.storage import beside, files_like, is_folder, is_remote, is_there, resolved
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
@@ -127,14 +129,34 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
     ------
     FileNotFoundError
         Where there is none.
+
+    Warns
+    -----
+    UserWarning
+        Where folders that hold results are left out of a pattern of all folders.
     """
     there = beside(path, name)
     if not glob.has_magic(name) or is_there(there):
         return [existing(path, key, name)]
     matches = files_like(path.parent, name)
+    below = {file.parent for file in matches} - {path.parent} if "**" in name else set()
+    if results := {folder for folder in below if _holds_results(folder)}:
+        matches = [file for file in matches if file.parent not in results]
+        warnings.warn(
+            f"{key} of {path}: {name} leaves out results of an earlier run in "
+            f"{', '.join(sorted(map(str, results)))}.",
+            stacklevel=2,
+        )
     if not matches:
         raise FileNotFoundError(f"{key} of {path}: no file is like {there}.")
     return matches
+
+
+def _holds_results(folder):
+    """Whether a run wrote a folder, or a project it."""
+    return any(is_there(folder / name) for name in RESULTS) or is_there(
+        folder.parent / "project.json"
+    )
 
 
 def own_clouds(

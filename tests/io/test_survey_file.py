@@ -301,6 +301,18 @@ def test_clouds_of_the_same_name_are_refused(folder):
         read_survey(folder)
 
 
+@pytest.mark.parametrize("mark", ["out/report.json", "project.json"])
+def test_a_pattern_of_all_folders_takes_no_results_for_input(folder, mark):
+    "What a run or a project wrote below the survey is left out, and said; the input stays"
+    (folder / "out").mkdir()
+    shutil.copy(folder / "pass-1.las", folder / "out" / "pass-1.las")
+    (folder / mark).write_text("{}")
+    toml(folder, '["pass-*.las"]', '["**/*.las"]')
+    with pytest.warns(UserWarning, match=r"leaves out results of an earlier run in \S+/out\."):
+        paths = read_survey(folder).cloud_paths
+    assert [*paths] == [folder / "pass-1.las", folder / "pass-2.las"]
+
+
 @pytest.mark.parametrize(
     ("crs", "message"),
     [
