@@ -76,7 +76,7 @@ def match_times(
     Warns
     -----
     UserWarning
-        When what fits contradicts the header.
+        When what fits contradicts the header, and of points without a time.
 
     Examples
     --------
@@ -96,6 +96,14 @@ def match_times(
             f"The points of {name} have gps_time 0 throughout: it was written without times. "
             "Export it anew with gps_time, which places points on the trajectory."
         )
+    if (zeros := np.count_nonzero(times == 0)) > 1:  # the week starts within one epoch
+        warnings.warn(
+            f"{zeros} of {len(times)} points sampled from {name} have gps_time 0: they were "
+            "written without times. Export them with gps_time, which places points on the "
+            "trajectory.",
+            stacklevel=2,
+        )
+        times = times[times != 0]
     _check_precision(name, times)
     span = trajectory.gps_time[[0, -1]]
     flagged = "standard" if is_standard else "week"

@@ -180,6 +180,17 @@ def test_a_cloud_without_times_is_refused():
         match_times("a.laz", np.empty(0), False, trajectory())
 
 
+@pytest.mark.parametrize("share", [0.1, 0.7])
+def test_points_without_a_time_beside_others_are_counted(share):
+    "However many there are, gps_time 0 is said as such, and the others tell the system"
+    times = SYSTEMS["standard"].copy()
+    times[: int(share * len(times))] = 0.0
+    words = rf"^{share * 500:.0f} of 500 points sampled from a\.laz have gps_time 0: "
+    with pytest.warns(UserWarning, match=words):
+        match = match_times("a.laz", times, True, trajectory())
+    assert match.constant == SYSTEMS["week"][0] - SYSTEMS["standard"][0]
+
+
 @settings(max_examples=50, deadline=None)
 @given(
     week=st.integers(1100, 3000),
