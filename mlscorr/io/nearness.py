@@ -1,5 +1,6 @@
 """Whether control and trajectory lie together."""
 
+import warnings
 from itertools import permutations
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from mlscorr.io.column_names import AXES
 from mlscorr.io.settings import SETTINGS
-from mlscorr.survey import ControlPoints, Trajectory
+from mlscorr.survey import SEARCH_RADIUS, ControlPoints, Trajectory
 
 FOOT = 0.3048  # m; the US survey foot is longer by 2 ppm
 
@@ -26,6 +27,11 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
     ------
     ValueError
         Names the columns that are exchanged, or the distance.
+
+    Warns
+    -----
+    UserWarning
+        Of heights that seem to be in feet.
     """
     distance = distance_of(points.position[:, :2], trajectory)
     orders = [(1, 0, 2), *permutations(range(3))]  # the usual exchange first
@@ -47,6 +53,24 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
             "CRS or zones. Bring both into the crs of survey.toml."
             f"{_likely_change(points.position[:, :2], trajectory)}"
         )
+    if owner := _heights_in_feet(path, points.position, trajectory):
+        warnings.warn(
+            f"The heights of {owner} may be in feet: only multiplied by {FOOT} are control and "
+            "trajectory at like heights. Convert them to m, or both to one system of heights.",
+            stacklevel=2,
+        )
+
+
+def _heights_in_feet(path, position, trajectory):
+    """Whose heights are like the others when taken as feet, and not as they stand; else empty."""
+    distance, epoch = nearest_epochs(position[:, :2], trajectory)
+    near = distance < SETTINGS.near
+    up, driven = position[near, 2], trajectory.position[epoch[near], 2]
+    if not near.any() or (apart := abs(np.median(up - driven))) < SEARCH_RADIUS:
+        return ""
+    feet = {path: up * FOOT - driven, "the trajectory": up - driven * FOOT}
+    owners = (owner for owner, high in feet.items() if abs(np.median(high)) < FOOT * apart)
+    return next(owners, "")
 
 
 def _likely_change(position, trajectory):

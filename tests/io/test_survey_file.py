@@ -394,6 +394,20 @@ def test_the_number_of_a_zone_in_front_of_eastings_is_named(folder):
         read_survey(exchange(folder, lambda e, n: (e + 50e6, n)))
 
 
+@pytest.mark.parametrize(
+    ("name", "heights"),
+    [("trajectory.csv", ["42"]), ("control.csv", ["44.4800", "44.5047", "42.5047"])],
+)
+def test_heights_in_feet_are_named(name, heights, folder):
+    "Metres on one side and feet on the other, though the plan agrees: whose heights they are"
+    text = (folder / name).read_text()
+    for height in heights:
+        text = text.replace(f",{height},", f",{float(height) / 0.3048:.4f},")
+    (folder / name).write_text(text)
+    with pytest.warns(UserWarning, match=rf"heights of .*{name[:-4]}\S* may be in feet"):
+        read_survey(folder)
+
+
 def test_far_control_points_beside_near_ones_are_normal(folder):
     "One control file may serve a whole town: what is near counts"
     with (folder / "control.csv").open("a") as file:
