@@ -2,9 +2,34 @@
 
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 from mlscorr.effects.catalogue import known_effects
 from mlscorr.effects.effect import Effect
+
+
+def run_file(path: Path) -> ModuleType:
+    """Run a Python file of the user's; the module that it makes.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    ValueError
+        Names the file, and what it raised.
+    """
+    spec = spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{path} is no Python file: its name must end in .py.")
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
+        line = f" (line {error.lineno})" if isinstance(error, SyntaxError) and error.lineno else ""
+        raise ValueError(f"{path} can't be run{line}: {type(error).__name__}: {error}") from error
+    return module
 
 
 def register_file(path: Path | str) -> tuple[type[Effect], ...]:
@@ -30,14 +55,7 @@ def register_file(path: Path | str) -> tuple[type[Effect], ...]:
     path, before = Path(path), set(known_effects())
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist; give a file that registers effects.")
-    spec = spec_from_file_location(path.stem, path)
-    if spec is None or spec.loader is None:
-        raise ValueError(f"{path} is no Python file: its name must end in .py.")
-    try:
-        spec.loader.exec_module(module_from_spec(spec))
-    except (Exception, SystemExit) as error:  # a user's code may raise anything
-        line = f" (line {error.lineno})" if isinstance(error, SyntaxError) and error.lineno else ""
-        raise ValueError(f"{path} can't be run{line}: {type(error).__name__}: {error}") from error
+    run_file(path)
     effects = tuple(kind for kind in known_effects() if kind not in before)
     if not effects:
         raise ValueError(

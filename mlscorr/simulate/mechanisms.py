@@ -6,7 +6,6 @@ anything takes one half, what grades a diagnosis takes the other, and no pair is
 """
 
 import hashlib
-import importlib.util
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.effects.own import run_file
 from mlscorr.simulate.displacement import RecordedPoints
 from mlscorr.simulate.scene import UP
 
@@ -134,18 +134,14 @@ def load_mechanisms(path: Path) -> Described:
     Raises
     ------
     ValueError
-        When one of them is missing.
+        When one of them is missing, or the file can't be run.
     FileNotFoundError
         When the file is.
     """
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist; it should hold MECHANISMS.")
-    spec = importlib.util.spec_from_file_location("mechanisms", path)
-    if spec is None or spec.loader is None:
-        raise ValueError(f"{path} is no Python file.")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = run_file(path)
     for name in ("MECHANISMS", "LEADS", "UNITS"):
         if set(getattr(module, name, {})) != set(getattr(module, "MECHANISMS", {"": None})):
             raise ValueError(
