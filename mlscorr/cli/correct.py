@@ -66,6 +66,8 @@ def correct(
     """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.evaluate.quality import failures, read_gate
+        from mlscorr.io.extra_bytes import add_sigma_fields
+        from mlscorr.io.las_checks import read_layout
         from mlscorr.io.project_file import is_project
         from mlscorr.io.trajectory_exports import check_exports
 
@@ -91,6 +93,8 @@ def correct(
         for sentence in recorded.layouts:
             terminal.say(sentence)
         check_exports(trajectory, recorded.crs, is_read=True)
+        for cloud in recorded.cloud_paths if sigma else ():
+            add_sigma_fields(read_layout(cloud))  # refuses a cloud that has them, before the work
         result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
         report = result.write(
             out, overwrite, progress, sigma, page=not no_report, trajectories=trajectory

@@ -312,6 +312,17 @@ def test_bad_input_is_refused_in_a_sentence(spoil, code, words, survey):
     assert list(survey.parent.iterdir()) == [survey]
 
 
+def test_a_cloud_that_has_sigmas_is_refused_before_its_points_are_read(survey):
+    "With --sigma, which would add them: were points read, no target would be found"
+    las = laspy.read(survey / "pass-1.laz")
+    las.add_extra_dim(laspy.ExtraBytesParams("sigma_easting", np.uint16))
+    las.intensity[:] = 1
+    las.write(survey / "pass-1.laz")
+    command = ["correct", str(survey), "-o", str(survey.parent / "out"), "--sigma", "-q"]
+    ended = CliRunner().invoke(app, command)
+    assert ended.exit_code == 3 and "have the field sigma_easting already" in ended.stderr
+
+
 @pytest.mark.parametrize("command", ["calibrate", "plan"])
 def test_a_mounting_that_a_command_needs_is_a_fault_of_survey_toml(command, survey):
     "Exit code 2, as for other keys that are missing there, and the section is named"
