@@ -16,6 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
+from mlscorr.cli.correct import tell
 from tests.beds.documents import undocumented
 from tests.beds.places import MLSCORR, ROOT
 
@@ -321,6 +322,18 @@ def test_a_cloud_that_has_sigmas_is_refused_before_its_points_are_read(survey):
     command = ["correct", str(survey), "-o", str(survey.parent / "out"), "--sigma", "-q"]
     ended = CliRunner().invoke(app, command)
     assert ended.exit_code == 3 and "have the field sigma_easting already" in ended.stderr
+
+
+def test_pictures_of_an_earlier_run_are_named(tmp_path, capsys):
+    "Without a new report, those of other numbers lie beside it: both are said to be older"
+    (tmp_path / "pictures").mkdir()
+    (tmp_path / "report.html").write_text("old")
+    none = {key: {"rmse": None} for key in ("before", "after", "leave_one_out")}
+    groups = {key: {"n": 0, "n_scored": 0, **none} for key in ("control", "check")}
+    report = {"statements": [], "ties": None, "files": [], **groups}
+    tell(report, tmp_path, as_json=False, page=False)
+    assert "Of an earlier run, and left as it was in" in (said := capsys.readouterr().err)
+    assert said.splitlines()[-2].endswith(": pictures, report.html.")
 
 
 @pytest.mark.parametrize("command", ["calibrate", "plan"])
