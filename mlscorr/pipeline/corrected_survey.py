@@ -79,9 +79,10 @@ class CorrectedSurvey(Summary):
 
     @property
     def _control(self) -> Score:
-        left_out, tests = self.estimate.left_out, self.estimate.tests
-        sigma = np.vstack([np.empty((0, 3)), *(test.sigma for test in tests)])
-        return score(self.matched_control, self.estimate.correction, left_out, sigma)
+        estimate, used = self.estimate, self.estimate.used  # a refused point scores nowhere
+        sigma = np.vstack([np.empty((0, 3)), *(test.sigma for test in estimate.tests)])
+        control, left_out = self.matched_control[used], estimate.left_out[used]
+        return score(control, estimate.correction, left_out, sigma)
 
     @property
     def _check(self) -> Score:

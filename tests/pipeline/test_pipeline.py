@@ -116,6 +116,20 @@ def test_a_verdict_knows_the_sigma_of_what_it_rests_on(corrected):
     np.testing.assert_allclose(result._control.sigma, np.sqrt((sigma**2).mean(axis=0)))
 
 
+def test_before_and_after_are_of_the_same_control_points(corrected):
+    "A point that was refused, 2 m off, counts neither before, nor after, nor left out in turn"
+    result = corrected[0]
+    matched, estimate = result.matched_control, result.estimate
+    used = np.arange(len(matched)) != 1
+    surveyed = matched.surveyed.position + np.where(used[:, None], 0.0, 2.0)
+    wrong = replace(matched, surveyed=replace(matched.surveyed, position=surveyed))
+    left_out = np.where(used[:, None], estimate.left_out, np.nan)
+    without = replace(estimate, used=used, left_out=left_out)
+    control = replace(result, matched_control=wrong, estimate=without)._control
+    assert control.before.n == control.after.n == control.left_out.n == len(matched) - 1
+    np.testing.assert_allclose(control.before.mean[:3], wrong[used].misclosure.mean(axis=0))
+
+
 @pytest.mark.long
 def test_points_that_are_control_and_check_at_once_are_no_matter_of_the_crs(copy):
     "Each place has two names, so neither is believed: the way out is to leave one of them out"
@@ -172,12 +186,16 @@ def test_misclosures_are_surveyed_minus_observed(corrected):
         assert target["after"] == pytest.approx(after, abs=1e-9)
 
 
+def is_scored(row, role):
+    return row["role"] == role and row["observed"] and (row["used"] or role == "check")
+
+
 @pytest.mark.parametrize("role", ["control", "check"])
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_statistics_follow_from_the_targets(corrected, role, when):
     "RMSE, mean, least and largest are those of the targets listed, in m"
     report = corrected[2]
-    rows = np.array([t[when] for t in report["targets"] if t["role"] == role and t["observed"]])
+    rows = np.array([row[when] for row in report["targets"] if is_scored(row, role)])
     group = report[role]
     assert group["n"] == len(rows)
     assert group[when]["rmse"] == pytest.approx(np.sqrt((rows**2).mean(axis=0)))
