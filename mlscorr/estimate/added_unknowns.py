@@ -27,6 +27,8 @@ class AddedUnknowns:
     covariance : (k, k) array
     response : (p, k) array
         Of the trend: by how much a unit of each would change it, where it is left out.
+    trend_variance : (p,) array
+        Of the trend beside them.
     statistic, critical : float
         Chi-squared of k degrees of freedom, and its critical value.
     """
@@ -34,6 +36,7 @@ class AddedUnknowns:
     correction: np.ndarray
     covariance: np.ndarray
     response: np.ndarray
+    trend_variance: np.ndarray
     statistic: float
     critical: float
 
@@ -63,7 +66,8 @@ class AddedUnknowns:
         right = weights.T @ solved.misclosure
         correction = covariance @ right
         critical = float(chdtri(len(correction), SETTINGS.significance))
-        return cls(correction, covariance, response, float(right @ correction), critical)
+        beside = np.diag(solved.trend_covariance + response @ covariance @ response.T)
+        return cls(correction, covariance, response, beside, float(right @ correction), critical)
 
     @property
     def sigma(self) -> np.ndarray:

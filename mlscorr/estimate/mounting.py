@@ -224,20 +224,30 @@ def prior_sigma(mounting: Mounting) -> np.ndarray:
 
 def _collocation(equations, posterior, recorded, start):
     """The estimate by collocation, averaged over the parameters, and what is determined (6 k,)."""
-    constant = np.tile(np.eye(3), (len(equations.mounting), 1, 1))
-    constant[len(equations.names) :] = 0.0  # the rows that hold the mountings
-    with_shift = np.concatenate([equations.mounting, constant], axis=2)
-    if len(equations.names) == 0:  # nothing sees a constant difference
-        with_shift = equations.mounting
+    shifting = with_shift(equations)
     mean, square, shifted, sigma0 = 0.0, 0.0, 0.0, 0.0
     for parameters, probability in posterior.points:
         solved = equations.solve(parameters)
         mean += probability * solved.trend
         square += probability * (solved.trend_covariance + np.outer(solved.trend, solved.trend))
         sigma0 += probability * solved.sigma0
-        free = replace(equations, mounting=with_shift).solve(parameters)
+        free = shifting.solve(parameters)
         shifted += probability * np.diag(free.trend_covariance)[: len(start)]
     correction, covariance = combined_correction(start, mean), square - np.outer(mean, mean)
     estimate = MountingEstimate.about(recorded, correction, covariance, float(sigma0))
-    limit = np.tile(np.repeat(SETTINGS.determined_sigma, 3), len(recorded))
-    return estimate, np.sqrt(shifted) < limit
+    return estimate, is_determined(shifted)
+
+
+def with_shift(equations: Equations) -> Equations:
+    """The same with a constant difference between the coordinates of control and trajectory."""
+    if len(equations.names) == 0:  # nothing sees it
+        return equations
+    constant = np.tile(np.eye(3), (len(equations.mounting), 1, 1))
+    constant[len(equations.names) :] = 0.0  # the rows that hold the mountings
+    return replace(equations, mounting=np.concatenate([equations.mounting, constant], axis=2))
+
+
+def is_determined(variance: np.ndarray) -> np.ndarray:
+    """Which components (6 k,) of mountings a geometry tells, by their variance with any shift."""
+    limit = np.tile(np.repeat(SETTINGS.determined_sigma, 3), len(variance) // 6)
+    return np.sqrt(variance) < limit

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from mlscorr.correction import Correction
 from mlscorr.estimate.added_unknowns import AddedUnknowns, with_added
 from mlscorr.estimate.calibration import SCANNER_COMPONENTS, Calibration, ScannerErrors
+from mlscorr.estimate.mounting import is_determined, with_shift
 from mlscorr.estimate.mounting_estimate import MountingEstimate, combined_correction
 from mlscorr.estimate.prediction import predict_pose_error
 from mlscorr.estimate.settings import SETTINGS
@@ -45,7 +46,10 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
         return replace(calibration, scanner=errors)
     columns = columns[:, is_wrong]
     # An error that data sheets rule out is no draw from what they state: it is not held to that
-    lacks = AddedUnknowns.of(equations, parameters, columns, np.full(is_wrong.sum(), np.inf))
+    free = np.full(is_wrong.sum(), np.inf)
+    lacks = AddedUnknowns.of(equations, parameters, columns, free)
+    shifted = AddedUnknowns.of(with_shift(equations), parameters, columns, free).trend_variance
+    determined = calibration.determined & is_determined(shifted[: len(calibration.determined)])
     correction[is_wrong], sigma[is_wrong] = lacks.correction, lacks.sigma
     equations = with_added(equations, -columns @ lacks.correction)
     pose_error = predict_pose_error(equations, calibration.posterior)
@@ -53,6 +57,7 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
         calibration,
         equations=equations,
         drift=Correction.by_pose_error(calibration.trajectory, *pose_error),
+        determined=determined,
         lsc=_without(calibration.recorded, calibration.lsc, lacks),
         scanner=ScannerErrors(correction, sigma, sigma < least, is_wrong),
     )

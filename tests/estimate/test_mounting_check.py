@@ -61,7 +61,7 @@ def test_a_lever_arm_is_named_where_it_exceeds_its_sigma_and_alone():
     "As two passes of a good POS tell of 9 cm; up, which they don't tell, is not named"
     lacks, sigma = [-0.087, 0.004, 0.094, 0.0, 0.0, 0.0], [0.011, 0.011, 0.129, 4e-4, 3e-4, 2e-4]
     covariance = np.diag(np.square(sigma))
-    check = AddedUnknowns(np.array(lacks), covariance, np.zeros((0, 6)), 68.6, 22.5)
+    check = AddedUnknowns(np.array(lacks), covariance, np.zeros((0, 6)), np.zeros(0), 68.6, 22.5)
     (sentence,) = mounting_warnings(check)
     assert "it lacks lever arm right -0.087 ± 0.011 m (chi-squared 69" in sentence
     assert mounting_warnings(replace(check, statistic=20.0)) == ()

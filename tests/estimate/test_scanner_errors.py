@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import calibration_with_ties, estimate_mounting, with_scanner_errors
+from mlscorr.estimate.mounting import believed_mounting
 from mlscorr.frames import georeference, scanner_partials, to_scanner
 from tests.beds.tied_site import RECORDED, tied_site
 
@@ -69,6 +70,21 @@ def test_an_encoder_beyond_any_data_sheet_is_not_pulled_to_it():
     assert abs(lacks.correction[1] + 0.005) < 2 * lacks.sigma[1]
     assert (np.abs(freed.lsc.correction - site.lacks) < 2 * freed.lsc.sigma).all()
     assert "mrad per rad (not determined)." in freed.warnings[-1]
+
+
+def test_an_encoder_that_looks_like_a_boresight_leaves_it_undetermined():
+    "Targets far to the left alone: by its scale or by a turn, roll and pitch come to the same"
+    site = tied_site(1, targets=48, number=3)
+    matched, _ = distorted(site, 0.0, 0.03)
+    beam = to_scanner(site.trajectory, RECORDED, matched.observations.position, matched.gps_time)
+    one_way = matched[np.arctan2(beam[:, 1], beam[:, 0]) > np.radians(165.0)]
+    known = believed_mounting(site.trajectory, [RECORDED], one_way)
+    assert known.determined[3:].all()
+    freed = with_scanner_errors(known, one_way)
+    assert freed.scanner.significant[1]
+    assert freed.determined.tolist() == [True, True, False, False, False, True]
+    assert freed.lsc.sigma[4] > 0.002  # rad
+    assert "boresight about forward" in freed.sigma_note
 
 
 @pytest.mark.long
