@@ -13,6 +13,8 @@ from mlscorr.survey import Trajectory
 def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
     """The trajectory, where a vehicle can move so: no lone epoch far off, no leap of a distance.
 
+    Epochs that come within a microsecond are one, as no file of ours tells them apart.
+
     A POS that finds its satellites again falls back at once by metres, so a single step may be
     faster than any vehicle, two in turn may not.
 
@@ -26,7 +28,13 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
     ------
     ValueError
         Counts the steps that no vehicle makes, and names the fastest.
+
+    Warns
+    -----
+    UserWarning
+        Where epochs are taken as one.
     """
+    trajectory = _distinct_epochs(path, trajectory)
     length = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     speed = length / np.diff(trajectory.gps_time)
     if np.ptp(trajectory.gps_time) > WEEK and speed.max() < SETTINGS.moving:
@@ -45,6 +53,22 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
             "and s. Remove it, or export the trajectory anew."
         )
     return trajectory
+
+
+def _distinct_epochs(path, trajectory):
+    """The trajectory with the first of each few epochs that are one; a speed between them is noise.
+
+    Times are compared as ``write_trajectory_csv`` writes them.
+    """
+    is_same = np.diff(np.round(trajectory.gps_time, 6), prepend=-np.inf) == 0
+    if not is_same.any():
+        return trajectory
+    warnings.warn(
+        f"{is_same.sum()} of {len(trajectory)} epochs of {path} come within a microsecond of the "
+        f"one before (first: {trajectory.gps_time[np.argmax(is_same)]:.6f} s): they are left out.",
+        stacklevel=5,
+    )
+    return Trajectory.concatenate([trajectory.select(~is_same)])
 
 
 def check_heading(

@@ -10,6 +10,7 @@ from mlscorr.frames import angles_from_attitude, attitude_from_angles, georefere
 from mlscorr.io.crs_checks import describe_projection
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS, read_sbet
 from mlscorr.io.trajectory import read_trajectory, write_trajectory_csv
+from mlscorr.pos.steps import find_steps
 from mlscorr.survey import Mounting, Trajectory
 from tests.beds.shared import shared
 
@@ -44,6 +45,19 @@ def table_of(trajectory, degrees=True):
 
 
 # ---- CSV
+
+
+def test_epochs_within_a_microsecond_are_one(tmp_path):
+    "An epoch 2 ns after another is left out with a sentence; it made a step of 22 cm"
+    written = table_of(drive())
+    table = np.insert(written, 200, written[200], axis=0)
+    table[201, 0] += 2e-9
+    path = tmp_path / "trajectory.csv"
+    np.savetxt(path, table, delimiter=",", header=HEADER, comments="", fmt="%.10f")
+    with pytest.warns(UserWarning, match=r"1 of 401 epochs .* within a microsecond"):
+        read = read_trajectory(path)
+    np.testing.assert_allclose(read.gps_time, written[:, 0], atol=1e-9)
+    assert len(find_steps(read)) == 0
 
 
 @pytest.mark.parametrize("sigmas", [True, False])
