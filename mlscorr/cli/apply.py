@@ -28,10 +28,10 @@ def apply(
     """Take a clock offset, datum or mounting that was found out of clouds and trajectory."""
     import numpy as np
 
-    from mlscorr.pipeline.applying import read_effects
+    from mlscorr.pipeline.found_effects import read_effects
 
     with exit_code(Exit.USAGE):
-        effects = [effect for source in sources for effect in read_effects(source)]
+        effects = [read_effects(source) for source in sources]
     with work(out, overwrite, survey) as progress:
         applied = mlscorr.apply(mlscorr.read_survey(survey), effects)
         content = applied.write(out, overwrite, progress)

@@ -126,9 +126,7 @@ class Calibration(Summary):
     @property
     def sigma_note(self) -> str:
         """On what sigmas of the one mounting rest that this geometry can't tell; else empty."""
-        parts = ", ".join(compress(MOUNTING_COMPONENTS, ~self.determined))
-        note = f"not determined: {parts}; its sigma holds only as far as the POS's own do"
-        return note if parts else ""
+        return sigma_note(self.determined)
 
     @property
     def posterior(self) -> Posterior:
@@ -239,6 +237,13 @@ class Calibration(Summary):
             ties_with_drift=self.ties_with_drift and self.ties_with_drift.of_scanner(number),
             scanner=None if self.scanner is None else self.scanner.of(number),
         )
+
+
+def sigma_note(determined: np.ndarray) -> str:
+    """On what sigmas of a mounting rest, of its components (6,) that are determined or not."""
+    parts = ", ".join(compress(MOUNTING_COMPONENTS, ~determined))
+    note = f"not determined: {parts}; its sigma holds only as far as the POS's own do"
+    return note if parts else ""
 
 
 def mounted_corrections(

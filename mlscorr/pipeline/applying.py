@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.correction import Correction
-from mlscorr.effects import Effect, effect_class, make_effect
+from mlscorr.effects import Effect
 from mlscorr.effects.wording import joined
 from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.io.conversion import written_name
@@ -20,24 +19,22 @@ from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.found_effects import CLOCK, MOUNTING, TAKEN_OUT, FoundEffects
 from mlscorr.pipeline.near_points import remounting_fault
 from mlscorr.survey import Survey, SurveyFileError, check_survey
 from mlscorr.survey.summary import Summary
 
-CLOCK = "time_offset"
-MOUNTING = ("lever_arm", "boresight")
-DATUM = ("horizontal_datum", "vertical_datum")
-TAKEN_OUT = (CLOCK, *MOUNTING, *DATUM)
 
-
-def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
+def apply(
+    survey: Survey, effects: Iterable[Effect | FoundEffects] | Effect | FoundEffects
+) -> AppliedSurvey:
     """Take effects of known size out of a survey: clock offset, mounting, datum.
 
     Parameters
     ----------
     survey : Survey
         As recorded, with the effects in it.
-    effects : iterable of Effect, or one
+    effects : iterable of Effect or FoundEffects, or one
         ``mlscorr.effects.make_effect`` makes them, ``read_effects`` reads what was found.
 
     Returns
@@ -49,8 +46,9 @@ def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
     Raises
     ------
     ValueError
-        For what is no effect, effects that nothing can take out, and for a mounting where there is
-        none, or several, or where the clouds are not as it puts them.
+        For what is no effect, effects that nothing can take out, those that were found in other
+        clouds, and for a mounting where there is none, or several, or where the clouds are not as
+        it puts them.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.effects import make_effect
@@ -71,7 +69,8 @@ def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
     0.08
     """
     check_survey(survey)
-    effects = _effects(effects)
+    parts = _effects_together(effects)
+    effects = tuple(effect for part in parts for effect in part.effects)
     stubborn = [effect for effect in effects if effect.name not in TAKEN_OUT]
     if not effects:
         raise ValueError(f"No effect is given: {joined(TAKEN_OUT)} can be taken out.")
@@ -82,7 +81,10 @@ def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
             f"{names} can't be taken out of clouds and trajectory; {joined(TAKEN_OUT)} can. "
             f"{remedies}"
         )
-    if any(effect.name in MOUNTING for effect in effects):
+    for part in parts:
+        part.check_clouds(survey)
+    mounted = [part for part in parts if part.is_of_mounting]
+    if mounted:
         survey.check_one_scanner("a mounting that is applied")
         if fault := remounting_fault(survey):
             raise ValueError(fault)
@@ -91,81 +93,26 @@ def apply(survey: Survey, effects: Iterable[Effect] | Effect) -> AppliedSurvey:
                 f"{survey.path} has no [mounting], which {joined(MOUNTING, 'or')} could change. "
                 "Add the lever_arm (m) and boresight (deg) that the cloud was georeferenced with."
             )
-    return AppliedSurvey(survey, effects, _correction(survey, effects))
+    correction = _correction(survey, effects)
+    mounting = correction.corrected_mounting
+    if mounting is None or len(mounted) > 1:  # of several nobody knows how well it is known
+        return AppliedSurvey(survey, effects, correction)
+    mounting = replace(mounting, covariance=mounted[0].covariance)
+    correction = replace(correction, corrected_mounting=mounting)
+    return AppliedSurvey(survey, effects, correction, mounted[0].note)
 
 
-def _effects(given) -> tuple[Effect, ...]:
-    """One effect or a list of them as a tuple; a ValueError for what is none."""
+def _effects_together(given) -> list[FoundEffects]:
+    """One effect or a list of them, each by itself or as it was found; a ValueError for others."""
     is_list = isinstance(given, Iterable) and not isinstance(given, str)
     effects = tuple(given) if is_list else (given,)
     for effect in effects:
-        if not isinstance(effect, Effect):
+        if not isinstance(effect, Effect | FoundEffects):
             raise ValueError(
                 f"{effect!r} is no effect: mlscorr.effects.make_effect(name, magnitude=size) makes "
                 f"one; {joined(TAKEN_OUT)} can be taken out."
             )
-    return effects
-
-
-def read_effects(source: str | Path) -> tuple[Effect, ...]:
-    """Effects that were found: by a document of diagnose or calibrate, or one by name and size.
-
-    Parameters
-    ----------
-    source : str or path
-        gap.json, calibration.json, or ``NAME=SIZE`` with three numbers for a vector, two for a
-        horizontal one: ``boresight=0.1,0,-0.2`` (deg).
-
-    Raises
-    ------
-    ValueError
-        Where it is neither, or names nothing that was found.
-    OSError
-        Where a document can't be read.
-    """
-    name, equals, size = str(source).partition("=")
-    if equals and name in TAKEN_OUT:
-        try:
-            values = [float(value) for value in size.split(",")]
-        except ValueError:
-            raise ValueError(f"{source}: {size!r} is no number, nor several with commas.") from None
-        return (make_effect(name, magnitude=values if len(values) > 1 else values[0]),)
-    if not Path(source).is_file():
-        raise ValueError(
-            f"There is no file {source}: neither a gap.json or calibration.json nor NAME=SIZE with "
-            f"one of {joined(TAKEN_OUT, 'or')}, as time_offset=0.005 (s)."
-        )
-    try:
-        content = json.loads(Path(source).read_text(encoding="utf-8"))
-        readers = {"mlscorr.gap/1": _of_gap, "mlscorr.calibration/1": _of_calibration}
-        return readers[content["schema"]](content)
-    except (KeyError, TypeError, json.JSONDecodeError):
-        raise ValueError(
-            f"{source} is no gap.json or calibration.json of mlscorr, or not one of a single "
-            "scanner; calibrate --clouds writes the clouds of several anew."
-        ) from None
-
-
-def _of_gap(content):
-    """The effects of the most probable cause; a ValueError where there is none."""
-    label, cause = content["verdict"]["label"], content["causes"][0] if content["causes"] else None
-    if label in ("none", "unknown") or cause is None or cause["effect"] != label:
-        raise ValueError(f"The diagnosis names no cause but {label}: nothing can be taken out.")
-    effects = []
-    for name in label.split("+"):
-        kind = effect_class(name)
-        if name not in TAKEN_OUT:
-            raise ValueError(f"{name}, a cause, can't be taken out of the cloud. {kind.remedy}")
-        sizes = {row["name"].removeprefix(f"{name} "): row for row in cause["parameters"]}
-        values = [sizes[part]["estimate"] for part in kind.parts]
-        effects.append(make_effect(name, magnitude=values if len(values) > 1 else values[0]))
-    return tuple(effects)
-
-
-def _of_calibration(content):
-    """What the recorded mounting lacks."""
-    lacks = content["lsc"]
-    return tuple(make_effect(name, magnitude=lacks[name]["correction"]) for name in MOUNTING)
+    return [e if isinstance(e, FoundEffects) else FoundEffects((e,)) for e in effects]
 
 
 def _correction(survey, effects):
@@ -204,11 +151,14 @@ class AppliedSurvey(Summary):
         That are taken out.
     correction : Correction
         Of trajectory and mounting.
+    note : str
+        On what the sigmas of the mounting rest.
     """
 
     survey: Survey
     effects: tuple[Effect, ...]
     correction: Correction
+    note: str = ""
 
     def write(
         self, out: str | Path, overwrite: bool = False, progress: Callable | None = None
@@ -246,7 +196,7 @@ class AppliedSurvey(Summary):
             write_survey_copy(
                 survey.path, folder / FILE_NAME, out, [] if mounting is None else [mounting],
                 [[written_name(file.path) for file in part.clouds] for part in parts], trajectory,
-                survey.corrected_by,
+                survey.corrected_by, [] if mounting is None else [self.note],
             )  # fmt: skip
             effects = [effect.document() for effect in self.effects]
             content = document("applied", {"name": survey.name, "effects": effects, "files": files})

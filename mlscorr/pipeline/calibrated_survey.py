@@ -23,6 +23,7 @@ from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.found_effects import cloud_rows
 from mlscorr.survey import Matched, Survey
 from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary
@@ -81,7 +82,8 @@ class CalibrationResult(Summary):
         from mlscorr.report.calibration_page import calibration_page
 
         survey, parts = self.survey, self.parts
-        content = document("calibration", self.report(with_drift) | {"files": []})
+        read = {"clouds": cloud_rows(survey), "files": []}
+        content = document("calibration", self.report(with_drift) | read)
         calibrations = {name: part.calibration for name, part in parts.items()}
         files = [[written_name(file.path) for file in p.survey.clouds] for p in parts.values()]
         with output_folder(out, survey.inputs, overwrite) as folder:

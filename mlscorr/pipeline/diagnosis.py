@@ -22,6 +22,7 @@ from mlscorr.gap.signatures import Signature, as_believed, curvature, select, si
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.found_effects import cloud_rows
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate.simulator_file import Simulator, beliefs_of, write_simulator
 from mlscorr.survey import Survey, check_rng, check_survey
@@ -267,6 +268,7 @@ def write_diagnosis(
     from mlscorr.report.gap import diagnosis_page
 
     page = diagnosis_page(content, survey.name)
+    content = content | {"clouds": cloud_rows(survey)}
     with output_folder(out, survey.inputs, overwrite) as folder:
         write_json(folder / "gap.json", content)
         page.write(folder / "gap.html")

@@ -14,7 +14,7 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.io.survey_copy import write_survey_copy
-from mlscorr.pipeline.applying import read_effects
+from mlscorr.pipeline.found_effects import cloud_rows, read_effects
 from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.documents import undocumented
@@ -85,12 +85,51 @@ def test_what_was_found_is_read_from_documents(tmp_path):
     label = "time_offset+boresight"
     gap = {"schema": "mlscorr.gap/1", "verdict": {"label": label}}
     path.write_text(json.dumps({**gap, "causes": [{"effect": label, "parameters": rows}]}))
-    late, turned = read_effects(path)
+    late, turned = read_effects(path).effects
     assert late == make_effect("time_offset", magnitude=-0.004)
     assert turned.magnitude == (0.1, 0.1, 0.1)
-    lacks = {"lever_arm": {"correction": [0, 0.1, 0]}, "boresight": {"correction": [0, 0, 0.2]}}
-    path.write_text(json.dumps({"schema": "mlscorr.calibration/1", "lsc": lacks}))
-    assert [effect.name for effect in read_effects(path)] == ["lever_arm", "boresight"]
+    path.write_text(json.dumps(calibration()))
+    assert [effect.name for effect in read_effects(path).effects] == ["lever_arm", "boresight"]
+
+
+def calibration():
+    "What apply reads of a calibration.json: lever arm forward not determined"
+    lsc = {
+        "lever_arm": {"correction": [0, 0.1, 0], "sigma": [0.01, 0.03, 0.02]},
+        "boresight": {"correction": [0, 0, 0.2], "sigma": [0.01, 0.02, 0.03]},
+        "correlation": (0.5 * np.eye(6) + 0.5).tolist(),
+    }
+    determined = [True, False, True, True, True, True]
+    return {"schema": "mlscorr.calibration/1", "lsc": lsc, "determined": determined}
+
+
+def test_a_mounting_is_known_as_well_as_the_calibration_knows_it(site, tmp_path):
+    "survey.toml has its sigmas and correlation, and on what they rest; with more applied, none"
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(calibration()))
+    with warnings.catch_warnings(action="ignore"):
+        survey, found = mlscorr.read_survey(site), read_effects(path)
+        mlscorr.apply(survey, found).write(tmp_path / "out")
+        known = mlscorr.read_survey(tmp_path / "out").mounting
+    sigma = np.append([0.01, 0.03, 0.02], np.radians([0.01, 0.02, 0.03]))
+    covariance = np.outer(sigma, sigma) * (0.5 * np.eye(6) + 0.5)
+    np.testing.assert_allclose(known.covariance, covariance, rtol=1e-5)
+    text = (tmp_path / "out" / "survey.toml").read_text()
+    assert "# not determined: lever arm forward; its sigma holds" in text
+    more = mlscorr.apply(survey, [found, make_effect("lever_arm", magnitude=[0.0, 0.1, 0.0])])
+    assert more.correction.corrected_mounting.covariance is None
+
+
+def test_what_was_found_in_other_clouds_is_refused(site, tmp_path):
+    "The clouds out of which it was taken are others: it is not taken out of these once more"
+    path = tmp_path / "calibration.json"
+    with warnings.catch_warnings(action="ignore"):
+        survey = mlscorr.read_survey(site)
+        path.write_text(json.dumps(calibration() | {"clouds": cloud_rows(survey)}))
+        mlscorr.apply(survey, [read_effects(path)]).write(tmp_path / "out")
+        without = mlscorr.read_survey(tmp_path / "out")
+        with pytest.raises(ValueError, match=r"None of the 1 clouds .* taken out of them already"):
+            mlscorr.apply(without, [read_effects(path)])
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.gap.signatures.simulators import as_believed, with_cause
 from mlscorr.gap.train.cases import RANDOM
 from mlscorr.io.las import read_chunks
+from mlscorr.pipeline.found_effects import read_effects
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator
 from tests.beds import diagnosed_street
@@ -30,6 +31,7 @@ KEYS = {
     *("closure", "next_data", "evidence", "innovations", "windows", "map", "channels"),
     *("simulator", "left_out", "warnings", "notes", "name", "absent"),
     *("rating", "statements", "agreement", "costs", "contrasts", "distances"),
+    "clouds",
 }
 
 
@@ -77,6 +79,13 @@ def test_the_effect_that_acts_is_named_with_its_size(diagnosed):
     assert closure["shrink"] > 0.9
     assert closure["null_band"][1] < closure["before"]
     assert abs(sum(told["where"][0]["share"]) - 1) < 1e-9
+
+
+def test_what_was_diagnosed_can_be_taken_out_of_these_clouds(late, diagnosed):
+    "gap.json knows them: the clock offset goes out of this survey"
+    survey, found = mlscorr.read_survey(late), read_effects(diagnosed / "gap.json")
+    assert [row["name"] for row in found.clouds] == [file.path.name for file in survey.clouds]
+    assert mlscorr.apply(survey, found).effects == found.effects
 
 
 @pytest.mark.long

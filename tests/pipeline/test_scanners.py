@@ -91,6 +91,7 @@ def test_both_scanners_are_calibrated(name, request):
     content = json.loads((out / "calibration.json").read_text())
     assert list(content["scanners"]) == ["1", "2"]
     assert undocumented(content) == {"1", "2"}  # the names of the scanners
+    assert content["clouds"] and all(row["bytes"] > 0 for row in content["clouds"])
     for (scanner, part), lacks in zip(content["scanners"].items(), LACKS, strict=True):
         lsc = part["lsc"]
         for key, truth in (("lever_arm", lacks[:3]), ("boresight", lacks[3:])):
