@@ -161,9 +161,11 @@ def clock_warnings(estimate: MountingEstimate, trajectory: Trajectory) -> Iterat
     lack = estimate.correction[1]
     if abs(lack) > SETTINGS.setup_sigmas * estimate.sigma[1]:
         way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
-        speed = way @ (way / np.diff(trajectory.gps_time)) / way.sum()  # where it drives, no halts
+        speeds = way / np.diff(trajectory.gps_time)
+        speed = np.average(speeds, weights=way)  # where it drives, no halts
+        spread = np.sqrt(np.average((speeds - speed) ** 2, weights=way))
         yield (
             f"The lever arm lacks {1e3 * lack:.0f} mm forward. A clock offset of "
-            f"{1e3 * abs(lack) / speed:.0f} ms at this survey's speed ({speed:.1f} m/s) looks the "
-            "same; other speeds tell them apart."
+            f"{1e3 * abs(lack) / speed:.0f} ms at this survey's speed ({speed:.1f} ± {spread:.1f} "
+            "m/s) looks the same but where speeds differ: by those mlscorr diagnose tells which."
         )

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from mlscorr.estimate import estimate_mounting
-from mlscorr.estimate.mounting_estimate import MountingEstimate
+from mlscorr.estimate.mounting_estimate import MountingEstimate, clock_warnings
 from mlscorr.frames import georeferenced_anew
+from mlscorr.survey import Trajectory
 from tests.beds.tied_site import RECORDED, tied_site
 
 
@@ -38,8 +40,21 @@ def test_a_lever_arm_that_lacks_something_forward_may_be_a_clock(calibration):
         lacks, covariance = -0.1 * np.eye(6)[axis], sigma**2 * np.eye(6)
         estimate = MountingEstimate.about([RECORDED], lacks, covariance, 1.0)
         warnings = replace(calibration, lsc=estimate).warnings
-        sentence = "lacks -100 mm forward. A clock offset of 20 ms at this survey's speed (5.0 m/s)"
+        sentence = (
+            "lacks -100 mm forward. A clock offset of 20 ms at this survey's speed (5.0 ± 0.0 "
+        )
         assert sum(sentence in warning for warning in warnings) == number
+
+
+def test_speeds_that_tell_a_clock_from_a_lever_arm_are_said():
+    "A way half at 5 and half at 15 m/s is driven at 10 ± 5 m/s, and a diagnosis tells by that"
+    lacks, covariance = -0.1 * np.eye(6)[1], 0.01**2 * np.eye(6)
+    estimate = MountingEstimate.about([RECORDED], lacks, covariance, 1.0)
+    speed = np.repeat([5.0, 15.0], [300, 100])  # m/s, over 1500 m each
+    place = np.outer(np.append(0.0, np.cumsum(speed)), [1.0, 0.0, 0.0])
+    driven = Trajectory(413_200.0 + np.arange(401.0), place, Rotation.identity(401))
+    (sentence,) = clock_warnings(estimate, driven)
+    assert "10 ms at this survey's speed (10.0 ± 5.0 m/s) looks the same but where" in sentence
 
 
 def test_a_correction_by_least_squares_is_another_than_by_collocation(calibration):
