@@ -114,7 +114,9 @@ def _differences(driven, span):
     usual = np.median(largest[np.unique(second)])
     jerk = SETTINGS.largest_jerk / 2 * times[span : span + len(size)] ** 3
     limit = np.maximum(jerk, max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual))
-    rows = np.flatnonzero((length > limit) & (length == largest[second]))
+    is_step = (length > limit) & (length == largest[second])
+    is_step[:span] = is_step[-span:] = False  # half of what a step in the outer span would be
+    rows = np.flatnonzero(is_step)
     # what the spans wholly before and after show is no step: filters and resampling ring beside one
     beside = np.pad(length, 2 * span, constant_values=usual)
     sigma = beside[[rows, rows + 4 * span]].max(axis=0).clip(usual)

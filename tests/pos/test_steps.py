@@ -127,3 +127,12 @@ def test_a_drone_that_turns_on_its_way_makes_no_steps():
     path = CORNER + np.outer(time, [3.0, 4.0, 0.0])
     turning = attitude_from_angles(0.0, 0.0, np.radians(90.0) * np.clip(time - 20.0, 0.0, 8.0))
     assert len(find_steps(Trajectory(START + time, path, turning))) == 0
+
+
+@pytest.mark.parametrize("row", [1, 2, -2, -1])
+def test_a_step_in_the_outermost_epochs_is_no_half_step_beside_them(row):
+    "What moves at the first or last epoch of a pass is not told from what moves beside it"
+    path = CORNER + np.outer(np.arange(600) * 0.1, [0.0, 10.0, 0.0])
+    path[row:] += [1.5, 0.0, 0.0]
+    trajectory = Trajectory(START + np.arange(600) * 0.1, path, Rotation.identity(600))
+    assert not np.any(find_steps(trajectory).size[:, 0] < 0.75)  # m

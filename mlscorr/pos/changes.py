@@ -1,0 +1,93 @@
+"""What sigma(t) states, free of the noise of epochs, and in time with the recorded path."""
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from mlscorr.pos.settings import SETTINGS
+from mlscorr.pos.steps import Steps
+from mlscorr.survey import Trajectory
+
+
+def quick_changes(gps_time: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Rows (k, 2) before and after each change of a size, at once or as filters spread it.
+
+    Before and after it the size stays, or changes by less than half as much in as long a time:
+    what grows from nothing, and sinks to it, is no such change, though it doubles in no time.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    size : (n,) array
+        Units: m.
+    """
+    later = _beside(gps_time, np.arange(len(size)), SETTINGS.step_duration)
+    least, largest = np.sort([size[later], size], axis=0)
+    changed = []
+    for first, last in runs(largest > SETTINGS.steady_ratio * least):
+        changes = np.abs(np.diff(size[first : later[last - 1] + 1]))
+        large = first + np.flatnonzero(changes >= changes.max() / SETTINGS.steady_ratio)
+        changed.append((large[0], large[-1] + 1))
+    first, last = np.array(changed, int).reshape(-1, 2).T
+    as_long = np.maximum(gps_time[last] - gps_time[first], SETTINGS.step_duration)
+    sooner, later = _beside(gps_time, first, -as_long), _beside(gps_time, last, as_long)
+    beside = np.abs([size[sooner] - size[first], size[later] - size[last]]).max(axis=0)
+    is_quick = np.abs(size[last] - size[first]) > SETTINGS.steady_ratio * beside
+    return np.column_stack([first, last])[is_quick]
+
+
+def _beside(gps_time, rows, duration):
+    """Rows a duration after rows, or before where it is negative; one row at least."""
+    away = np.searchsorted(gps_time, gps_time[rows] + duration, side="right") - 1
+    away = np.where(duration > 0, np.maximum(away, rows + 1), np.minimum(away, rows - 1))
+    return away.clip(0, len(gps_time) - 1)
+
+
+def runs(flags: np.ndarray, cuts: np.ndarray | tuple = ()) -> list[tuple[int, int]]:
+    """First row of each run of flags, and the row after its last one; parted at cuts.
+
+    Parameters
+    ----------
+    flags : (n,) bool array
+    cuts : (k,) int array
+    """
+    change = np.diff(flags.astype(int), prepend=0, append=0)
+    cuts = [row for row in cuts if 0 < row < len(flags) and flags[row - 1] and flags[row]]
+    rows = [np.sort(np.append(np.flatnonzero(change == side), cuts)) for side in (1, -1)]
+    return list(zip(*(row.astype(int) for row in rows), strict=True))
+
+
+def timely_sigma(trajectory: Trajectory, steps: Steps) -> np.ndarray:
+    """Sigma (n, 3) of the position, by the median about each epoch, that changes with the path.
+
+    What a trajectory states is often of another rate, or of another filter, than its path: a step
+    of the path near a change is the same event, seen better, since the error can't change at once
+    where the path doesn't. Units: m.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        With sigmas.
+    steps : Steps
+    """
+    time, sigma = trajectory.gps_time, np.empty_like(trajectory.position_sigma)
+    beside = round(SETTINGS.step_duration / float(np.median(np.diff(time))))
+    for first, last in np.searchsorted(time, trajectory.passes):
+        own = slice(first, last + 1)
+        for axis, stated in enumerate(trajectory.position_sigma.T):
+            sigma[own, axis] = median_filter(stated[own], 2 * beside + 1, mode="nearest")
+    changes = quick_changes(time, np.linalg.norm(sigma, axis=1))
+    timely, rows = sigma.copy(), np.searchsorted(time, steps.middle)
+    for change, step in _pairs(time[changes].mean(axis=1), steps.middle):
+        (first, last), row = changes[change], rows[step]
+        timely[first:row], timely[row:last] = sigma[first], sigma[last]
+    return timely
+
+
+def _pairs(times, others):
+    """Numbers (k, 2) of times and others within fix_time, twice as near as to any third."""
+    away = np.full((len(times) + 2, len(others) + 2), 2 * SETTINGS.fix_time)
+    away[:-2, :-2] = np.abs(times[:, None] - others)
+    second = [np.partition(away, 1, axis=axis).take(1, axis=axis) for axis in (0, 1)]
+    limit = np.minimum(second[0], second[1][:, None]) / 2
+    return np.argwhere((away < limit)[:-2, :-2])
