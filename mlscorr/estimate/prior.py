@@ -10,13 +10,14 @@ from mlscorr.estimate.equations import NO_TREND, Equations
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 
+SCALES = ("drift_scale", "walk_scale", "jitter_scale", "bias_scale")
 # One sigma of the logarithms about their start
 SPREAD = {
     name: float(np.log(factor))
     for factor, names in (
         (SETTINGS.precise_factor, ("drift_time", "attitude_scale")),
         (SETTINGS.time_factor, ("jitter_time", "bias_time", "attitude_time", "trend_sigma")),
-        (SETTINGS.scale_factor, ("drift_scale", "walk_scale", "jitter_scale", "bias_scale")),
+        (SETTINGS.scale_factor, (*SCALES, "level_scale")),
     )
     for name in names
 }
@@ -89,6 +90,7 @@ def _prior(equations, time, attitude_follows):
         start["trend_sigma"] = float(np.sqrt(np.mean(equations.stated_epochs.gnss**2)))
     is_split = bool(np.any(equations.stated.gnss))
     fixed = (() if is_split else SPLIT) + (("attitude_time",) if attitude_follows else ())
+    fixed += ("level_scale",) if equations.stated.gnss_clock is None else ()
     fixed += ("trend_sigma",) if equations.order == NO_TREND or not is_held else ()
     free = [name for name in NAMES if name not in fixed]
     return Prior(

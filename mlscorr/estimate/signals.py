@@ -24,6 +24,8 @@ class SignalParameters:
         Of the random walk in an integrated drift.
     jitter_scale, jitter_time : float
     bias_scale, bias_time : float
+    level_scale : float
+        Of what sigma(t) is raised by at once, as by a solution that is not fixed.
     attitude_scale, attitude_time : float
     trend_sigma : float
         Of each coefficient of the trend. Units: m.
@@ -37,6 +39,7 @@ class SignalParameters:
     jitter_time: float
     bias_scale: float
     bias_time: float
+    level_scale: float
     attitude_scale: float
     attitude_time: float
     trend_sigma: float
@@ -57,7 +60,8 @@ def pose_signals(
     """
     position, rotation = partials[:, :, :3], partials[:, :, 3:]
     family = "matern32" if parameters.family == INTEGRATED else parameters.family
-    gnss, clock = position * stated.gnss[:, None], stated.gnss_clock
+    gnss = position * stated.gnss_by(parameters.level_scale)[:, None]
+    clock = stated.gnss_clock
     jitter = Covariance("exponential", parameters.jitter_time)
     return (
         *_drift(stated, parameters, position),

@@ -85,6 +85,7 @@ def _covariance(parameters):
         "jitter_scale": parameters.jitter_scale,
         "bias_correlation_time": parameters.bias_time,
         "bias_scale": parameters.bias_scale,
+        "level_scale": parameters.level_scale,
         "attitude_scale": parameters.attitude_scale,
     }
 

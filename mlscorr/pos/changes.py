@@ -85,8 +85,9 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> np.ndarray:
 
 
 def _pairs(times, others):
-    """Numbers (k, 2) of times and others within fix_time, twice as near as to any third."""
-    away = np.full((len(times) + 2, len(others) + 2), 2 * SETTINGS.fix_time)
+    """Numbers (k, 2) of times and others that can be the same, twice as near as to any third."""
+    farthest = SETTINGS.sigma_interval + SETTINGS.step_duration
+    away = np.full((len(times) + 2, len(others) + 2), 2 * farthest)
     away[:-2, :-2] = np.abs(times[:, None] - others)
     second = [np.partition(away, 1, axis=axis).take(1, axis=axis) for axis in (0, 1)]
     limit = np.minimum(second[0], second[1][:, None]) / 2

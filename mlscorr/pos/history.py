@@ -6,6 +6,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from mlscorr.pos.changes import quick_changes, runs, timely_sigma
 from mlscorr.pos.settings import SETTINGS
 from mlscorr.pos.steps import Steps, find_steps
 from mlscorr.survey import Trajectory
@@ -28,6 +29,9 @@ class DriftHistory:
     starts : (k + r + 1,) array
         When it begins to grow after the start, each restart and each return: where sigma(t) says
         so, never (infinite) where it says that it doesn't, else at once. Units: s.
+    sigma : (n, 3) array
+        What is stated of E, N, H, without the noise of epochs and in time with the path; zero
+        where nothing is. Units: m.
     held : (3,) array
         The sigma of E, N, H that stays while GNSS holds the POS; zero where sigma(t) doesn't tell
         it from the part that grows. Units: m.
@@ -41,6 +45,7 @@ class DriftHistory:
     restarts: np.ndarray
     returns: np.ndarray
     starts: np.ndarray
+    sigma: np.ndarray
     held: np.ndarray
     level: np.ndarray
 
@@ -91,10 +96,9 @@ class DriftHistory:
         gps_time : (n,) array
             Units: s.
         """
-        epochs, sigma = self.trajectory.gps_time, self.trajectory.position_sigma
-        if sigma is None or not self.is_stated:
+        if not self.is_stated:
             return np.full(len(gps_time), -1)
-        size = np.linalg.norm(sigma, axis=1)
+        epochs, size = self.trajectory.gps_time, np.linalg.norm(self.sigma, axis=1)
         is_raised = size > SETTINGS.steady_ratio * np.linalg.norm(self.held)
         number = np.cumsum(np.diff(is_raised, prepend=False) & is_raised) - 1
         number[~is_raised] = -1
@@ -104,19 +108,9 @@ class DriftHistory:
     def turns(self) -> np.ndarray:
         """Times (j,) at which the level changes at once: another solution, of other errors. s."""
         time, size = self.trajectory.gps_time, np.linalg.norm(self.level, axis=1)
-        rows = np.arange(len(time) - 1)
-        # over as long as filters and resampling spread it, an epoch at least
-        later = np.searchsorted(time, time[:-1] + SETTINGS.step_duration, side="right") - 1
-        later = np.maximum(later, rows + 1)
-        least, largest = np.sort([size[later], size[:-1]], axis=0)
-        turned = []
-        for first, last in _runs(largest > SETTINGS.steady_ratio * least):
-            changes = np.abs(np.diff(size[first : later[last - 1] + 1]))
-            # the last large one: what is on the way is no larger than what was before
-            large = np.flatnonzero(changes >= SETTINGS.fall_ratio * changes.max())
-            turned.append(first + large[-1])
-        rows = np.array(turned, int)
-        return (time[rows] + time[rows + 1]) / 2
+        # where the change is over: what is on the way is no larger than what was before
+        rows = quick_changes(time, size)[:, 1]
+        return (time[rows - 1] + time[rows]) / 2
 
     def level_at(self, gps_time: np.ndarray) -> np.ndarray:
         """The level (n, 3) of the epochs at or before times. Units: m.
@@ -148,24 +142,27 @@ def drift_history(trajectory: Trajectory) -> DriftHistory:
 
 
 def _history(trajectory):
-    time, held, steps = trajectory.gps_time, held_sigma(trajectory), find_steps(trajectory)
+    time, steps = trajectory.gps_time, find_steps(trajectory)
     restarts = np.sort(np.concatenate([trajectory.passes[1:, 0], steps.middle]))
+    stated = trajectory.position_sigma
+    sigma = np.zeros((len(time), 3)) if stated is None else timely_sigma(trajectory, steps)
+    held = _held(sigma)
     level = np.tile(held, (len(time), 1))
     if not held.any():
         starts = np.append(time[0], restarts)
-        return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, held, level)
-    sigma = trajectory.position_sigma
-    restarts = np.sort(np.append(restarts, _falls(trajectory, held, restarts)))
+        return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, sigma, held, level)
+    size = np.linalg.norm(sigma, axis=1)
+    changes = quick_changes(time, size)
+    restarts = np.sort(np.append(restarts, _falls(time, size, changes, held, restarts)))
     is_raised = np.maximum(sigma**2 - held**2, 0.0).sum(axis=1) > held @ held
-    returns = _returns(trajectory, _runs(is_raised), restarts)
+    returns = _returns(time, size, runs(is_raised), restarts)
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
-    grown, size = [np.inf], np.linalg.norm(sigma, axis=1)
+    grown = [np.inf]
     cuts = np.searchsorted(time, edges)
-    for first, last in reversed(_runs(is_raised, cuts)):
-        # what filters and resampling spread has come by then
-        settled = np.searchsorted(time, time[first] + SETTINGS.step_duration, side="right") - 1
-        settled = min(settled, last - 1)
-        if first in cuts or size[settled] > SETTINGS.steady_ratio * size[first - 1]:
+    for first, last in reversed(runs(is_raised, cuts)):
+        at_once = changes[(changes[:, 0] <= first) & (first <= changes[:, 1]), 1]
+        settled = min(at_once.max(initial=first), last - 1)
+        if first in cuts or len(at_once):
             level[settled:last] = np.minimum.accumulate(sigma[settled:last], axis=0)
             level[first:settled] = level[settled]
         # what is raised at once and goes back is no drift, but what GNSS holds the POS to
@@ -174,20 +171,11 @@ def _history(trajectory):
     grown = np.array(grown[::-1])
     first = grown[np.searchsorted(grown, edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
-    return DriftHistory(trajectory, steps, restarts, returns, starts, held, level)
+    return DriftHistory(trajectory, steps, restarts, returns, starts, sigma, held, level)
 
 
-def _runs(flags, cuts=()):
-    """First row of each run of flags (n,), and the row after its last one; parted at cuts."""
-    change = np.diff(flags.astype(int), prepend=0, append=0)
-    cuts = [row for row in cuts if 0 < row < len(flags) and flags[row - 1] and flags[row]]
-    rows = [np.sort(np.append(np.flatnonzero(change == side), cuts)) for side in (1, -1)]
-    return list(zip(*(row.astype(int) for row in rows), strict=True))
-
-
-def _returns(trajectory, raised, restarts):
+def _returns(time, size, raised, restarts):
     """Ends of outages in the middle of which sigma(t) is largest, as a smoother states it. s."""
-    size, time = np.linalg.norm(trajectory.position_sigma, axis=1), trajectory.gps_time
     returns = []
     for first, last in raised:
         if last == len(time):
@@ -201,28 +189,20 @@ def _returns(trajectory, raised, restarts):
     return np.array(returns)
 
 
-def _falls(trajectory, held, restarts):
+def _falls(time, size, changes, held, restarts):
     """Times at which sigma(t) falls back, without those of known restarts. Units: s."""
-    size, time = np.linalg.norm(trajectory.position_sigma, axis=1), trajectory.gps_time
-    is_large = size[:-1] > SETTINGS.steady_ratio * np.linalg.norm(held)
-    rows = np.flatnonzero((size[1:] < SETTINGS.fall_ratio * size[:-1]) & is_large)
-    falls = (time[rows] + time[rows + 1]) / 2
+    first, last = changes.T
+    is_fall = (size[last] < size[first]) & (
+        size[first] > SETTINGS.steady_ratio * np.linalg.norm(held)
+    )
+    falls = (time[last - 1] + time[last])[is_fall] / 2
     # a sigma that falls while the path steps a little later or sooner tells of the same return
     away = np.abs(falls[:, None] - restarts).min(axis=1, initial=np.inf)
     return falls[away > SETTINGS.fix_time]
 
 
-def held_sigma(trajectory: Trajectory) -> np.ndarray:
-    """Sigma (3,) of E, N, H to which GNSS holds the POS; zero where sigma(t) is constant. m.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        As recorded, as a whole.
-    """
-    sigma = trajectory.position_sigma
-    if sigma is None:
-        return np.zeros(3)
+def _held(sigma):
+    """Sigma (3,) to which GNSS holds the POS, of (n, 3); zero where it is constant."""
     held = np.percentile(sigma, SETTINGS.held_percentile, axis=0)
     is_steady = (sigma.max(axis=0) <= SETTINGS.steady_ratio * held).all()
     return np.zeros(3) if is_steady else held

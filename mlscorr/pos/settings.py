@@ -10,15 +10,17 @@ class Settings:
     """Limits and scales, each with its unit and source."""
 
     held_percentile: float = 5.0  # of sigma(t): GNSS at its best, free of single epochs
-    steady_ratio: float = 2.0  # of largest to held sigma; below it sigma(t) tells of no drift
+    # of largest to held sigma, below which sigma(t) tells of no drift; of a change within
+    # step_duration, below which GNSS is neither back nor of another solution
+    steady_ratio: float = 2.0
     outage: float = 60.0  # s; for which data sheets of GNSS/INS state how far the position drifts
     smallest_step: float = 0.1  # m; two fixed RTK solutions of 2 cm per axis differ by less
     step_ratio: float = 10.0  # to the median of seconds' largest steps: updates, noise
     largest_jerk: float = 5.0  # m/s^3, of braking in town (ISO 15622); a step is beyond it
     step_duration: float = 0.4  # s; over which filters and resampling spread a fall-back
+    sigma_interval: float = 1.0  # s; at which POS software exports sigmas beside a path of 200 Hz
     whole_step: float = 0.9  # of the largest size; a span that shows less cuts the step
     fix_time: float = 10.0  # s; in which receivers fix ambiguities again, by their data sheets
-    fall_ratio: float = 0.5  # of sigma from one epoch to the next: GNSS is back
     # m, E, N, H: a fixed RTK solution, 1 cm and 1.5 cm + 1 ppm by receivers' data sheets, and as
     # much for what the inertial unit adds
     gnss_sigma: tuple[float, float, float] = (0.02, 0.02, 0.03)

@@ -74,6 +74,19 @@ class StatedSigma:
         """Sigma (n, 3) of a POS that GNSS holds: the stated one, else that of RTK. Units: m."""
         return np.minimum(self.position, self.held if self.history.is_stated else SETTINGS.gnss)
 
+    def gnss_by(self, scale: float) -> np.ndarray:
+        """As gnss (n, 3), where what sigma(t) is raised by at once is taken by a scale. Units: m.
+
+        Parameters
+        ----------
+        scale : float
+            Of the level's part beyond what GNSS holds the POS to at its best.
+        """
+        if self.gnss_clock is None:
+            return self.gnss
+        best = np.minimum(self.gnss, self.history.held)
+        return np.sqrt(best**2 + scale**2 * (self.gnss**2 - best**2))
+
     @cached_property
     def since(self) -> np.ndarray:
         """Time (n,) since drift began to grow, zero before. Units: s."""
@@ -169,14 +182,17 @@ def stated_sigma(
     pose = trajectory if gps_time is None else trajectory.at(gps_time)
     history = drift_history(trajectory)
     shape = (len(pose.gps_time), 3)
-    position, angles = pose.position_sigma, pose.attitude_sigma
-    if position is None:
-        position = np.full(shape, pos.position_sigma)
+    position, angles = np.full(shape, pos.position_sigma), pose.attitude_sigma
+    if trajectory.position_sigma is not None:
+        columns = history.sigma.T
+        position = np.column_stack(
+            [np.interp(pose.gps_time, trajectory.gps_time, column) for column in columns]
+        )
     if angles is None:
         angles = np.broadcast_to(pos.attitude_sigma, shape)
     largest = np.full(3, float(pos.position_sigma))
     if trajectory.position_sigma is not None:
-        largest = trajectory.position_sigma.max(axis=0)
+        largest = history.sigma.max(axis=0)
     return StatedSigma(
         gps_time=pose.gps_time, position=position, angles=angles, rotation=pose.attitude,
         largest=largest, history=history, starts=history.starts if starts is None else starts,

@@ -76,7 +76,7 @@ def test_jitter_and_bias_are_free_where_sigma_has_two_parts(kind):
 def test_scales_are_ten_and_times_two_or_three():
     "One sigma: factor 10 on scales of position, 2 on drift time and attitude, 3 on other times"
     prior = mounting_prior(equations_of(GROWING))
-    factors = {name: np.exp(spread(prior, name)) for name in NAMES}
+    factors = {NAMES[i]: np.exp(own) for i, own in zip(prior.free, prior.spread, strict=True)}
     scales = ("drift_scale", "walk_scale", "jitter_scale", "bias_scale")
     assert factors == pytest.approx(
         {
@@ -85,6 +85,15 @@ def test_scales_are_ten_and_times_two_or_three():
             **dict.fromkeys(("drift_time", "attitude_scale"), 2.0),
         }
     )
+
+
+def test_what_sigma_is_raised_by_at_once_has_a_scale_of_its_own():
+    "A solution of 0.3 m for 60 s may be better than that, by ten; what grows gently needs none"
+    sigma = np.where((EPOCHS > 60.0) & (EPOCHS < 120.0), 0.3, 0.02)[:, None] * np.ones(3)
+    case = Case(EPOCHS, CONSTANT, even(5), np.random.default_rng(1), sigma)
+    raised = position_equations(case.recorded, case.matched, Pos(), 0, position_prior)
+    assert np.exp(spread(position_prior(raised), "level_scale")) == pytest.approx(10.0)
+    assert spread(position_prior(equations_of(GROWING)), "level_scale") is None
 
 
 def test_what_is_stated_is_believed_first():

@@ -12,7 +12,7 @@ from mlscorr.pos import stated_sigma
 from mlscorr.survey import Pos, Trajectory
 
 TIME = 413200.0 + np.arange(0.0, 100.0, 0.5)  # s
-PARAMETERS = SignalParameters("matern32", 2.0, 30.0, 0.1, 1.0, 5.0, 3.0, 60.0, 1.5, 90.0, 0.1)
+PARAMETERS = SignalParameters("matern32", 2.0, 30.0, 0.1, 1.0, 5.0, 3.0, 60.0, 1.0, 1.5, 90.0, 0.1)
 
 
 @pytest.fixture(scope="module")

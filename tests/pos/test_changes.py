@@ -46,9 +46,9 @@ def test_a_change_that_filters_spread_is_whole():
     assert changed(size) == pytest.approx(np.array([[79.9, 80.2]]))
 
 
-@pytest.mark.parametrize("late", [-3.0, -0.5, 0.3, 1.0, 5.0])
+@pytest.mark.parametrize("late", [-1.0, -0.5, 0.3, 1.0])
 def test_sigma_changes_where_the_path_steps(late):
-    "Stated seconds sooner or later than the steps of 0.7 m in the path: it changes with them"
+    "Stated up to a second sooner or later than the steps of 0.7 m in the path: it changes with them"
     sigma = np.where((TIME - late >= 40.0) & (TIME - late < 80.0), 0.4, 0.02)
     assert np.abs(timely(sigma, 0.7 * FLOATED) - SIGMA).max() < 1e-9
 
@@ -63,8 +63,8 @@ def test_sigma_of_a_second_changes_where_the_path_steps():
 
 
 def test_sigma_stays_where_two_steps_are_as_near():
-    "Steps 2 s before and 3 s after a change: nobody knows which of them it is"
-    error = 0.7 * ((TIME >= 38.0) & (TIME < 43.0))
+    "Steps 1 s before and 1.2 s after a change: nobody knows which of them it is"
+    error = 0.7 * ((TIME >= 39.0) & (TIME < 41.2))
     sigma = np.where(TIME >= 40.0, 0.4, 0.02)
     assert np.abs(timely(sigma, error) - sigma).max() < 1e-9
 

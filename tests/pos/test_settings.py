@@ -26,5 +26,5 @@ def test_times_are_in_their_order():
 
 def test_shares_are_shares():
     "What a steady sigma and a fall are told by"
-    assert 0 < SETTINGS.fall_ratio < SETTINGS.whole_step < 1 < SETTINGS.steady_ratio
+    assert 0 < SETTINGS.whole_step < 1 < SETTINGS.steady_ratio
     assert 0 < SETTINGS.held_percentile < 50
