@@ -22,7 +22,7 @@ class BeamCheck:
     def __init__(self, survey: Survey):
         self.survey = survey
         self.samples: dict[CloudFile, list[np.ndarray]] = {}
-        self.segments: dict[CloudFile, list[np.ndarray]] = {}
+        self.times: dict[CloudFile, list[np.ndarray]] = {}
 
     def watched(self, read: Callable) -> Callable:
         """A function that reads as another one does, and samples what it gives.
@@ -34,13 +34,13 @@ class BeamCheck:
         """
 
         def watch(file: CloudFile) -> Iterator[PointCloud]:
-            rows, numbers = self.samples[file], self.segments[file] = [], []
+            rows, times = self.samples[file], self.times[file] = [], []
             step = 0
             for chunk in read(file):
                 step = step or max(1, len(chunk) // IO.sampled_points)  # of the last, short one too
                 some = chunk[::step]
-                numbers.append(self.survey.trajectory.segment(some.gps_time))
-                some = some[numbers[-1] >= 0]
+                times.append(some.gps_time)
+                some = some[self.survey.trajectory.segment(some.gps_time) >= 0]
                 rows.append(self._sample(some, self.survey.of(file).mounting))
                 yield chunk
 
@@ -58,8 +58,8 @@ class BeamCheck:
 
     def outside(self) -> Iterator[str]:
         """A sentence on each file with points outside the trajectory."""
-        for file, numbers in self.segments.items():
-            yield from outside_warnings(self.survey, file, np.concatenate([[], *numbers]))
+        for file, times in self.times.items():
+            yield from outside_warnings(self.survey, file, np.concatenate([[], *times]))
 
     def warnings(self) -> Iterator[str]:
         """A sentence on each file whose beams can't have been measured so."""
@@ -116,23 +116,26 @@ class BeamCheck:
         return ""
 
 
-def outside_warnings(survey: Survey, file: CloudFile, segment: np.ndarray) -> Iterator[str]:
+def outside_warnings(survey: Survey, file: CloudFile, times: np.ndarray) -> Iterator[str]:
     """A sentence where points of a file lie outside the trajectory or in its gaps.
 
     Parameters
     ----------
     survey : Survey
     file : CloudFile
-    segment : (n,) int array
-        Of the trajectory, of times spread over the file; -1 where none has it.
+    times : (n,) array
+        Spread over the file, in the trajectory's system. Units: s.
     """
-    if (segment < 0).any():
-        start, end = survey.trajectory.gps_time[[0, -1]]
+    trajectory = survey.trajectory
+    outside = times[trajectory.segment(times) < 0]
+    if len(outside):
+        away = np.fmax.reduce(np.abs(outside[:, None] - trajectory.passes.ravel()).min(axis=1))
+        start, end = trajectory.gps_time[[0, -1]]
         yield (
-            f"About {np.mean(segment < 0):.0%} of the points of {file.name} lie outside the "
-            f"trajectory [{start:.3f}, {end:.3f}] s or in its gaps ({len(survey.trajectory.gaps)})"
-            f", by {len(segment)} times spread over it: they stay as they are (exit code 4). "
-            "Export the whole trajectory."
+            f"{len(outside)} of {len(times)} points sampled from {file.name} lie outside the "
+            f"trajectory [{start:.3f}, {end:.3f}] s or in its gaps ({len(trajectory.gaps)}), up to "
+            f"{away:.3f} s from it: they stay as they are (exit code 4). Export the whole "
+            "trajectory."
         )
 
 

@@ -109,10 +109,10 @@ def match_times(
     flagged = "standard" if is_standard else "week"
     candidates = _candidates(times, span)
     if setting == "auto":
-        preferred = _best(candidates, times, span, (flagged,))
-        match = preferred or _best(candidates, times, span, _others(flagged, times))
+        preferred = _best(candidates, times, trajectory, (flagged,))
+        match = preferred or _best(candidates, times, trajectory, _others(flagged, times))
     else:
-        match = _best(candidates, times, span, (setting,))
+        match = _best(candidates, times, trajectory, (setting,))
     if match is None:
         raise ValueError(_nothing_fits(name, times, span, candidates, setting))
     if setting == "auto":
@@ -123,7 +123,7 @@ def match_times(
                 f"[{times.min():.1f}, {times.max():.1f}] s fit the trajectory as {match}.",
                 stacklevel=2,
             )
-    _check_week_end(name, times, span, match)
+    _check_week_end(name, times, trajectory, match)
     return match
 
 
@@ -143,12 +143,12 @@ def _check_precision(name, times):
     warnings.warn(sentence, stacklevel=3)  # drift hardly changes within an eighth of a second
 
 
-def _check_week_end(name, times, span, match):
+def _check_week_end(name, times, trajectory, match):
     """Refuse seconds of week that start again where the trajectory's run on."""
-    placed = times + match.constant
+    placed, span = times + match.constant, trajectory.gps_time[[0, -1]]
     outside = placed[(placed < span[0]) | (placed > span[1])]
     for week in (-WEEK, WEEK) if match.cloud_system == "week" and len(outside) else ():
-        if share := _inside(outside, span, week):
+        if share := _inside(outside, trajectory.passes, week):
             raise ValueError(
                 f"The GPS week ends within {name}: {share * len(outside):.0f} of {len(times)} "
                 f"sampled times [{times.min():.3f}, {times.max():.3f}] s lie inside the trajectory "
@@ -162,6 +162,7 @@ def _candidates(times, span):
     """Constants (s) as a list of (constant, cloud system, trajectory system), simplest first."""
     middle, goal = np.median(times), np.mean(span)
     candidates = [(0.0, system, system) for system in SYSTEMS]
+    candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
     to_gps = {"standard": ADJUSTMENT, "gps": 0.0}
     for cloud, added in to_gps.items():  # to seconds of week, or to the other continuous system
         week = np.floor((middle + added) / WEEK)
@@ -170,26 +171,29 @@ def _candidates(times, span):
     for system, taken in to_gps.items():  # from seconds of week
         week = np.floor((goal + taken) / WEEK)
         candidates += [(WEEK * (week + k) - taken, "week", system) for k in (0, -1, 1)]
-    candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
     return candidates
 
 
-def _inside(times, span, constant):
-    """Share of the times that fall inside the trajectory's span."""
-    return np.mean((times + constant >= span[0]) & (times + constant <= span[1]))
+def _inside(times, passes, constant):
+    """Share of the times that fall inside passes (k, 2) of the trajectory, or its span (2,)."""
+    starts, ends = np.reshape(passes, (-1, 2)).T
+    number = np.searchsorted(starts, times + constant, side="right") - 1
+    return np.mean((number >= 0) & (times + constant <= ends[number]))
 
 
-def _best(candidates, times, span, systems):
-    """The TimeMatch with most times inside, the first of equals; None when none fits."""
-    best = None
-    for system in systems:
-        for constant, cloud, trajectory in candidates:
-            if cloud != system:
-                continue
-            inside = _inside(times, span, constant)
-            if inside >= SETTINGS.covered_share and (best is None or inside > best.inside):
-                best = TimeMatch(float(constant), cloud, trajectory, float(inside))
-    return best
+def _best(candidates, times, trajectory, systems):
+    """The TimeMatch with most times in passes, or else in all, the first of equals; or None."""
+    for passes in (trajectory.passes, trajectory.gps_time[[0, -1]]):  # gaps hold any by chance
+        fits = [
+            TimeMatch(float(constant), cloud, system, float(inside))
+            for flagged in systems
+            for constant, cloud, system in candidates
+            if cloud == flagged
+            and (inside := _inside(times, passes, constant)) >= SETTINGS.covered_share
+        ]
+        if fits:
+            return max(fits, key=lambda match: match.inside)
+    return None
 
 
 def _others(flagged, times):

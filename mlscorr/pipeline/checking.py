@@ -162,7 +162,7 @@ def _placed_times(survey) -> tuple[int, list[str]]:
             continue
         segment = survey.trajectory.segment(times)
         passes += len(set(segment[segment >= 0].tolist()))
-        outside += outside_warnings(survey, file, segment)
+        outside += outside_warnings(survey, file, times)
     return passes, outside
 
 

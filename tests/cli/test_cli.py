@@ -486,8 +486,9 @@ def test_points_without_a_pose_are_counted_and_the_rest_is_done(in_part):
     outside = report["coverage"]["points_outside_trajectory"]
     assert outside > 0
     assert f"{outside} of {report['files'][0]['points']} points lie outside" in process.stderr
-    (warning,) = [text for text in report["model"]["warnings"] if text.startswith("About ")]
-    share = float(re.match(r"About (\d+)% of the points of pass-1.laz lie outside", warning)[1])
+    (warning,) = [text for text in report["model"]["warnings"] if "points sampled" in text]
+    some, sampled = map(int, re.match(r"(\d+) of (\d+) points sampled", warning).groups())
+    share = 100 * some / sampled
     assert share == pytest.approx(100 * outside / report["files"][0]["points"], abs=5)
     assert f"Warning: {warning}" in process.stderr
     assert "    T02: " in process.stderr and "gap of the trajectory" in process.stderr

@@ -78,6 +78,36 @@ def test_a_few_times_outside_are_normal():
     assert 0.85 < match.inside < 0.95
 
 
+@pytest.mark.parametrize("system", ["week", "gps"])
+def test_a_few_points_past_the_end_do_not_choose_the_system(system):
+    "A gap of days holds nothing: equal times stay equal where others put all points into the gap"
+    first, last = SYSTEMS[system][0] - 300_000.0, SYSTEMS[system][-1]
+    days = Trajectory.concatenate([trajectory(first, first + 500.0), trajectory(last - 500, last)])
+    match = match_times("a.laz", OF_WEEK + 9.0, False, days)
+    assert (match.constant, match.trajectory_system) == (last - OF_WEEK[-1], system)
+    assert 0.75 < match.inside < 0.85
+
+
+def test_a_cloud_of_the_second_week_goes_into_it():
+    "Drives at one hour of two weeks, both within the span: most times inside a pass tell the week"
+    later = SYSTEMS["gps"] + 604_800.0
+    weeks = [trajectory(t[0] + lag, t[-1]) for t, lag in ((SYSTEMS["gps"], 250.0), (later, -5.0))]
+    match = match_times("a.laz", OF_WEEK, False, Trajectory.concatenate(weeks))
+    assert match.constant == later[0] - OF_WEEK[0]
+
+
+def test_both_sides_of_the_end_of_the_week_have_one_system():
+    "A trajectory that counts on through Saturday midnight: both clouds are in seconds of week"
+    running = np.linspace(604_780.1, 604_820.1, 81)
+    for part in (running[:40], running[40:] - 604_800.0):
+        match = match_times("a.laz", part, False, trajectory(604_775.0, 604_825.0))
+        assert match.trajectory_system == "week"
+        assert match.constant == (0.0 if part[0] > 1e5 else 604_800.0)
+    parted = Trajectory.concatenate([trajectory(0.0, 20.0), trajectory(604_780.0, 604_799.9)])
+    for part in (running[:40] + 0.3, running[40:] - 604_800.0):
+        assert match_times("a.laz", part, False, parted).constant == 0.0
+
+
 def test_an_explicit_system_is_obeyed():
     "Who sets cloud.gps_time gets it, whatever the header says, and without a warning"
     match = match_times("a.laz", OF_WEEK, True, trajectory(), "week")
