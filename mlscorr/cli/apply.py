@@ -39,8 +39,6 @@ def apply(
     for effect in applied.effects:
         sizes = ", ".join(f"{size:.4g}" for size in np.atleast_1d(effect.magnitude))
         say(f"Taken out: {effect.name} {sizes} {effect.quantities()['magnitude'].unit}")
-    untouched = sum(file["untouched"] for file in content["files"])
     say(f"Survey:    {out / 'survey.toml'}, with the clouds beside it")
-    if untouched:
-        say(f"{untouched} points outside the trajectory were left as they were.")
+    if any(file["untouched"] for file in content["files"]):
         raise typer.Exit(Exit.IN_PART)

@@ -113,7 +113,7 @@ def fill_increments(
 def move_integers(
     xs: np.ndarray, ys: np.ndarray, zs: np.ndarray, scale: np.ndarray, offset: np.ndarray,
     gps_time: np.ndarray, constant: float, epochs: np.ndarray, step: float, is_gap: np.ndarray,
-    table: np.ndarray,
+    table: np.ndarray, rest: np.ndarray,
 ) -> tuple[int, int]:  # fmt: skip
     """Move the scaled integers of points by whole increments, in place.
 
@@ -124,11 +124,13 @@ def move_integers(
         The offset is about the correction's origin. Units: m.
     gps_time, constant, epochs, step, is_gap, table
         As for ``locate`` and ``fill_increments``.
+    rest : (3,) array
+        Added to points without a pose. Units: m.
 
     Returns
     -------
     outside, overflow : int
-        Numbers of points without a pose, and of those that don't fit 32 bits; both stay.
+        Numbers of points without a pose, and of those that don't fit 32 bits, which stay.
     """
     index = locate(gps_time, constant, epochs, step, is_gap)
     outside = 0
@@ -138,12 +140,13 @@ def move_integers(
         i = index[p]
         if i < 0:
             outside += 1
-            continue
-        weight = (gps_time[p] + constant - epochs[i]) / (epochs[i + 1] - epochs[i])
-        ex, ey, ez = _increment(
-            xs[p] * scale[0] + offset[0], ys[p] * scale[1] + offset[1],
-            zs[p] * scale[2] + offset[2], weight, table[i], table[i + 1],
-        )  # fmt: skip
+            ex, ey, ez = rest
+        else:
+            weight = (gps_time[p] + constant - epochs[i]) / (epochs[i + 1] - epochs[i])
+            ex, ey, ez = _increment(
+                xs[p] * scale[0] + offset[0], ys[p] * scale[1] + offset[1],
+                zs[p] * scale[2] + offset[2], weight, table[i], table[i + 1],
+            )  # fmt: skip
         x = xs[p] + np.rint(ex / scale[0])
         y = ys[p] + np.rint(ey / scale[1])
         z = zs[p] + np.rint(ez / scale[2])

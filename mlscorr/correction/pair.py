@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +35,8 @@ class Correction(Summary):
         Without both, the mounting stays as it is, and cancels.
     covariance : (n, 6, 6) array, optional
         Of the corrected position (m) and of a small rotation about the map axes (rad).
+    datum : (3,) array, optional
+        What of it needs no time, and moves points outside the trajectory, too. Units: m.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Correction(Summary):
     recorded_mounting: Mounting | None = None
     corrected_mounting: Mounting | None = None
     covariance: np.ndarray | None = None
+    datum: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self):
         if not np.array_equal(self.recorded.gps_time, self.corrected.gps_time):
@@ -113,7 +116,7 @@ class Correction(Summary):
         Returns
         -------
         increments : (n, 3) array
-            Zero outside the trajectory. Units: m.
+            Outside the trajectory the datum alone. Units: m.
         inside : (n,) bool array
 
         Raises
@@ -122,7 +125,7 @@ class Correction(Summary):
             Unless each point has a time.
         """
         require_times(len(xyz), len(gps_time))
-        increments = np.zeros((len(gps_time), 3))
+        increments = np.tile(self.datum, (len(gps_time), 1))
         inside = np.zeros(len(gps_time), dtype=bool)
         fill_increments(
             np.ascontiguousarray(gps_time, dtype=float), np.ascontiguousarray(xyz - self.origin),
@@ -131,7 +134,7 @@ class Correction(Summary):
         return increments, inside
 
     def apply(self, cloud: PointCloud) -> PointCloud:
-        """Corrected PointCloud; points outside the trajectory are left as they were."""
+        """Corrected PointCloud; outside the trajectory the datum alone moves points."""
         moved, _ = self.increments(cloud.xyz, cloud.gps_time)
         return PointCloud(np.add(cloud.xyz, moved, out=moved), cloud.gps_time, cloud.intensity)
 
@@ -157,7 +160,7 @@ class Correction(Summary):
         Returns
         -------
         int
-            Number of points outside the trajectory (unchanged).
+            Number of points outside the trajectory, which the datum alone moves.
 
         Raises
         ------
@@ -169,7 +172,7 @@ class Correction(Summary):
         outside, overflow = move_integers(
             *xyz, np.asarray(scale, dtype=float), np.asarray(offset, dtype=float) - self.origin,
             gps_time, float(time_constant), self.recorded.gps_time, self._step, self.is_gap,
-            self.table,
+            self.table, self.datum,
         )  # fmt: skip
         if overflow:
             raise ValueError(

@@ -114,7 +114,8 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
     if corrected.untimed:
         warnings.warn(
             f"{corrected.untimed} of {layout.points} points of {layout.path} have a gps_time that "
-            "is not a number. They can't be placed on the trajectory and were left as they were.",
+            "is not a number. They can't be placed on the trajectory: nothing that goes by time "
+            "moves them.",
             stacklevel=3,
         )
     return corrected.outside.tolist()

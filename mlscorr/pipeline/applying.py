@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from mlscorr.io.survey_file import FILE_NAME
 from mlscorr.io.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
-from mlscorr.pipeline.found_effects import CLOCK, MOUNTING, TAKEN_OUT, FoundEffects
+from mlscorr.pipeline.found_effects import CLOCK, DATUM, MOUNTING, TAKEN_OUT, FoundEffects
 from mlscorr.pipeline.near_points import remounting_fault
 from mlscorr.survey import Survey, SurveyFileError, check_survey
 from mlscorr.survey.summary import Summary
@@ -41,7 +42,7 @@ def apply(
     -------
     AppliedSurvey
         A clock offset goes into the trajectory (on the scanner's clock from then on) and moves the
-        points; a datum moves trajectory and points to the control; a mounting moves the points.
+        points; a datum moves trajectory and all points to the control; a mounting moves the points.
 
     Raises
     ------
@@ -135,8 +136,9 @@ def _correction(survey, effects):
     here, there = recorded.at(times[known]), recorded.at(times[known] - late)
     moved = replace(there, gps_time=here.gps_time, position=there.position + shift)
     if not lacks.any():
-        return Correction(here, moved)
-    return Correction(here, moved, survey.mounting, corrected_mounting(survey.mounting, lacks))
+        return Correction(here, moved, datum=shift)
+    mounting = corrected_mounting(survey.mounting, lacks)
+    return Correction(here, moved, survey.mounting, mounting, datum=shift)
 
 
 @dataclass(frozen=True, repr=False)
@@ -183,11 +185,13 @@ class AppliedSurvey(Summary):
             As ``CorrectedSurvey.write`` does.
         """
         survey, correction = self.survey, self.correction
-        mounting, files = correction.corrected_mounting, []
+        mounting, files, left = correction.corrected_mounting, [], []
+        by_time = [effect.name for effect in self.effects if effect.name not in DATUM]
         with output_folder(out, survey.inputs, overwrite) as folder:
             done = (progress or silent)("Writing the cloud", survey.points)
             for path, points, outside in write_clouds(survey, folder, correction, done):
-                files.append({"name": path.name, "points": points, "untouched": outside})
+                left.append(outside if by_time else 0)
+                files.append({"name": path.name, "points": points, "untouched": left[-1]})
             trajectory = None
             if any(effect.name not in MOUNTING for effect in self.effects):
                 trajectory = "trajectory.csv"
@@ -201,4 +205,20 @@ class AppliedSurvey(Summary):
             effects = [effect.document() for effect in self.effects]
             content = document("applied", {"name": survey.name, "effects": effects, "files": files})
             write_json(folder / "applied.json", content)
+        if any(left):
+            warnings.warn(
+                f"{sum(left)} of {survey.points} points outside the trajectory or in its gaps keep "
+                f"{joined(by_time)}, which goes by time: the clouds are torn there. Export the "
+                "whole trajectory, or clip the clouds to it.",
+                stacklevel=2,
+            )
+        if survey.reference is not None and correction.datum.any():
+            way = ", ".join(
+                f"{axis} {v:+.3f}" for axis, v in zip("ENH", correction.datum, strict=True)
+            )
+            warnings.warn(
+                f"The reference surface {survey.reference} stays where the clouds were. Move it by "
+                f"{way} m, too, or remove scene.reference from the new survey.toml.",
+                stacklevel=2,
+            )
         return content

@@ -127,7 +127,8 @@ SCALE, OFFSET = np.array([0.001, 0.002, 0.0005]), np.array([10.0, -20.0, 3.0])  
 def moved(integers, time, table, constant=0.0):
     "Moved integers (n, 3), and numbers outside and beyond 32 bits"
     columns = [np.ascontiguousarray(column) for column in integers.T.astype(np.int32)]
-    counts = move_integers(*columns, SCALE, OFFSET, time, constant, EPOCHS, 0.005, NO_GAP, table)
+    drive = EPOCHS, 0.005, NO_GAP, table
+    counts = move_integers(*columns, SCALE, OFFSET, time, constant, *drive, np.zeros(3))
     return np.column_stack(columns), counts
 
 

@@ -212,14 +212,52 @@ def test_one_effect_need_be_in_no_list(site):
     assert mlscorr.apply(survey, late).effects == mlscorr.apply(survey, [late]).effects == (late,)
 
 
-def test_points_that_stay_as_they_are_end_with_a_code_of_their_own(site, tmp_path):
-    "The trajectory ends early: the rest is counted, and not all was done"
+@pytest.fixture
+def short(site, tmp_path):
+    "The site with a trajectory that ends early, and a reference surface"
     folder = shutil.copytree(site, tmp_path / "short")
     rows = (folder / "trajectory.csv").read_text().splitlines(keepends=True)
     (folder / "trajectory.csv").write_text("".join(rows[: len(rows) * 3 // 4]))
+    return folder
+
+
+def test_points_that_stay_as_they_are_end_with_a_code_of_their_own(short, tmp_path):
+    "The trajectory ends early: the rest is counted with what it misses, and not all was done"
     out = tmp_path / "out"
-    given = ["apply", str(folder), "vertical_datum=0.1", "-o", str(out), "--json"]
-    done = CliRunner().invoke(app, given)
+    given = [
+        "apply",
+        str(short),
+        "time_offset=0.01",
+        "vertical_datum=0.1",
+        "-o",
+        str(out),
+        "--json",
+    ]
+    with pytest.warns(UserWarning) as said:
+        done = CliRunner().invoke(app, given)
     assert done.exit_code == 4, done.output
-    untouched = sum(file["untouched"] for file in json.loads(done.stdout)["files"])
-    assert untouched > 1000 and f"{untouched} points outside" in done.stderr
+    (file,) = json.loads(done.stdout)["files"]
+    words = f"{file['untouched']} of {file['points']} points outside the trajectory or in its gaps"
+    assert file["untouched"] > 1000
+    assert any(f"{words} keep time_offset," in str(warning.message) for warning in said)
+
+
+def test_a_datum_moves_all_points(short, tmp_path):
+    "It needs no time: points past the end of the trajectory go with the others, in one surface"
+    (short / "wall.ply").write_text("ply\n")
+    toml = (short / "survey.toml").read_text() + '\n[scene]\nreference = "wall.ply"\n'
+    (short / "survey.toml").write_text(toml)
+    las = laspy.read(short / "pass-1.laz")
+    las.gps_time[:10] = np.nan
+    las.write(short / "pass-1.laz")
+    with warnings.catch_warnings(action="ignore"):  # of the early end
+        survey = mlscorr.read_survey(short)
+    sizes = {"horizontal_datum": [0.2, -0.1], "vertical_datum": 15.3}
+    datum = [make_effect(name, magnitude=size) for name, size in sizes.items()]
+    with pytest.warns(UserWarning) as said:
+        document = mlscorr.apply(survey, datum).write(tmp_path / "out")
+    assert document["files"][0]["untouched"] == 0
+    way = laspy.read(tmp_path / "out" / "pass-1.laz").xyz - las.xyz
+    np.testing.assert_allclose(way, np.tile([0.2, -0.1, 15.3], (len(way), 1)), rtol=0, atol=1e-6)
+    (sentence,) = (str(w.message) for w in said if "wall.ply" in str(w.message))
+    assert "Move it by E +0.200, N -0.100, H +15.300 m, too" in sentence
