@@ -48,7 +48,7 @@ class Sessions:
     layouts : tuple of str
         How tables of others were understood.
     notes : tuple of str
-        How the files were joined.
+        How the files were joined, and what was added to their times.
     """
 
     trajectory: Trajectory
@@ -92,6 +92,12 @@ def read_sessions(
         parts, notes = with_sigmas(names, parts, pos)
         joined, joints = join_sessions(names, parts, pos or Pos())
         notes = [_summary(names, parts, joined), *joints, *notes]
+    notes += [
+        f"{file.section.time_constant:+g} s (trajectory.time_constant) were added to the times of "
+        f"{name}: trajectories that are written have them, too."
+        for name, file in zip(names, files, strict=True)
+        if file.section.time_constant
+    ]
     layouts = tuple(filter(None, (file.layout for file in read)))
     return Sessions(joined, tuple(parts), any(f.is_sbet for f in read), layouts, tuple(notes))
 

@@ -171,6 +171,16 @@ def test_a_survey_of_two_trajectories_is_that_of_one(folder):
     )
 
 
+def test_what_is_added_to_times_is_noted(folder):
+    "18 s of one of two trajectories are said with its name, and that what is written has them"
+    assert not any("time_constant" in note for note in read_survey(folder).notes)
+    late = replace(drive(20.0, 15.0), gps_time=drive(20.0, 15.0).gps_time - 18.0)
+    write_trajectory_csv(folder / "run-2.csv", late)
+    change(folder, '"run-2.csv"', '"run-2.csv"\ntime_constant = 18.0')
+    (note,) = (note for note in read_survey(folder).notes if "time_constant" in note)
+    assert note.startswith("+18 s (trajectory.time_constant) were added to the times of run-2.csv:")
+
+
 def test_an_sbet_may_stand_beside_a_table(folder):
     "Each is read as it would be alone: latitudes projected, map coordinates as they are"
     (folder / "run-2.csv").unlink()
