@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.project_file import ProjectParts
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import PointCloud, Survey
+from mlscorr.survey import PointCloud, Survey, SurveyFileError
 from mlscorr.survey.summary import counted
 from mlscorr.targets import BY_EDGES, Candidates, search_radius, why_useless
 
@@ -84,9 +84,11 @@ def check_control(survey: Survey | ProjectParts) -> None:
     Raises
     ------
     ValueError
+        A SurveyFileError where no list of them is named.
     """
     if len(survey.control) == len(survey.check) == 0:
-        raise ValueError(
+        is_named = any(file.what == "control" for file in survey.inputs)
+        raise (ValueError if is_named else SurveyFileError)(
             f"{survey.path} gives no control points: it has no section [control], or the file "
             "named there is empty. A correction needs surveyed points, or passes that overlap with "
             "--ties-only; mlscorr extract lists the targets of a cloud without them."

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from mlscorr.io.projection import check_crs
 from mlscorr.io.toml_file import read_toml
 from mlscorr.simulate.scenario import Scenario
 
@@ -20,6 +21,7 @@ def read_scenario(path: Path | str) -> Scenario:
     """
     path = Path(path)
     scenario = read_toml(path, Scenario, "a scenario")
+    check_crs(scenario.crs)
     for part, key in FILES:
         section = getattr(scenario, part)
         if (name := getattr(section, key)) is None:

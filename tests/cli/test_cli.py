@@ -346,6 +346,19 @@ def test_a_mounting_that_a_command_needs_is_a_fault_of_survey_toml(command, surv
     assert ended.exit_code == 2 and "survey.toml has no [mounting]" in ended.stderr, ended.stderr
 
 
+@pytest.mark.parametrize("command", ["correct", "compare", "plan", "check"])
+def test_a_survey_toml_without_control_is_a_fault_of_it(command, survey):
+    "Exit code 2 by every command that needs control; 3 where the list that is named is empty"
+    (survey / "control.csv").write_text("")
+    text = (survey / "survey.toml").read_text().partition("[scene]")[0]
+    for content, code in ((text, 3), (text.replace('[control]\nfile = "control.csv"', ""), 2)):
+        (survey / "survey.toml").write_text(content)
+        out = [] if command == "check" else ["-o", str(survey.parent / "out")]
+        with warnings.catch_warnings(action="ignore"):
+            ended = CliRunner().invoke(app, [command, str(survey), *out])
+        assert ended.exit_code == code and "control" in ended.output, ended.output
+
+
 @pytest.mark.parametrize("bad", [b for b in BAD if b[0] not in SEEN_IN_POINTS], ids=lambda b: b[0])
 def test_a_check_refuses_what_a_correction_refuses(bad, survey):
     "The same exit code for each, and the same words among all that it says; nothing changed"

@@ -6,7 +6,9 @@ import sys
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.io.survey_file import read_survey
 from mlscorr.simulate import simulate
@@ -216,6 +218,17 @@ def test_a_bad_scenario_ends_in_a_sentence_and_writes_nothing(write, tmp_path):
     assert "boresight of 200 deg exceeds 10 deg" in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("crs", "words"),
+    [("EPSG:2263", "US survey foot"), ("EPSG:4326", "a projected CRS"), ("none", "is unknown")],
+)
+def test_a_crs_that_no_survey_can_have_is_wrong_use(crs, words, write, tmp_path):
+    "Exit code 2, as of survey.toml, before anything is simulated"
+    scenario = write(f"crs = '{crs}'\n")
+    ended = CliRunner().invoke(app, ["simulate", str(scenario), "-o", str(tmp_path / "out")])
+    assert ended.exit_code == 2 and words in ended.stderr
 
 
 @pytest.mark.long

@@ -46,7 +46,8 @@ def planned_rows(survey: Survey) -> Rows:
         parts.append(_facets(survey, np.random.default_rng(0)))
     parts = [part for part in parts if len(part)]
     if not parts and not len(targets) and survey.reference is None:
-        raise ValueError(
+        is_named = any(file.what == "control" for file in survey.inputs)
+        raise (ValueError if is_named else SurveyFileError)(
             f"{survey.path} names no target and no [scene] reference, so there is nothing to plan "
             "with. Give [control] with the points as they are planned."
         )
