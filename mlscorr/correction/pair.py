@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from mlscorr.correction.kernel import fill_increments, move_integers, require_times
 from mlscorr.frames import angle_sigma
 from mlscorr.survey import Mounting, PointCloud, Trajectory
-from mlscorr.survey.summary import Summary
+from mlscorr.survey.summary import Summary, counted
 
 
 @dataclass(frozen=True, repr=False)
@@ -174,11 +174,7 @@ class Correction(Summary):
             gps_time, float(time_constant), self.recorded.gps_time, self._step, self.is_gap,
             self.table, self.datum,
         )  # fmt: skip
-        if overflow:
-            raise ValueError(
-                f"{overflow} corrected points do not fit the file's scale {scale} m and offset "
-                f"{offset} m: the correction or the file's header is wrong by kilometres."
-            )
+        require_fit(overflow, scale, offset)
         return outside
 
     @cached_property
@@ -192,6 +188,29 @@ class Correction(Summary):
         gap = np.isin(self.recorded.gps_time, self.recorded.gaps[:, 0])
         gap[-1] = True
         return gap
+
+
+def require_fit(overflow: int, scale: np.ndarray, offset: np.ndarray) -> None:
+    """Refuse corrected points that a file's integers can't hold.
+
+    Parameters
+    ----------
+    overflow : int
+        How many there are.
+    scale, offset : (3,) array
+        Of the file. Units: m.
+
+    Raises
+    ------
+    ValueError
+    """
+    if overflow:
+        raise ValueError(
+            f"{counted(overflow, 'corrected point')} can't be stored in 32 bits with the file's "
+            f"scale {scale} m and offset {offset} m. Either the offset is so far from the points "
+            "that they hardly fit as they were (export the file with one near them), or the "
+            "correction is wrong by kilometres."
+        )
 
 
 def increments_by_scanner(

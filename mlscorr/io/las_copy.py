@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.correction.pair import require_fit
 from mlscorr.correction.point_sigma import PointSigma
 from mlscorr.io.copc_writer import CopcWriter
 from mlscorr.io.extra_bytes import add_sigma_fields, with_sigmas
@@ -167,11 +168,7 @@ def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
     cloud = PointCloud(places, gps_time + time_constant, np.zeros(len(gps_time)))
     new = old + np.rint((correction.apply(cloud).xyz - places) / scale)
     overflow = int((np.abs(new) > INTEGER_LIMIT).any(axis=1).sum())
-    if overflow:
-        raise ValueError(
-            f"{overflow} corrected points do not fit the file's scale {scale} m and offset "
-            f"{offset} m: the correction or the file's header is wrong by kilometres."
-        )
+    require_fit(overflow, scale, offset)
     for values, corrected in zip(xyz, new.T, strict=True):
         values[:] = corrected
     return 0

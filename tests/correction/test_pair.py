@@ -96,8 +96,10 @@ def test_integers_that_overflow_are_refused():
     correction = Correction(recorded, replace(recorded, position=recorded.position + 1.0))
     integers = np.full((3, 4), 2**31 - 500, dtype=np.int32)
     offset = CORNER - integers[:, 0] * SCALE
-    with pytest.raises(ValueError, match="4 corrected points do not fit the file's scale"):
-        correction.shift_integers(integers, SCALE, offset, np.full(4, START + 5.0))
+    for count, words in ((4, "^4 corrected points can't be"), (1, "^1 corrected point can't be")):
+        some = integers[:, :count].copy()
+        with pytest.raises(ValueError, match=words):
+            correction.shift_integers(some, SCALE, offset, np.full(count, START + 5.0))
 
 
 def test_trajectories_of_different_epochs_make_no_correction():

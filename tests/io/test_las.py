@@ -436,7 +436,7 @@ def test_the_input_is_never_the_output(tmp_path):
 def test_coordinates_that_overflow_are_refused(tmp_path):
     "A correction of thousands of kilometres does not fit 32 bits and is refused, not wrapped"
     path = write_street(tmp_path / "in.laz")
-    with pytest.raises(ValueError, match="do not fit the file's scale"):
+    with pytest.raises(ValueError, match="can't be stored in 32 bits with the file's scale"):
         write_corrected(cloud_of(path), tmp_path / "out.laz", covering(path, (3e6, 0.0, 0.0)))
     assert os.listdir(tmp_path) == ["in.laz"]
 
