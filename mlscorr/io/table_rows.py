@@ -75,7 +75,9 @@ def _all_rows(layout):
             lines = (" ".join(line.split()) for line in file) if layout.separator == " " else file
             reader = csv.reader(lines, delimiter=layout.separator, skipinitialspace=True)
             for row in reader:
-                yield layout.lines + reader.line_num, [cell.strip() for cell in row]
+                cells = (cell.strip() for cell in row)
+                signed = ["-" + cell[1:] if cell[:1] == "−" else cell for cell in cells]  # U+2212
+                yield layout.lines + reader.line_num, signed
         except UnicodeDecodeError:
             raise ValueError(not_text(layout.path)) from None
         except csv.Error as error:

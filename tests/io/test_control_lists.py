@@ -127,6 +127,12 @@ def test_our_own_columns_in_other_letters_are_read_and_said_alike(rows, drive, t
     assert "(commas, decimal point, letters of Windows-1252)" in lists["cp1252"].layout
 
 
+def test_a_minus_sign_is_read_as_one(drive, tmp_path):
+    "Spreadsheets write U+2212 before a height below zero; within a name it stays"
+    points = read(tmp_path, "PtID;E;N;H\nP−1;532012,49;3373991,48;−4,48\n", drive).control
+    assert points.name == ("P−1",) and points.position[0, 2] == -4.48
+
+
 def test_columns_of_the_list_go_before_what_is_said_of_all(drive, tmp_path):
     "Kinds, sizes (mm), one sigma for all axes and roles that stand in the table are its own"
     header = "Name;Kind;Size (mm);E;N;H;σ;Role;Remark\n"
