@@ -41,10 +41,10 @@ def check_crs(crs: str) -> CRS:
                 f"crs {crs_name(crs)} has its {axis.name} in {axis.unit_name}, not in "
                 "metres. Bring clouds, trajectory and control into a CRS in metres."
             )
-    if {axis.direction for axis in axes[:2]} != {"east", "north"}:
+    if {axis.direction for axis in axes} - {"up"} != {"east", "north"}:
         raise ValueError(
-            f"crs {crs_name(crs)} counts {axes[0].direction} and {axes[1].direction}; "
-            "axes must point east and north."
+            f"crs {crs_name(crs)} counts {', '.join(axis.direction for axis in axes)}; "
+            "axes must point east and north, and up where there is a height."
         )
     return crs
 

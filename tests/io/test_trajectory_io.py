@@ -318,10 +318,11 @@ def test_sbet_datum_is_the_one_of_the_crs(tmp_path):
         ("EPSG:4326", "projected CRS is needed"),
         ("EPSG:2227", "US survey foot, not in metres"),
         ("EPSG:2048", "axes must point east and north"),
+        ("EPSG:32733+5715", "counts east, north, down; axes must .* up where there is a height"),
     ],
 )
 def test_sbet_needs_a_projected_crs_in_metres(tmp_path, crs, message):
-    "No CRS, an unknown, a geographic one, feet, or axes that point south: each in a sentence"
+    "No CRS, an unknown, a geographic one, feet, axes that point south or down: each in a sentence"
     path = written(tmp_path / "sbet.out", sbet_records())
     with pytest.raises(ValueError, match=message):
         read_trajectory(path, crs)
