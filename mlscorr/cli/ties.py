@@ -10,14 +10,17 @@ def ties(
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
+    from mlscorr.survey.summary import counted
+
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.find_ties(recorded, progress=progress).write(out, overwrite)
     print_json(content, as_json)
     features = content["features"]
     say(
-        f"{content['ties']} ties between {features['plane']} planes, {features['pole']} poles, "
-        f"{features['line']} pieces of painted lines and {features['dash']} dashes; "
+        f"{counted(content['ties'], 'tie')} between {counted(features['plane'], 'plane')}, "
+        f"{counted(features['pole'], 'pole')}, {counted(features['line'], 'painted line')} and "
+        f"{counted(features['dash'], 'dash')}; "
         f"{content['refused']} more contradict their neighbours."
     )
     for pair in content["pairs"]:
