@@ -156,7 +156,7 @@ def exit_code(code: Exit, has_results: Callable[[], bool | str] = lambda: False)
         yield
     except KeyboardInterrupt:
         _stop(has_results())
-    except (OSError, ImportError, ValueError, SystemError) as error:
+    except (OSError, ImportError, ValueError, SystemError, MemoryError) as error:
         if _repeats:  # a library made it of an interruption
             _stop(has_results())
         _tell(error, code)
@@ -166,6 +166,8 @@ def _tell(error, code):
     """Say what went wrong, and end with its exit code; that of a ValueError is given."""
     if isinstance(error, SystemError):
         raise error
+    if isinstance(error, MemoryError):
+        _fail(f"{error or 'No memory is left'}. Ask for less: shorter, coarser or in parts.", code)
     if isinstance(error, ImportError):
         _fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
     from mlscorr.survey import SurveyFileError

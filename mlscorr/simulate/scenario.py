@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from mlscorr.effects import Effect, in_order, make_effect
+from mlscorr.io.time_systems import WEEK
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -131,7 +132,7 @@ class Scenario(_Part):
     name: str = "street"
     crs: str = "EPSG:32650"
     origin: Vector = (532_000.0, 3_374_000.0, 42.0)  # E, N, H at the start: Wuhan's UTM zone
-    start_time: NotNegative = 357_700.0  # s of the GPS week
+    start_time: Annotated[float, Field(ge=0, lt=WEEK)] = 357_700.0  # s of the GPS week
     scene: SceneScenario = SceneScenario()
     targets: TargetScenario = TargetScenario()
     drive: DriveScenario = DriveScenario()
@@ -154,6 +155,8 @@ class Scenario(_Part):
 
     @model_validator(mode="after")
     def _holds_its_events(self):
+        if self.end is not None and self.end > WEEK:
+            raise ValueError(f"the drive of {self.end:g} s is longer than a week of {WEEK:g} s")
         spans = [("drive.stops", self.drive.stops)]
         spans += [("pos.outages", self.pos.outages), ("pos.canyons", self.pos.canyons)]
         events = [(f"{key} of {length:g} s from", start, start + length)

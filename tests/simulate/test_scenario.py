@@ -1,6 +1,7 @@
 """A scenario file in: what it may say, what is refused and how, and the examples."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -218,6 +219,20 @@ def test_a_bad_scenario_ends_in_a_sentence_and_writes_nothing(write, tmp_path):
     assert "boresight of 200 deg exceeds 10 deg" in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("start_time = 700000", "start_time"),
+        ("[drive]\nduration = 1e9", "the drive of 1e[+]09 s is longer than a week of 604800 s"),
+        ("[drive]\npose_rate = 1e12", r"Unable to allocate .* Ask for less"),
+    ],
+)
+def test_what_no_week_and_no_memory_hold_is_refused(key, words, write, tmp_path):
+    "A sentence with the numbers, where memory ran out"
+    ended = CliRunner().invoke(app, ["simulate", str(write(f"{key}\n")), "-o", str(tmp_path / "o")])
+    assert ended.exit_code in (2, 3) and re.search(words, ended.stderr), ended.output
 
 
 @pytest.mark.parametrize(
