@@ -12,8 +12,6 @@ Sources: Davis 2006, Direct Methods for Sparse Linear Systems, chapter 4; Liu, N
 SIAM J. Matrix Anal. Appl. 14, 242-252 (fronts); Takahashi, Fagan and Chin 1973 (selected inverse).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -10,8 +10,6 @@ with F1, Q1 over t - t_i, F2 over t_i+1 - t, e the first state and q1 the first 
 and past the last node the missing neighbour stands at infinity.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

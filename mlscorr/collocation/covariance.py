@@ -20,8 +20,6 @@ it has the poles -3/2 and -1/2 and, with E = 1 - exp(-x),
     F(x) = exp(-x/2) [exp(-x), sqrt(3) E; 0, 1],   Q(x) = [E^3, sqrt(3)/2 E^2; sqrt(3)/2 E^2, E]
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

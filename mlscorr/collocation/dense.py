@@ -4,8 +4,6 @@ Its work grows with the cube of the observations: the oracle of the others, the 
 is correlated in any manner, and the fastest for a few hundred rows of which each sees two epochs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

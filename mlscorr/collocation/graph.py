@@ -1,7 +1,5 @@
 """Which knots and shared errors of sparse rows know of each other: the edges of L."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations, product
 

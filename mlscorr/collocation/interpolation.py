@@ -3,8 +3,6 @@
 Nodes are the epochs of the observations in the recursion, and knots in the information form.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

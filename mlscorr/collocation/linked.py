@@ -3,8 +3,6 @@
 Beside ``collocate``, which is exact to 1e-9 and for rows of one epoch each.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ rows leave R^2 = 1 - 1e-6, and the one of 21 points starts at 0.1619 m, LS of or
 0.1618 m. If C0 stood in D_Lambda too, the signal would grow less than in proportion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

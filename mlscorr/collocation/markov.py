@@ -1,7 +1,5 @@
 """V of Markov signals by the recursion: linear in observations and epochs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

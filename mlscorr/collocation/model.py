@@ -1,7 +1,5 @@
 """What a collocation is about: signals, and the generalised least squares of the trend."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

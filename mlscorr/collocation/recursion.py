@@ -15,8 +15,6 @@ its covariance. H = B (mixing) on the first state of each process. Sources: Sär
 section 10 (filter, smoother) and 12 (processes); Durbin and Koopman 2012, section 4.5.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ H, which observes the states, is never written out: each loop expands W H of the
 it comes to, some dozen columns that are not zero.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

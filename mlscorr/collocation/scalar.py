@@ -1,7 +1,5 @@
 """The Markov recursion for scalar observations, which keeps no states."""
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -1,7 +1,5 @@
 """How a likelihood changes with signals and trend, for the search of their parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

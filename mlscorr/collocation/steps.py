@@ -6,8 +6,6 @@ leave open of the signal, sigma / sqrt(n): a signal below the noise needs knots 
 correlation time apart, where one far above it needs dozens in that time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

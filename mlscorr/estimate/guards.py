@@ -1,7 +1,5 @@
 """What the control points of a survey can't tell, and sentences about it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise

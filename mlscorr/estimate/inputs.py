@@ -1,7 +1,5 @@
 """What can't be estimated from, and what is done where the POS doesn't state its sigmas."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ the signal: 3 of the position and 3 small rotations about the map axes. Plain le
 takes the POS to be free of error, stands beside it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

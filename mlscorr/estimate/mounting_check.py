@@ -3,8 +3,6 @@
 Drift depends on time, a boresight's part on the direction of travel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

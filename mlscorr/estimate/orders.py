@@ -1,7 +1,5 @@
 """Orders of the trend side by side: restricted likelihood, probability, leave-one-out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

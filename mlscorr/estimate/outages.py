@@ -5,8 +5,6 @@ the recorded path; the starts don't, so each segment's is sought between its con
 likelihood. A step that contradicts the control points is no fall-back, only a restart.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

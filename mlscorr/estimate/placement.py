@@ -5,8 +5,6 @@ collocation hold no misclosure. So each candidate is taken as it would be seen, 
 of the variance along the drive is worked out before anybody surveys it.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np

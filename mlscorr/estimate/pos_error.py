@@ -1,7 +1,5 @@
 """From misclosures to the corrected trajectory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """From an estimate to the POS error at every epoch, and to the corrected trajectory (Eq. 14-15)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

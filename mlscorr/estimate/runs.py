@@ -5,8 +5,6 @@ way, the error is the POS's: its sigma is raised there as it grows between two p
 GNSS holds it, and everything is estimated anew.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -5,8 +5,6 @@ way; a wrong scale of the encoder turns what lies far from the zero beam. (An of
 turns all about the scanner's axis, as a boresight does, and is part of that.)
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where control points hold a correction, and where it is extrapolated."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """What the other targets say of each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

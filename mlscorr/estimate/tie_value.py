@@ -1,7 +1,5 @@
 """What ties bring to an estimate beside control points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

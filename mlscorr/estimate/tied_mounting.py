@@ -6,8 +6,6 @@ differences of the partial derivatives at both. Two scanners that saw it a secon
 all of the POS error: what is left between them is the one mounting beside the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What a diagnosis or a calibration found, with the clouds in which it is, to be taken out."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """``check`` of a project: all that is wrong with its drives before they are corrected."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

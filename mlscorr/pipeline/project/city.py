@@ -1,7 +1,5 @@
 """All drives of a project: those that saw the same things together, area by area if too many."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From what files hold to corrected drives: matched, estimated together, and parted again."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

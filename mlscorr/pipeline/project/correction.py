@@ -1,7 +1,5 @@
 """``correct`` of a project: from several drives to the corrected clouds and reports of all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """project.json: what became of each drive, and what failed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """The part of one drive in an estimate that several drives made together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Who works on tasks: this process, processes of this machine, or a cluster of others."""
 
-from __future__ import annotations
-
 import ctypes
 import multiprocessing
 import os

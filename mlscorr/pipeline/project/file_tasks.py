@@ -1,7 +1,5 @@
 """What touches points: pure functions of one file and small values, whose results are files."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Collection, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Drives as one survey: one trajectory, times made distinct, passes counted over all."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

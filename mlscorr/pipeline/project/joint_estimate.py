@@ -1,7 +1,5 @@
 """Which drives are estimated together: those that ties join."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

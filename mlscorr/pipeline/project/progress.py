@@ -1,7 +1,5 @@
 """How far a project has come: sentences at intervals, a log, and what status reads."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

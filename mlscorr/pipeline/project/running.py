@@ -1,7 +1,5 @@
 """Tasks to their ends: those whose results are there are left, lost workers' are tried again."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait

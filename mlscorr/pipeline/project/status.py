@@ -1,7 +1,5 @@
 """``status``: how far a project has come, from what its run keeps."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

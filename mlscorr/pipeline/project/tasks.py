@@ -1,7 +1,5 @@
 """Tasks, how they are carried out, and how they end."""
 
-from __future__ import annotations
-
 import time
 import warnings
 from collections.abc import Callable
