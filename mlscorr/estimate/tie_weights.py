@@ -43,9 +43,7 @@ class WeighedTies:
     @property
     def ties(self) -> TieEquations:
         """The ties with their weights."""
-        ties = self.equations.ties
-        assert ties is not None
-        return ties
+        return self.equations.ties
 
     @property
     def ratio(self) -> np.ndarray:
@@ -128,7 +126,6 @@ def solved_ties(tied: Equations, parameters: SignalParameters) -> WeighedTies:
     tied : Equations
     parameters : SignalParameters
     """
-    assert tied.ties is not None
     return WeighedTies(tied, parameters, tied.solve(parameters), tied.ties.weight)
 
 

@@ -21,7 +21,7 @@ from mlscorr.blind.cases import make_case, outside_mechanisms
 from mlscorr.blind.mix import mix
 from mlscorr.blind.scoring import score
 from mlscorr.effects import EFFECTS
-from mlscorr.io.output import document, write_json
+from mlscorr.io.output import document, output_file, write_json
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.finding import find_targets, silent
 
@@ -106,9 +106,8 @@ def run_blind(out: Path, workers: int, progress: Callable | None = None) -> tupl
     done = (progress or silent)("Diagnosing", len(todo))
     with _locked(out / "key.json"):
         for folder, answer in _in_processes([(_diagnose, folder) for folder in todo], workers):
-            part = answers / f".{folder.name}.part"
-            write_json(part, answer)
-            os.replace(part, answers / f"{folder.name}.json")
+            with output_file(answers / f"{folder.name}.json") as part:
+                write_json(part, answer)
             done(1)
     failed = sum("error" in json.loads(path.read_text()) for path in answers.glob("*.json"))
     return len(folders), failed
@@ -186,10 +185,9 @@ def _opened(out, plan):
 
 
 def _write_key(out, key):
-    part = out / ".key.part"
-    part.touch(mode=0o600)
-    write_json(part, key)
-    os.replace(part, out / "key.json")
+    with output_file(out / "key.json") as part:
+        part.touch(mode=0o600)
+        write_json(part, key)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.correction import corrected_fields
 from mlscorr.pipeline.file_finding import FileFinding, join_findings
 from mlscorr.pipeline.project.areas import Area
-from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, drive_estimates
+from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, drive_estimate
 from mlscorr.pipeline.project.joint import FoundDrive
 from mlscorr.pipeline.project.joint_estimate import JointEstimate
 from mlscorr.survey import Survey
@@ -75,11 +75,11 @@ def corrected_drives(
     states = [_state(part, number, area) for number in range(len(joint.drives))]
     if joint.is_single and area is None:
         return [(CorrectedSurvey(**drive_fields(joint.drives[0], estimate)), states[0])]
-    estimates = drive_estimates(joint, estimate, [tied_sentence(state) for state in states])
     places = place_control(estimate)
     section = {} if area is not None else tie_section(estimate) or {}  # an area is no drive
     results = []
-    for drive, own, shift in zip(joint.drives, estimates, joint.shifts, strict=True):
+    for number, (drive, shift) in enumerate(zip(joint.drives, joint.shifts, strict=True)):
+        own = drive_estimate(joint, estimate, number, tied_sentence(states[number]))
         first, last = drive.survey.trajectory.gps_time[[0, -1]]
         near = [replace(place, gps_time=place.gps_time - shift) for place in places]
         shared = {

@@ -1,6 +1,5 @@
 """The part of one drive in an estimate that several drives made together."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,23 +39,18 @@ class CorrectedDrive(CorrectedSurvey):
     tie_section: dict | None = None
 
 
-def drive_estimates(
-    joint: JointDrives, estimate: Estimate, notes: Sequence[str]
-) -> list[DriveEstimate]:
-    """The part of each drive in an estimate of all.
+def drive_estimate(joint: JointDrives, estimate: Estimate, number: int, note: str) -> DriveEstimate:
+    """The part of one drive in an estimate of all.
 
     Parameters
     ----------
     joint : JointDrives
     estimate : Estimate
-    notes : sequence of str
-        Sentences on each drive's ties with others.
+    number : int
+        Of the drive.
+    note : str
+        A sentence on its ties with others.
     """
-    return [_part(joint, estimate, number, note) for number, note in enumerate(notes)]
-
-
-def _part(joint, estimate, number, note):
-    """The DriveEstimate of a drive."""
     trajectory, shift = joint.drives[number].survey.trajectory, joint.shifts[number]
     owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
     rows = owner == number
