@@ -13,6 +13,8 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from pyproj import CRS
+from pyproj.exceptions import CRSError
 
 from mlscorr.io.cloud_sources import CloudSource
 from mlscorr.io.e57 import open_e57
@@ -219,9 +221,6 @@ def _time_system(path, times):
 
 def _known_crs(wkt):
     """A CRS that can be written, and a phrase where there is another."""
-    from pyproj import CRS
-    from pyproj.exceptions import CRSError
-
     if wkt is None:
         return None, ""
     try:

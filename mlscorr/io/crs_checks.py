@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pyproj import CRS, Transformer
 
 from mlscorr.io.projection import check_crs, crs_name, map_of
 from mlscorr.survey import Trajectory
-
-if TYPE_CHECKING:
-    from pyproj import CRS
 
 
 def check_area(crs: CRS, trajectory: Trajectory) -> None:
@@ -121,8 +119,6 @@ def crs_notes(crs: str | None, trajectory: Trajectory, is_sbet: bool) -> list[st
 
 def _check_datum(crs, trajectory):
     """Warn where latitudes of GNSS would lie elsewhere than those of the CRS's own datum."""
-    from pyproj import Transformer
-
     place = np.median(trajectory.position[:, :2], axis=0)
     to_map = Transformer.from_crs("EPSG:4326", crs.to_2d(), always_xy=True)
     east, north = to_map.transform(*map_of(crs)(*place, inverse=True)) - place

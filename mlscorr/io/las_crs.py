@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import struct
 import warnings
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pyproj import CRS, Transformer
+from pyproj.exceptions import CRSError, ProjError
 
 from mlscorr.io.las_checks import variable_records
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.projection import crs_name
 from mlscorr.io.settings import SETTINGS
-
-if TYPE_CHECKING:
-    from pyproj import CRS
 
 OWNER, WKT, GEO_KEYS = b"LASF_Projection", 2112, 34735  # LAS 1.4 R15, section 3
 PROJECTED, GEOGRAPHIC, VERTICAL = 3072, 2048, 4096  # keys of GeoTIFF 1.1
@@ -34,9 +32,6 @@ def stated_crs(layout: LasLayout) -> CRS | None:
     pyproj.CRS or None
         None where no VLR states one, or PROJ doesn't know it.
     """
-    from pyproj import CRS
-    from pyproj.exceptions import CRSError
-
     words = [
         data.split(b"\0")[0].decode("utf-8", "replace")
         for data in variable_records(layout, OWNER, WKT)
@@ -80,8 +75,6 @@ def crs_conflict(layout: LasLayout, crs: str) -> str:
     crs : str
         Of survey.toml; one that can be used.
     """
-    from pyproj import CRS
-
     stated, survey_crs = stated_crs(layout), CRS.from_user_input(crs)
     if stated is None:
         return ""
@@ -105,9 +98,6 @@ def _other_units(layout, stated):
 
 def _other_place(layout, stated, survey_crs):
     """Words on how far apart the middle of a cloud lies by two CRS."""
-    from pyproj import Transformer
-    from pyproj.exceptions import ProjError
-
     if stated.to_2d().to_epsg() == survey_crs.to_2d().to_epsg() is not None:
         return ""
     middle = cloud_box(layout).mean(axis=0)[:2]

@@ -7,16 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import laspy
 import lazrs
 import numpy as np
+from pyproj import CRS
 
 from mlscorr.io.output import output_file
 from mlscorr.survey import PointCloud
-
-if TYPE_CHECKING:
-    import laspy
 
 SCAN_ANGLE_UNIT = 0.006  # deg, LAS 1.4 specification, formats 6 to 10
 INTEGER_LIMIT = np.iinfo(np.int32).max  # of coordinates
@@ -56,8 +54,6 @@ def cloud_writer(
     OSError
         When the disk refuses.
     """
-    import laspy
-
     path = Path(path)
     header = _header(corner, crs, scale, created, 7 if has_colours else 6)
     if is_standard:
@@ -121,8 +117,6 @@ class CloudWriter:
         ValueError
             Where a coordinate is not a number or does not fit the scale.
         """
-        import laspy
-
         if len(cloud) == 0:
             return
         header = self._las.header
@@ -157,8 +151,6 @@ def _check(xyz, header):
 
 def _header(corner, crs, scale, created, point_format):
     """LAS header whose offset is the corner in whole metres."""
-    import laspy
-
     header = laspy.LasHeader(point_format=point_format, version="1.4")
     header.scales = np.full(3, scale)
     header.offsets = np.floor(corner)
@@ -166,9 +158,7 @@ def _header(corner, crs, scale, created, point_format):
     header.creation_date = created or date.today()
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.WEEK_TIME
     if crs is not None:
-        import pyproj
-
-        wkt = pyproj.CRS.from_user_input(crs).to_wkt("WKT1_GDAL")  # LAS 1.4 asks for WKT 1
+        wkt = CRS.from_user_input(crs).to_wkt("WKT1_GDAL")  # LAS 1.4 asks for WKT 1
         header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
         header.global_encoding.wkt = True
     return header

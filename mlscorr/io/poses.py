@@ -10,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 import numpy as np
+from pyproj import Transformer
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.layouts import TableLayout
@@ -108,8 +109,6 @@ def _read_pos(path):
         raise ValueError(
             f"{path} is not a table of {', '.join(POS_COLUMNS)} (s, deg, deg, m): {error}"
         ) from None
-    from pyproj import Transformer
-
     to_map = Transformer.from_crs("EPSG:4326", utm_zone(*table[0, 1:3]), always_xy=True)
     table[:, 1], table[:, 2] = to_map.transform(table[:, 2], table[:, 1])
     return table

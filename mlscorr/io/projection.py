@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from pyproj import CRS, Proj
+from pyproj import CRS, Proj, Transformer
+from pyproj.exceptions import CRSError, ProjError
 
 
 def check_crs(crs: str) -> CRS:
@@ -51,9 +49,6 @@ def check_crs(crs: str) -> CRS:
 
 @lru_cache
 def _parse_crs(crs):
-    from pyproj import CRS
-    from pyproj.exceptions import CRSError
-
     try:
         return CRS.from_user_input(crs)
     except CRSError:
@@ -118,8 +113,6 @@ def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nda
     ValueError
         Where a grid or the CRS does not reach.
     """
-    from pyproj.exceptions import ProjError
-
     crs = _by_greenwich(crs)
     longitude, latitude = np.degrees(record["longitude"]), np.degrees(record["latitude"])
     try:
@@ -181,8 +174,6 @@ def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray]
     ValueError
         Where a grid is missing, or the CRS does not reach.
     """
-    from pyproj.exceptions import ProjError
-
     projected = _by_greenwich(crs)
     try:
         transformer = _exact(projected, projected.geodetic_crs.to_3d())
@@ -198,8 +189,6 @@ def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray]
 
 def _exact(source, target):
     """The transformation between two CRS, by the grids that it needs or not at all."""
-    from pyproj import Transformer
-
     return Transformer.from_crs(
         source, target, always_xy=True, only_best=True, allow_ballpark=False
     )
@@ -212,6 +201,4 @@ def map_of(crs: CRS) -> Proj:
     ----------
     crs : pyproj.CRS
     """
-    from pyproj import Proj
-
     return Proj(crs.sub_crs_list[0] if crs.is_compound else crs)

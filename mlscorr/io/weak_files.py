@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pyproj import Transformer
 
 from mlscorr.io.column_names import AXES
 from mlscorr.io.projection import check_crs
@@ -50,8 +51,6 @@ def write_weak(
 
 def _features(stretches, trajectory, crs):
     """A line for each stretch: RFC 7946, so longitude and latitude by WGS 84."""
-    from pyproj import Transformer
-
     to_degrees = Transformer.from_crs(check_crs(crs).to_2d(), "EPSG:4326", always_xy=True)
     features = []
     for row in stretches:

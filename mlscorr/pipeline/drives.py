@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from pyproj import Transformer
 
 from mlscorr.io.folder_roles import FileRole
 from mlscorr.io.las import spread_records
@@ -118,8 +119,6 @@ class Drive:
     @property
     def zone(self) -> str:
         """EPSG code of the UTM zone of a geographic one."""
-        from pyproj import Transformer
-
         place = np.median(self.recorded.trajectory.position[:, :2], axis=0)
         to_degrees = Transformer.from_crs(WORLD[0], "EPSG:4326", always_xy=True)
         longitude, latitude = to_degrees.transform(*place)
