@@ -41,8 +41,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     ties : Ties
         The places likewise; the directions are those of the things themselves.
     """
-    parameters = calibration.parameters[0][0]
-    tied, correction = _converged(calibration, matched, ties, parameters)
+    tied, correction = _converged(calibration, matched, ties)
     rows = replace(tied.ties, weight=np.ones(len(ties)))  # without those of robust estimation
     bare = replace(tied.equations, ties=None)
     predictions, screening, is_used = screen_with_ties(bare, calibration.screening, rows)
@@ -71,16 +70,15 @@ def previewed_mounting(
     matched, ties : Matched, Ties
         As of calibration_with_ties.
     """
-    parameters = calibration.parameters[0][0]
-    tied, correction = _converged(calibration, matched, ties, parameters)
+    tied, correction = _converged(calibration, matched, ties)
     recorded = calibration.recorded
     mountings = corrected_mountings(recorded, correction)
-    pose = tied.solved.predict_mean(*pose_rows(tied.equations, parameters))
+    pose = tied.solved.predict_mean(*pose_rows(tied.equations, tied.parameters))
     drift = Correction.by_pose_error(calibration.trajectory, pose)
     return mounted_corrections(drift, recorded, mountings)
 
 
-def _converged(calibration, matched, ties, parameters) -> tuple[WeighedTies, np.ndarray]:
+def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
     """Equations with robust weights about the mountings that they give, and these' correction."""
     recorded, targets, step = calibration.recorded, matched[calibration.used], 0.0
     correction, equations = calibration.lsc.correction, calibration.equations
@@ -88,7 +86,7 @@ def _converged(calibration, matched, ties, parameters) -> tuple[WeighedTies, np.
         correction = correction + step  # here, so that the last equations are about the last one
         mountings, about = linearized(equations, targets, recorded, correction)
         moved = georeferenced_ties(about, recorded, mountings, ties)
-        tied = graduated(about, parameters, moved)
+        tied = graduated(about, calibration.parameters[0][0], moved)
         step = combined_correction(correction, tied.solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
             break
