@@ -48,7 +48,7 @@ def test_a_change_that_filters_spread_is_whole():
 
 @pytest.mark.parametrize("late", [-1.0, -0.5, 0.3, 1.0])
 def test_sigma_changes_where_the_path_steps(late):
-    "Stated up to a second sooner or later than the steps of 0.7 m in the path: it changes with them"
+    "Stated up to a second off the steps of 0.7 m in the path: it changes with them"
     sigma = np.where((TIME - late >= 40.0) & (TIME - late < 80.0), 0.4, 0.02)
     assert np.abs(timely(sigma, 0.7 * FLOATED) - SIGMA).max() < 1e-9
 
