@@ -57,12 +57,12 @@ def runs(flags: np.ndarray, cuts: np.ndarray | tuple = ()) -> list[tuple[int, in
     return list(zip(*(row.astype(int) for row in rows), strict=True))
 
 
-def timely_sigma(trajectory: Trajectory, steps: Steps) -> np.ndarray:
-    """Sigma (n, 3) of the position, by the median about each epoch, that changes with the path.
+def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.ndarray]:
+    """Sigma (n, 3) of the position as stated, and by the median about each epoch, with the path.
 
     What a trajectory states is often of another rate, or of another filter, than its path: a step
     of the path near a change is the same event, seen better, since the error can't change at once
-    where the path doesn't. Units: m.
+    where the path doesn't. There both change. Units: m.
 
     Parameters
     ----------
@@ -70,18 +70,21 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> np.ndarray:
         With sigmas.
     steps : Steps
     """
-    time, sigma = trajectory.gps_time, np.empty_like(trajectory.position_sigma)
+    time, sigma = trajectory.gps_time, trajectory.position_sigma.copy()
+    steady = np.empty_like(sigma)
     beside = round(SETTINGS.step_duration / float(np.median(np.diff(time))))
     for first, last in np.searchsorted(time, trajectory.passes):
         own = slice(first, last + 1)
-        for axis, stated in enumerate(trajectory.position_sigma.T):
-            sigma[own, axis] = median_filter(stated[own], 2 * beside + 1, mode="nearest")
-    changes = quick_changes(time, np.linalg.norm(sigma, axis=1))
-    timely, rows = sigma.copy(), np.searchsorted(time, steps.middle)
+        for axis, stated in enumerate(sigma.T):
+            steady[own, axis] = median_filter(stated[own], 2 * beside + 1, mode="nearest")
+    changes = quick_changes(time, np.linalg.norm(steady, axis=1))
+    rows = np.searchsorted(time, steps.middle)
     for change, step in _pairs(time[changes].mean(axis=1), steps.middle):
         (first, last), row = changes[change], rows[step]
-        timely[first:row], timely[row:last] = sigma[first], sigma[last]
-    return timely
+        before, after = steady[[first, last]]
+        for values in (sigma, steady):
+            values[first:row], values[row:last] = before, after
+    return sigma, steady
 
 
 def _pairs(times, others):

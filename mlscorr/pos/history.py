@@ -30,8 +30,7 @@ class DriftHistory:
         When it begins to grow after the start, each restart and each return: where sigma(t) says
         so, never (infinite) where it says that it doesn't, else at once. Units: s.
     sigma : (n, 3) array
-        What is stated of E, N, H, without the noise of epochs and in time with the path; zero
-        where nothing is. Units: m.
+        What is stated of E, N, H, in time with the path; zero where nothing is. Units: m.
     held : (3,) array
         The sigma of E, N, H that stays while GNSS holds the POS; zero where sigma(t) doesn't tell
         it from the part that grows. Units: m.
@@ -144,17 +143,18 @@ def drift_history(trajectory: Trajectory) -> DriftHistory:
 def _history(trajectory):
     time, steps = trajectory.gps_time, find_steps(trajectory)
     restarts = np.sort(np.concatenate([trajectory.passes[1:, 0], steps.middle]))
-    stated = trajectory.position_sigma
-    sigma = np.zeros((len(time), 3)) if stated is None else timely_sigma(trajectory, steps)
-    held = _held(sigma)
+    stated = steady = np.zeros((len(time), 3))
+    if trajectory.position_sigma is not None:
+        stated, steady = timely_sigma(trajectory, steps)
+    held = _held(steady)
     level = np.tile(held, (len(time), 1))
     if not held.any():
         starts = np.append(time[0], restarts)
-        return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, sigma, held, level)
-    size = np.linalg.norm(sigma, axis=1)
+        return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, stated, held, level)
+    size = np.linalg.norm(steady, axis=1)
     changes = quick_changes(time, size)
     restarts = np.sort(np.append(restarts, _falls(time, size, changes, held, restarts)))
-    is_raised = np.maximum(sigma**2 - held**2, 0.0).sum(axis=1) > held @ held
+    is_raised = np.maximum(steady**2 - held**2, 0.0).sum(axis=1) > held @ held
     returns = _returns(time, size, runs(is_raised), restarts)
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
     grown = [np.inf]
@@ -163,15 +163,14 @@ def _history(trajectory):
         at_once = changes[(changes[:, 0] <= first) & (first <= changes[:, 1]), 1]
         settled = min(at_once.max(initial=first), last - 1)
         if first in cuts or len(at_once):
-            level[settled:last] = np.minimum.accumulate(sigma[settled:last], axis=0)
+            level[settled:last] = np.minimum.accumulate(steady[settled:last], axis=0)
             level[first:settled] = level[settled]
         # what is raised at once and goes back is no drift, but what GNSS holds the POS to
-        if np.any((sigma[settled:last] ** 2 - 2 * level[settled:last] ** 2).sum(axis=1) > 0):
+        if np.any((steady[settled:last] ** 2 - 2 * level[settled:last] ** 2).sum(axis=1) > 0):
             grown.append(time[first])
-    grown = np.array(grown[::-1])
-    first = grown[np.searchsorted(grown, edges)]
+    first = np.array(grown[::-1])[np.searchsorted(grown[::-1], edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
-    return DriftHistory(trajectory, steps, restarts, returns, starts, sigma, held, level)
+    return DriftHistory(trajectory, steps, restarts, returns, starts, stated, held, level)
 
 
 def _returns(time, size, raised, restarts):
@@ -192,9 +191,8 @@ def _returns(time, size, raised, restarts):
 def _falls(time, size, changes, held, restarts):
     """Times at which sigma(t) falls back, without those of known restarts. Units: s."""
     first, last = changes.T
-    is_fall = (size[last] < size[first]) & (
-        size[first] > SETTINGS.steady_ratio * np.linalg.norm(held)
-    )
+    limit = SETTINGS.steady_ratio * np.linalg.norm(held)
+    is_fall = (size[last] < size[first]) & (size[first] > limit)
     falls = (time[last - 1] + time[last])[is_fall] / 2
     # a sigma that falls while the path steps a little later or sooner tells of the same return
     away = np.abs(falls[:, None] - restarts).min(axis=1, initial=np.inf)

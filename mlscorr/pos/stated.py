@@ -184,9 +184,8 @@ def stated_sigma(
     shape = (len(pose.gps_time), 3)
     position, angles = np.full(shape, pos.position_sigma), pose.attitude_sigma
     if trajectory.position_sigma is not None:
-        columns = history.sigma.T
         position = np.column_stack(
-            [np.interp(pose.gps_time, trajectory.gps_time, column) for column in columns]
+            [np.interp(pose.gps_time, trajectory.gps_time, column) for column in history.sigma.T]
         )
     if angles is None:
         angles = np.broadcast_to(pos.attitude_sigma, shape)

@@ -91,7 +91,7 @@ def test_boresight_closes_the_misfit_of_real_passes(two_pass_gap, name, dense):
     less, and nothing of it is significant.
 
     Which planes there are depends on where the cells of 1 m fall: over 24 of their places an angle
-    of Car is 2 sigma off in half, and what is left of Tent is called none in half.
+    of Car is 2 sigma off in half, and over 6 what is left of Tent is called none in half.
     """
     scene = two_pass_gap.scene(name)
     assert np.percentile(scene.away, 95) < 0.004  # m, of the file's points, put there by their pose

@@ -20,11 +20,11 @@ def changed(size):
 
 
 def timely(sigma, error):
-    "Timely sigma (n,) of a drive to the north with an error to the east"
+    "Timely sigma (n,) by medians, of a drive to the north with an error to the east"
     path = CORNER + np.outer(TIME, [0.0, 10.0, 0.0]) + np.outer(error, [1.0, 0.0, 0.0])
     stated = np.repeat(sigma[:, None], 3, axis=1)
     driven = Trajectory(START + TIME, path, Rotation.identity(len(TIME)), stated)
-    return timely_sigma(driven, find_steps(driven))[:, 0]
+    return timely_sigma(driven, find_steps(driven))[1][:, 0]
 
 
 def test_a_change_at_once_lies_between_two_epochs():
