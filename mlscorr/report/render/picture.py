@@ -51,9 +51,7 @@ class Picture:
             height, width = self.before.shape[:2]
             for k in (0, 1):
                 figure = _blank(width, height)
-                axes = _panel(figure, self.view, k, pair[k], (0, 0))
-                symbols.scale_bar(axes, self.view.camera)
-                symbols.compass(axes, self.view.camera, corner)
+                _panel(figure, self.view, k, pair[k], (0, 0), corner)
                 pair[k] = _drawn(figure)
         both = _few_colours(np.concatenate(pair))  # the same colours in both
         width, half = both.width, both.height // 2
@@ -70,10 +68,8 @@ class Picture:
         figure, corner = _blank(*size), symbols.free_corner(self.before, self.after)
         corners = _panel_corners(self.view.camera.size, size)
         for k, words in enumerate(("Before the correction", "After the correction")):
-            axes = _panel(figure, self.view, k, (self.before, self.after)[k], corners[k])
+            axes = _panel(figure, self.view, k, (self.before, self.after)[k], corners[k], corner)
             axes.set_title(words, fontsize=symbols.letter(axes, 1.0), color="#333333", loc="left")
-            symbols.scale_bar(axes, self.view.camera)
-            symbols.compass(axes, self.view.camera, corner)
         _words(figure, self.view, corners[0][0] / size[0])
         symbols.legend(figure, self.view, self.limits, (GAP, FOOT))
         return _png(_few_colours(_drawn(figure)))
@@ -125,8 +121,8 @@ def _drawn(figure):
     return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()
 
 
-def _panel(figure, view, k, pixels, corner):
-    """The points of one side, pixel by pixel, its marks over them; returns its axes in pixels."""
+def _panel(figure, view, k, pixels, corner, free):
+    """The points of one side, pixel by pixel, under its marks, with scale and compass; its axes."""
     height, width = pixels.shape[:2]
     wide, high = figure.bbox.width, figure.bbox.height
     bottom = high - corner[1] - height
@@ -137,6 +133,8 @@ def _panel(figure, view, k, pixels, corner):
     for mark in view.marks[k]:
         _mark(axes, mark, view.camera)
     _names(axes, view.marks[k], view.camera)
+    symbols.scale_bar(axes, view.camera)
+    symbols.compass(axes, view.camera, free)
     return axes
 
 
