@@ -43,7 +43,9 @@ class WeighedTies:
     @property
     def ties(self) -> TieEquations:
         """The ties with their weights."""
-        return self.equations.ties
+        ties = self.equations.ties
+        assert ties is not None
+        return ties
 
     @property
     def ratio(self) -> np.ndarray:
@@ -126,6 +128,7 @@ def solved_ties(tied: Equations, parameters: SignalParameters) -> WeighedTies:
     tied : Equations
     parameters : SignalParameters
     """
+    assert tied.ties is not None
     return WeighedTies(tied, parameters, tied.solve(parameters), tied.ties.weight)
 
 

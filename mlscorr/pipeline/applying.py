@@ -213,9 +213,7 @@ class AppliedSurvey(Summary):
                 stacklevel=2,
             )
         if survey.reference is not None and correction.datum.any():
-            way = ", ".join(
-                f"{axis} {v:+.3f}" for axis, v in zip("ENH", correction.datum, strict=True)
-            )
+            way = ", ".join(f"{a} {v:+.3f}" for a, v in zip("ENH", correction.datum, strict=True))
             warnings.warn(
                 f"The reference surface {survey.reference} stays where the clouds were. Move it by "
                 f"{way} m, too, or remove scene.reference from the new survey.toml.",

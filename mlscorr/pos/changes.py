@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.spatial import cKDTree
 
 from mlscorr.pos.settings import SETTINGS
 from mlscorr.pos.steps import Steps
@@ -78,9 +79,8 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.n
         for axis, stated in enumerate(sigma.T):
             steady[own, axis] = median_filter(stated[own], 2 * beside + 1, mode="nearest")
     changes = quick_changes(time, np.linalg.norm(steady, axis=1))
-    rows = np.searchsorted(time, steps.middle)
     for change, step in _pairs(time[changes].mean(axis=1), steps.middle):
-        (first, last), row = changes[change], rows[step]
+        (first, last), row = changes[change], np.searchsorted(time, steps.middle[step])
         before, after = steady[[first, last]]
         for values in (sigma, steady):
             values[first:row], values[row:last] = before, after
@@ -90,8 +90,8 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.n
 def _pairs(times, others):
     """Numbers (k, 2) of times and others that can be the same, twice as near as to any third."""
     farthest = SETTINGS.sigma_interval + SETTINGS.step_duration
-    away = np.full((len(times) + 2, len(others) + 2), 2 * farthest)
-    away[:-2, :-2] = np.abs(times[:, None] - others)
-    second = [np.partition(away, 1, axis=axis).take(1, axis=axis) for axis in (0, 1)]
-    limit = np.minimum(second[0], second[1][:, None]) / 2
-    return np.argwhere((away < limit)[:-2, :-2])
+    back, _ = cKDTree(times[:, None]).query(others[:, None], 2)
+    away, number = cKDTree(others[:, None]).query(times[:, None], 2)
+    limit = np.minimum(away[:, 1], np.append(back[:, 1], 0.0)[number[:, 0]]) / 2  # 0: no others
+    rows = np.flatnonzero(away[:, 0] < np.minimum(limit, farthest))
+    return np.column_stack([rows, number[rows, 0]])

@@ -18,7 +18,7 @@ class Settings:
     step_ratio: float = 10.0  # to the median of seconds' largest steps: updates, noise
     largest_jerk: float = 5.0  # m/s^3, of braking in town (ISO 15622); a step is beyond it
     step_duration: float = 0.4  # s; over which filters and resampling spread a fall-back
-    sigma_interval: float = 1.0  # s; at which POS software exports sigmas beside a path of 200 Hz
+    sigma_interval: float = 1.0  # s; of sigmas in SBET's companion smrmsg, beside a path of 200 Hz
     whole_step: float = 0.9  # of the largest size; a span that shows less cuts the step
     fix_time: float = 10.0  # s; in which receivers fix ambiguities again, by their data sheets
     # m, E, N, H: a fixed RTK solution, 1 cm and 1.5 cm + 1 ppm by receivers' data sheets, and as
