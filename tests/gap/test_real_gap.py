@@ -76,31 +76,52 @@ def test_outage_drift_in_the_simulator_shrinks_the_real_gap(real, drive):
     assert np.mean(np.array(shrink) > 0) >= 0.75
 
 
-@pytest.fixture
-def two_pass_gap(real):
-    "The example on two real passes"
+DENSE = {"Car": (0.941, 1.181, 2.497), "Tent": (0.743, -0.143, 0.372)}  # deg, by all points
+
+
+@pytest.fixture(scope="module", params=DENSE)
+def real_passes(real, request):
+    "The name of two real passes, and what the example finds of them"
     shared("data", "routescene_uav")
-    return real("two_pass_gap")
-
-
-@pytest.mark.parametrize(
-    ("name", "dense"), [("Car", (0.941, 1.181, 2.497)), ("Tent", (0.743, -0.143, 0.372))]
-)
-def test_boresight_closes_the_misfit_of_real_passes(two_pass_gap, name, dense):
-    """As a fit of all points gives it, within 2 sigma; of planes held out a tenth is left, or
-    less, and nothing of it is significant.
-
-    Which planes there are depends on where the cells of 1 m fall: over 24 of their places an angle
-    of Car is 2 sigma off in half, and over 6 what is left of Tent is called none in half.
-    """
-    scene = two_pass_gap.scene(name)
+    two_pass_gap = real("two_pass_gap")
+    scene = two_pass_gap.scene(request.param)
     assert np.percentile(scene.away, 95) < 0.004  # m, of the file's points, put there by their pose
-    result, _ = two_pass_gap.study(scene, np.random.default_rng(1), folds=2, chance=REPLICAS)
-    away = np.abs(np.subtract(result["boresight"], dense)) / result["sigma"]
-    assert np.sqrt(np.mean(away**2)) < 2.0
-    before, after = (np.median(np.abs(result[key])) for key in ("before", "after"))
+    rng = np.random.default_rng(1)
+    return request.param, two_pass_gap.study(scene, rng, folds=2, chance=REPLICAS)[0]
+
+
+def misfits(result):
+    "Median misfit of planes held out (mm) with the recorded and the calibrated boresight"
+    return (np.median(np.abs(result[key])) for key in ("before", "after"))
+
+
+def test_boresight_closes_the_misfit_of_real_passes(real_passes):
+    "A tenth is left of planes held out"
+    before, after = misfits(real_passes[1])
     assert after < before / 10
-    assert result["left"]["p_value"] > 0.05
+
+
+def test_boresight_of_real_passes_is_that_of_all_points(real_passes, request):
+    "As a fit of all points gives it, within 2 sigma"
+    name, result = real_passes
+    if name == "Car":
+        missed = "one of three angles is 2.05 sigma off, with planes joined across faces of cells"
+        request.applymarker(pytest.mark.xfail(reason=missed, strict=True))
+    away = np.abs(np.subtract(result["boresight"], DENSE[name])) / result["sigma"]
+    assert (away < 2.0).all()
+
+
+def test_nothing_but_boresight_parts_real_passes(real_passes, request):
+    "They lie 8 cm apart before, and no cause is left after"
+    name, result = real_passes
+    if name == "Tent":
+        missed = (
+            "6 cm apart, then position_noise at p = 0.19, on 18 planes of cells off whole metres"
+        )
+        request.applymarker(pytest.mark.xfail(reason=missed, strict=True))
+    before, _ = misfits(result)
+    assert before > 80.0  # mm
+    assert result["left"]["verdict"] == "none"
 
 
 @pytest.mark.parametrize("script", ["pos_gap.py", "two_pass_gap.py"])
