@@ -17,6 +17,7 @@ from mlscorr.estimate.orders import Alternative, affordable_order, compare_order
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.prediction import GridPredictions, pose_rows, predict_pose_error
 from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate.refusals import weighed_refusals
 from mlscorr.estimate.runs import find_windows, with_windows
 from mlscorr.estimate.screening import Screening, screen
 from mlscorr.estimate.settings import SETTINGS
@@ -265,15 +266,19 @@ def _estimate(trajectory, names, predictions, screening, notes):
 
 def _screened(trajectory, matched, pos, order):
     """Equations, their Screening, and the windows of drift that runs of rejected targets show."""
-    windows, more = (), ()
+    windows, more, plain = (), (), None
     for _ in range(SETTINGS.rounds):
         windows += more
         raised = with_windows(trajectory, windows) if windows else trajectory
         equations = position_equations(raised, matched, pos, order, position_prior)
         equations = equations.with_order(affordable_order(order, equations))
         equations = with_drift_history(equations)
+        plain = equations if plain is None else plain
         screening = screen(equations)
         more = find_windows(equations, screening)
         if not more:
             break
-    return equations, screening, windows
+    weighed = weighed_refusals(equations, plain, screening, len(windows))
+    if screening.outliers and not weighed.outliers:
+        return plain, weighed, ()
+    return equations, weighed, windows

@@ -18,7 +18,7 @@ from mlscorr.collocation.covariance import INTEGRATED
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters, most_probable
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.target_tests import TargetTest, all_tests, single_test
+from mlscorr.estimate.target_tests import TargetTest, all_tests, gross_evidence, single_test
 
 
 @dataclass(frozen=True)
@@ -146,24 +146,9 @@ def _eliminate(equations, parameters, objective):
 
 
 def _gains(solved, rows_of):
-    """Log posterior odds of a gross error, the same in all its rows' epochs, against none.
-
-    By name. With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of what the rows see of three axes, E,
-    an error of sigma s has the log odds (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along
-    the eigenvectors of M.
-    """
-    score = [solved.weights[rows].reshape(-1, 3).sum(axis=0) for rows in rows_of.values()]
-    blocks = [
-        solved.precision_of(rows).reshape(-1, 3, len(rows) // 3, 3) for rows in rows_of.values()
-    ]
-    values, vectors = np.linalg.eigh([block.sum(axis=(0, 2)) for block in blocks])
-    along = np.einsum("nij,ni->nj", vectors, score) ** 2
-    variance = np.square(SETTINGS.gross_sizes)[:, None, None]
-    more = 1.0 + variance * np.maximum(values, 0.0)
-    density = 0.5 * np.sum(variance * along / more - np.log(more), axis=2)
-    odds = SETTINGS.gross_share / (1.0 - SETTINGS.gross_share) / len(SETTINGS.gross_sizes)
-    gains = np.logaddexp.reduce(density, axis=0) + np.log(odds)
-    return dict(zip(rows_of, gains.tolist(), strict=True))
+    """Log posterior odds of a gross error, the same in all its rows' epochs, against none."""
+    odds = np.log(SETTINGS.gross_share / (1.0 - SETTINGS.gross_share))
+    return {name: gain + odds for name, gain in gross_evidence(solved, rows_of).items()}
 
 
 def _rejected_groups(equations, rejected):

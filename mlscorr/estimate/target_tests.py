@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri, ndtri
 
+from mlscorr.collocation import Collocation
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Objective, Posterior
 from mlscorr.estimate.settings import SETTINGS
@@ -122,3 +123,29 @@ def _test(equations, name, left_out, targets):
     statistic = float(mean @ np.linalg.solve(covariance, mean))
     parts = (mean, np.sqrt(np.diag(covariance)), redundancy)
     return TargetTest(name, statistic, critical, *(part.reshape(-1, 3) for part in parts))
+
+
+def gross_evidence(solved: Collocation, rows_of: dict) -> dict:
+    """Log Bayes factor of an error, the same in all of some rows' epochs, against none, by name.
+
+    With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of what the rows see of three axes, E, an error
+    of sigma s has the log factor (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along the
+    eigenvectors of M; averaged over the sizes that gross errors have.
+
+    Parameters
+    ----------
+    solved : Collocation
+    rows_of : dict
+        Rows of three each by name.
+    """
+    score = [solved.weights[rows].reshape(-1, 3).sum(axis=0) for rows in rows_of.values()]
+    blocks = [
+        solved.precision_of(rows).reshape(-1, 3, len(rows) // 3, 3) for rows in rows_of.values()
+    ]
+    values, vectors = np.linalg.eigh([block.sum(axis=(0, 2)) for block in blocks])
+    along = np.einsum("nij,ni->nj", vectors, score) ** 2
+    variance = np.square(SETTINGS.gross_sizes)[:, None, None]
+    more = 1.0 + variance * np.maximum(values, 0.0)
+    density = 0.5 * np.sum(variance * along / more - np.log(more), axis=2)
+    gains = np.logaddexp.reduce(density, axis=0) - np.log(len(SETTINGS.gross_sizes))
+    return dict(zip(rows_of, gains.tolist(), strict=True))

@@ -1,0 +1,82 @@
+"""Refused control points in numbers tell of a POS that drifts, a few of blunders."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.estimate.assembly import position_equations
+from mlscorr.estimate.posterior import Objective
+from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate.refusals import drift_odds
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.survey import Matched, Pos
+from tests.beds.pos_errors import EPOCHS, Case, even, rms, waves
+
+STRONG = np.log(SETTINGS.strong_evidence)
+
+
+def bumped_case(count, times=None):
+    "A POS that errs by millimetres, but by decimetres for 14 s at some of 20 targets"
+    rng, places = np.random.default_rng(count), even(20)[1::4]
+    error = waves(rng, 0.002)
+    for centre in places[:count]:
+        share = np.clip((EPOCHS - centre + 7.0) / 14.0, 0.0, 1.0)[:, None]
+        error = error + np.sin(np.pi * share) ** 2 * rng.choice([-0.4, 0.4], 3)
+    sigma = np.full_like(error, 0.02)
+    return Case(EPOCHS, error, even(20) if times is None else times, rng, sigma), error
+
+
+def odds_of(equations, names, windows=0):
+    objective = Objective.of(equations)
+    parameters = objective.parameters("matern32", objective.initial)
+    return drift_odds(equations, names, parameters, windows)
+
+
+@pytest.mark.long
+def test_many_lone_deviations_are_drift():
+    "A quarter of the points off by 0.7 m: used and named, and 95 % within 1.96 sigma says so"
+    case, error = bumped_case(5)
+    estimate = case.estimate()
+    remaining = case.remaining(estimate)
+    within = np.abs(remaining) < 1.96 * estimate.correction.corrected.position_sigma
+    assert not estimate.outliers
+    assert rms(remaining) < 0.5 * rms(error) and within.mean() > 0.9
+    assert any("T02, T06, T10, T14, T18" in line for line in estimate.warnings)
+
+
+def test_two_lone_deviations_of_twenty_are_blunders_rather():
+    "More of them, or drift that was seen elsewhere in the drive, turn the odds"
+    names = ["T02", "T06", "T10", "T14", "T18"]
+    odds = [odds_of(bumped_case(count)[0].equations(), names[:count]) for count in (1, 2, 3, 5)]
+    assert odds[1] < 0.0 < odds[2] < STRONG < odds[3]
+    assert odds[0] < odds[1]
+    assert odds_of(bumped_case(2)[0].equations(), names[:2], windows=1) > STRONG
+
+
+def test_a_target_beside_one_that_is_right_is_wrong():
+    "What was seen within a second drifted with it: a lone deviation there is no drift"
+    times = np.sort(np.append(even(20)[:-1], even(20)[1:18:4] + 0.6))
+    case, _ = bumped_case(0, times)
+    names = []
+    for number in np.flatnonzero(np.diff(times) < 1.0):
+        case.spoil(number, [0.4, -0.4, 0.4])
+        names.append(case.control.name[number])
+    assert len(names) == 5
+    assert odds_of(case.equations(), names) < -STRONG
+
+
+def test_a_target_that_deviates_alike_in_two_passes_is_wrong():
+    "One error in both is likelier than two drifts that happen to be equal"
+    times = even(20)
+    case, _ = bumped_case(0, times)
+    names = (*case.control.name[:10], *case.control.name[:10])
+    odds = []
+    for second in (1.0, -1.0):
+        place = case.observations.position.copy()
+        place[[1, 11]] += np.outer([1.0, second], [0.4, -0.4, 0.4])
+        looked = replace(case.observations, position=place, name=names)
+        matched = Matched(looked, replace(case.control, name=names))
+        equations = position_equations(case.recorded, matched, Pos(), 0, position_prior)
+        odds.append(odds_of(equations, ["T02"]))
+    assert odds[0] < odds[1] - STRONG
