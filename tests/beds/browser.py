@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import zlib
 from html import unescape
 
 import pytest
@@ -38,3 +39,22 @@ def browse(folder, wrapper):
     assert text.startswith("{"), text
     console = [line for line in process.stderr.splitlines() if "CONSOLE" in line]
     return text, [line for line in console if not any(words in line for words in ITS_OWN)]
+
+
+def print_glyphs(path):
+    "Number of glyphs on each sheet of paper (Letter) that a page is printed on"
+    target = path.with_suffix(".pdf")
+    command = [BROWSER, "--headless", "--no-sandbox", "--no-pdf-header-footer"]
+    profile = f"--user-data-dir={path.parent / 'profile'}"
+    command += [profile, f"--print-to-pdf={target}", path.as_uri()]
+    subprocess.run(command, capture_output=True, timeout=600, check=True)
+    pdf = target.read_bytes()
+    sheets = re.findall(rb"/Type /Page\n.*?/Contents (\d+) 0 R", pdf, re.S)
+    return [_glyphs(pdf, int(number)) for number in sheets]
+
+
+def _glyphs(pdf, number):
+    "Number of glyphs, of four hexadecimal digits each, in a stream of a PDF"
+    start = pdf.index(b"stream\n", re.search(rb"^%d 0 obj" % number, pdf, re.M).end()) + 7
+    content = zlib.decompressobj().decompress(pdf[start:])
+    return sum(len(text) // 4 for text in re.findall(rb"<([0-9A-F]+)> Tj", content))

@@ -7,7 +7,7 @@ import pytest
 from mlscorr.report.calibration_page import calibration_page
 from mlscorr.report.comparison_page import write_comparison
 from mlscorr.report.gap import diagnosis_page, plan_page
-from tests.beds.browser import browse, need_browser
+from tests.beds.browser import browse, need_browser, print_glyphs
 from tests.beds.gap_documents import KINDS, plan_document
 from tests.beds.reports import drive, fabricate, page
 from tests.report.test_calibration_page import calibrated, calibrated_together
@@ -99,8 +99,8 @@ async function run() {
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory):
-    "What Chromium found in every page: (results by page and frame, lines of its console)"
+def pages(tmp_path_factory):
+    "Paths of a page of each kind, in one folder"
     need_browser()
     folder = tmp_path_factory.mktemp("pages")
     content = calibrated(determined=False)
@@ -114,12 +114,19 @@ def opened(tmp_path_factory):
     }
     for name, html in htmls.items():
         (folder / f"{name}.html").write_text(html, encoding="utf-8")
+    return [folder / f"{name}.html" for name in (*htmls, "compare")]
+
+
+@pytest.fixture(scope="module")
+def opened(pages):
+    "What Chromium found in every page: (results by page and frame, lines of its console)"
     frames = [
-        (name, label, PAPER.get(name, width) if label == "print" else width)
-        for name in (*htmls, "compare")
+        (path.stem, label, PAPER.get(path.stem, width) if label == "print" else width)
+        for path in pages
         for label, width in FRAMES
     ]
-    text, console = browse(folder, WRAPPER.replace("of FRAMES", f"of {json.dumps(frames)}"))
+    wrapper = WRAPPER.replace("of FRAMES", f"of {json.dumps(frames)}")
+    text, console = browse(pages[0].parent, wrapper)
     return json.loads(text), console
 
 
@@ -142,3 +149,9 @@ def test_letters_stand_out_by_day_and_by_night(opened):
     assert small == {}
     for name, found in results.items():
         assert (found["ground"] != "rgb(255, 255, 255)") == name.endswith("dark"), name
+
+
+def test_the_first_sheet_of_paper_holds_the_answer(pages):
+    "More than title and date, which some 100 glyphs are"
+    for path in pages:
+        assert print_glyphs(path)[0] > 400, path.name
