@@ -1,10 +1,11 @@
 """Files that are read, and whether they are still those that were read."""
 
-import os
 from collections.abc import Sequence
+from dataclasses import astuple
 from pathlib import Path
 
-from mlscorr.io.storage import as_path, file_state, is_remote
+from mlscorr.io.identity import FileIdentity
+from mlscorr.io.storage import as_path
 from mlscorr.survey import InputFile
 
 
@@ -42,7 +43,7 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
     changed = [file for file in inputs if _state(file.path) != file.state]
     if changed:
         file, state = changed[0], _state(changed[0].path)
-        size = f"{state[2]} bytes now, {file.state[2]} then" if any(state) else "it is gone"
+        size = f"{state[0]} bytes now, {file.state[0]} then" if any(state) else "it is gone"
         raise OSError(
             f"{len(changed)} of {len(inputs)} input files were replaced or changed since they were "
             f"read (first: the {file.what} {file.path}, {size}): another program may still be "
@@ -51,12 +52,11 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
 
 
 def _state(path):
-    """Disk, number, size, and times of last change of content and of file; zeros without one."""
+    """Size, time of change and digest of a file; zeros without one.
+
+    Not the time of its inode: a backup that links it changes that, and so do other rights.
+    """
     try:
-        if is_remote(path):
-            size, changed = file_state(path)
-            return 0, 0, size, changed, 0
-        s = os.stat(path)
+        return astuple(FileIdentity.of(path))
     except FileNotFoundError:
-        return (0,) * 5
-    return s.st_dev, s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns
+        return 0, 0, ""

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.control import NOTHING_SURVEYED, read_surveyed
-from mlscorr.io.identity import find_copies
+from mlscorr.io.copies import find_copies
 from mlscorr.io.inputs import input_file
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.project_sections import ProjectFile

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mlscorr.io.conversion import written_name
+from mlscorr.io.copies import find_copies
 from mlscorr.io.folder_roles import RESULTS
-from mlscorr.io.identity import find_copies
 from mlscorr.io.storage import beside, files_like, is_folder, is_remote, is_there, resolved
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
 from mlscorr.io.text_files import nearest

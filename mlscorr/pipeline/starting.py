@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from mlscorr.io.conversion import is_foreign, recorded_points
+from mlscorr.io.copies import find_copies
 from mlscorr.io.folder_roles import SIMULATED, FileRole, sort_files
-from mlscorr.io.identity import find_copies
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.output import output_file

@@ -27,7 +27,8 @@ class InputFile:
         What it is, in words.
     path : Path
     state : tuple of int or str
-        Disk, number, size (bytes) and times of change (ns; a store's ETag) when its reading began.
+        Size (bytes), time of change (ns; a store's ETag) and digest of both ends when its reading
+        began; zeros without a file.
     """
 
     what: str

@@ -156,6 +156,20 @@ def test_an_input_that_changes_while_it_is_read_stops_the_run(change, tmp_path):
     assert not list(tmp_path.glob(".out*"))
 
 
+@pytest.mark.parametrize(
+    "touch", [lambda p: p.chmod(0o400), lambda p: p.with_name("backup").hardlink_to(p)]
+)
+def test_other_rights_and_links_of_an_input_leave_a_run_alone(touch, tmp_path):
+    "A backup that links what is read, or a change of its rights, changes nothing of its content"
+    path, out = tmp_path / "pass-1.laz", tmp_path / "out"
+    path.write_text("old text")
+    inputs = [input_file("cloud", path)]
+    time.sleep(0.02)  # s, the finest step of a file's time
+    with output_folder(out, inputs):
+        touch(path)
+    assert out.is_dir()
+
+
 def test_an_input_in_a_folder_that_gets_results_is_refused(tmp_path):
     "Below the output folder, too, where results go there: by overwriting as well"
     path = tmp_path / "shift" / "pass-1.laz"
