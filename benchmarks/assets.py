@@ -62,8 +62,7 @@ def main():
 def draw(name, folder, write):
     """Draw a picture and compare it: whether it has changed."""
     new, old = folder / f"{name}.png", ASSETS / f"{name}.png"
-    option = [] if name == "diagnose" else ["--picture"]
-    command = [sys.executable, ROOT / SCRIPTS[name][0], *option, new]
+    command = [sys.executable, ROOT / SCRIPTS[name][0], "--picture", new]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
     share = share_changed(old, new)
     word = "has changed" if share > SHARE else "looks the same"

@@ -44,7 +44,9 @@ def parse():
     parser.add_argument("survey", nargs="?", type=Path)
     parser.add_argument("--out", type=Path, help="keep the results in this folder")
     parser.add_argument("--picture", type=Path, default=ASSETS / "correct_a_survey.png")
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    arguments.picture.parent.mkdir(parents=True, exist_ok=True)
+    return arguments
 
 
 def simulated(folder):

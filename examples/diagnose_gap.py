@@ -1,14 +1,15 @@
 """Find out, round by round, what a simulator does not know of a survey.
 
-    python examples/diagnose_gap.py [PICTURE]
+    python examples/diagnose_gap.py [--picture FILE.png]
 
 A street is simulated with a scanner clock that is 6 ms off and control in a height datum that is
 6 cm off. The diagnosis sees the survey alone: it names one effect, puts it into the simulator, and
 is asked again until nothing is left.
 """
 
-import sys
+import argparse
 import tempfile
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -19,6 +20,7 @@ from mlscorr.simulate import Scenario, simulate
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
+ASSETS = Path(__file__).parents[1] / "assets"
 HIDDEN = [
     {"name": "time_offset", "magnitude": 0.006},
     {"name": "vertical_datum", "magnitude": 0.06},
@@ -93,10 +95,18 @@ def split(axis, one):
 
 
 def main():
-    path = sys.argv[1] if len(sys.argv) > 1 else "assets/diagnose.png"
+    picture = parse().picture
     with tempfile.TemporaryDirectory() as folder:
-        draw(rounds(survey_to_explain(folder)), path)
-    print(f"Picture: {path}")
+        draw(rounds(survey_to_explain(folder)), picture)
+    print(f"Picture: {picture}")
+
+
+def parse():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--picture", type=Path, default=ASSETS / "diagnose.png")
+    arguments = parser.parse_args()
+    arguments.picture.parent.mkdir(parents=True, exist_ok=True)
+    return arguments
 
 
 if __name__ == "__main__":

@@ -65,7 +65,9 @@ def parse():
     parser.add_argument("series", nargs="?", type=Path, default=shared if shared.exists() else None)
     parser.add_argument("--drives", type=int, default=5, help="simulated drives of 1500 s")
     parser.add_argument("--picture", type=Path, default=ROOT / "assets" / "pos_error.png")
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    arguments.picture.parent.mkdir(parents=True, exist_ok=True)
+    return arguments
 
 
 def city_drive(duration):
@@ -138,7 +140,6 @@ def draw(runs, picture):
         axes.set_title(f"Autocorrelation {title}")
         axes.axhline(0.0, color="0.7", lw=0.8)
     lost.set_ylabel("1 at lag 0; bands: 90 % of the drives")
-    picture.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(picture, dpi=110)
 
 

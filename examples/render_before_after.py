@@ -49,7 +49,9 @@ def parse():
     parser.add_argument("survey", nargs="?", type=Path)
     parser.add_argument("--out", type=Path, help="write every picture into this folder")
     parser.add_argument("--picture", type=Path, default=ROOT / "assets/render_before_after.png")
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    arguments.picture.parent.mkdir(parents=True, exist_ok=True)
+    return arguments
 
 
 def at_hand():

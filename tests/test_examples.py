@@ -50,3 +50,12 @@ def test_decision_costs_makes_its_picture(tmp_path):
         "careful",
     ]
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.py")))
+def test_an_example_says_what_it_takes_before_it_works(name, tmp_path):
+    "From any folder, within the time of its imports; nothing is drawn meanwhile"
+    script = [sys.executable, EXAMPLES / f"{name}.py", "--help"]
+    printed = subprocess.check_output(script, text=True, cwd=tmp_path, timeout=60)
+    assert "--picture" in printed
+    assert not list(tmp_path.iterdir())

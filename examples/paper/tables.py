@@ -23,7 +23,9 @@ def parse(arguments, description, picture):
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20, help="simulated surveys (default: 20)")
     parser.add_argument("--picture", type=Path, default=ROOT / "assets" / picture)
-    return parser.parse_args(arguments)
+    given = parser.parse_args(arguments)
+    given.picture.parent.mkdir(parents=True, exist_ok=True)
+    return given
 
 
 @cache

@@ -60,6 +60,7 @@ def main():
         },
     }
     out.mkdir(parents=True, exist_ok=True)
+    arguments.picture.parent.mkdir(parents=True, exist_ok=True)
     (out / "pos_gap.json").write_text(json.dumps(result, indent=1) + "\n")
     show(result)
     print(f"Page: {write(out, one, result, cycles, measured, believed, models)}")

@@ -79,6 +79,7 @@ def main():
     if not result:
         return
     arguments.out.mkdir(parents=True, exist_ok=True)
+    arguments.picture.parent.mkdir(parents=True, exist_ok=True)
     (arguments.out / "two_pass_gap.json").write_text(json.dumps(result, indent=1) + "\n")
     print(f"Page: {write(arguments.out, scenes, result, turned)}")
     if "Car" in result:
