@@ -1,5 +1,6 @@
 """The commands: read, call, write; nothing else. What they do is told by pipeline."""
 
+import logging
 import os
 import warnings
 from importlib import import_module
@@ -48,6 +49,7 @@ def main() -> None:
     """Entry point of the command line."""
     listen()
     os.environ["RUST_BACKTRACE"] = "0"  # of a decoder that meets a damaged file
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # of a home without room for its cache
     warnings.showwarning = lambda message, *_, **__: warn(f"Warning: {message}")
     try:
         app()

@@ -159,13 +159,12 @@ def _rendering():
         child = subprocess.run(
             [sys.executable, "-c", RENDER], capture_output=True, timeout=RENDER_SECONDS, check=False
         )
+        state = f"failed (exit code {child.returncode})" if child.returncode else "drawn"
     except subprocess.TimeoutExpired:
         state = f"no picture within {RENDER_SECONDS} s"
-    else:
-        if child.returncode == 0:
-            return InstalledPart("off-screen picture", True, "drawn")
-        state = f"failed (exit code {child.returncode})"
-    return InstalledPart("off-screen picture", False, state, needed=False)
+    except OSError as error:  # where Python itself may not be started
+        state = f"failed ({error})"
+    return InstalledPart("off-screen picture", state == "drawn", state, needed=False)
 
 
 def _geoids():

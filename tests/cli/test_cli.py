@@ -1,6 +1,7 @@
 """The command line as a careless user meets it: real processes, exit codes, what stands where."""
 
 import json
+import os
 import re
 import shutil
 import signal
@@ -640,3 +641,13 @@ def test_importing_loads_no_heavy_library(module):
     loaded = subprocess.check_output([sys.executable, "-c", code], text=True).split()
     heavy = {"laspy", "lazrs", "open3d", "sklearn", "scipy", "numba", "matplotlib", "pyproj"}
     assert not heavy & set(loaded)
+
+
+def test_a_home_that_cannot_be_written_is_not_spoken_of():
+    "Matplotlib keeps its fonts elsewhere then, which is nothing that a user could mend"
+    code = "from mlscorr.cli import main\ntry: main()\nfinally: import matplotlib"
+    home = {"HOME": os.devnull, "PATH": os.environ["PATH"]}
+    command = [sys.executable, "-c", code, "--version"]
+    process = subprocess.run(command, capture_output=True, text=True, env=home, cwd=ROOT)
+    assert process.returncode == 0
+    assert process.stderr == ""

@@ -4,11 +4,12 @@ import json
 import platform
 import re
 import subprocess
+import sys
 
 import pytest
 
 from mlscorr.pipeline.installation import LIBRARIES, PACKAGES, Installation, InstalledPart, remedy
-from tests.beds.places import MLSCORR
+from tests.beds.places import MLSCORR, ROOT
 
 
 @pytest.fixture(scope="module")
@@ -18,6 +19,13 @@ def examined():
     document = json.loads(process.stdout)
     assert next(iter(document.items())) == ("schema", "mlscorr.doctor/1")
     return process, {finding["name"]: finding for finding in document["findings"]}
+
+
+def test_a_python_that_cannot_be_started_draws_no_picture():
+    "Where the interpreter is part of another program doctor says so, and goes on"
+    code = "import sys, mlscorr; sys.executable = ''; print(*mlscorr.doctor().parts, sep='\\n')"
+    told = subprocess.check_output([sys.executable, "-c", code], text=True, cwd=ROOT)
+    assert "'off-screen picture', ok=False" in told
 
 
 def test_all_that_is_needed_is_looked_at(examined):
