@@ -53,8 +53,8 @@ def read_layout(path: str | Path) -> LasLayout:
         head = file.read(HEADER_SIZES[0])
         if head[:4] != b"LASF" or len(head) < HEADER_SIZES[0]:
             raise ValueError(
-                f"{path} is not a LAS or LAZ file, or cut off: it has {size} bytes and begins with "
-                f"{head[:4]!r}; a header alone has {HEADER_SIZES[0]} and begins with b'LASF'."
+                f"{path} is not a LAS or LAZ file (or .e57, .ply), or cut off: it has {size} bytes "
+                f"and begins with {head[:4]!r}; a header alone has {HEADER_SIZES[0]}, from b'LASF'."
             )
         start = struct.unpack_from("<I", head, 96)[0]
         if start > size:
