@@ -20,8 +20,7 @@ def ties(
     say(
         f"{counted(content['ties'], 'tie')} between {counted(features['plane'], 'plane')}, "
         f"{counted(features['pole'], 'pole')}, {counted(features['line'], 'painted line')} and "
-        f"{counted(features['dash'], 'dash')}; "
-        f"{content['refused']} more contradict their neighbours."
+        f"{counted(features['dash'], 'dash')}; {content['refused']} more contradict neighbours."
     )
     for pair in content["pairs"]:
         parts = [

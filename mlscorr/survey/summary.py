@@ -47,9 +47,12 @@ def counted(number: int, noun: str) -> str:
 
     >>> counted(1, "pass"), counted(2, "pass"), counted(3, "entry"), counted(0, "cloud file")
     ('1 pass', '2 passes', '3 entries', '0 cloud files')
+    >>> counted(4, "dash"), counted(5, "epoch")
+    ('4 dashes', '5 epochs')
     """
-    ends = {"s": f"{noun}es", "y": f"{noun[:-1]}ies"}
-    return f"{number} {noun if number == 1 else ends.get(noun[-1], f'{noun}s')}"
+    ends = {"s": f"{noun}es", "sh": f"{noun}es", "y": f"{noun[:-1]}ies"}
+    plural = ends.get(noun[-1]) or ends.get(noun[-2:], f"{noun}s")
+    return f"{number} {noun if number == 1 else plural}"
 
 
 def _short(value):
