@@ -77,10 +77,6 @@ class Knots(NamedTuple):
         parts = [clocks[rows[k], s] for s, k in enumerate(kept)]
         return cls(first, np.concatenate([epochs[:0], *parts]), times, cells)
 
-    def cell(self, gps_time: np.ndarray) -> np.ndarray:
-        """Number of the cell of each time."""
-        return np.searchsorted(self.times, gps_time, side="right")
-
 
 def knot_step(covariance: Covariance, share: float = SHARE) -> float:
     """Largest step between knots among epochs, on the signal's clock.
