@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mlscorr.estimate.inputs import filled_sigmas
 from mlscorr.evaluate.settings import SETTINGS
 from mlscorr.matching.settings import SETTINGS as MATCHING
 from mlscorr.pos import stated_sigma
@@ -32,7 +33,8 @@ def datum_warnings(control: Matched, trajectory: Trajectory, pos: Pos) -> tuple[
     """
     if len(control) < 3:
         return ()
-    sigma = stated_sigma(trajectory, pos, control.gps_time).position
+    filled, _ = filled_sigmas(trajectory)
+    sigma = stated_sigma(filled, pos, control.gps_time).position
     return *_height(control.misclosure[:, 2], sigma[:, 2]), *_plan(control, sigma[:, :2], pos)
 
 

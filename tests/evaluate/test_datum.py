@@ -1,6 +1,7 @@
 """What all control points have in common is said where the POS leaves no room for it."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,16 @@ def test_heights_of_another_datum_are_named():
     (sentence,) = said(lambda place: place - [0.0, 0.0, 0.3])
     assert re.search(r" 0\.(2[5-9]|3[0-5]) m below the cloud", sentence)
     assert "12 observations" in sentence and "vertical datum" in sentence
+
+
+@pytest.mark.parametrize("rows", [slice(0, 40), slice(None)])
+def test_sigmas_of_zero_are_no_statement_of_a_datum_either(rows):
+    "Control 0.3 m lower is named where epochs state a sigma of zero, which others fill in"
+    sigma = DRIVE.position_sigma.copy()
+    sigma[rows] = 0.0
+    lower = control(np.random.default_rng(3), lambda place: place - [0.0, 0.0, 0.3])
+    (sentence,) = datum_warnings(lower, replace(DRIVE, position_sigma=sigma), Pos())
+    assert re.search(r" 0\.(2[5-9]|3[0-5]) m below the cloud", sentence)
 
 
 def test_another_horizontal_datum_is_named():
