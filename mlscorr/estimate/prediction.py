@@ -34,14 +34,14 @@ class GridPredictions:
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """Numbers of regular epochs, those before and after gaps, and those nearest to control."""
+        """Numbers of regular epochs, those about gaps, steps and restarts, those beside control."""
         trajectory, n = self.equations.trajectory, len(self.equations.trajectory)
         history = self.equations.stated.history
         steps = np.concatenate([history.steps.before, history.steps.after, history.restarts])
         edges = np.searchsorted(trajectory.gps_time, [*trajectory.gaps.ravel(), *steps])
         control = np.searchsorted(trajectory.gps_time, self.equations.observed)
         regular = np.linspace(0, n - 1, min(n, SETTINGS.prediction_epochs)).round().astype(int)
-        return np.unique(np.clip(np.concatenate([regular, edges, control]), 0, n - 1))
+        return np.unique(np.clip(np.concatenate([regular, edges, edges - 1, control]), 0, n - 1))
 
     def add(self, parameters: SignalParameters, solved: Collocation) -> None:
         """Predict under parameters, by their Collocation.

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate.posterior import Posterior
+from mlscorr.estimate.outages import with_drift_history
+from mlscorr.estimate.posterior import Posterior, choose_parameters
 from mlscorr.estimate.prediction import (
     GridPredictions,
     bridge_steps,
@@ -17,7 +18,7 @@ from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.target_tests import all_tests
 from mlscorr.pos import find_steps
 from mlscorr.survey import Trajectory
-from tests.beds.pos_errors import EPOCHS, START, smooth_case
+from tests.beds.pos_errors import EPOCHS, START, Case, even, filtered_outage, smooth_case, waves
 
 ROWS = np.array([0, 137, 900, 1500, 2000])
 
@@ -30,6 +31,10 @@ def parameters(objective):
 def sure(*pairs):
     "A posterior of these parameters and weights"
     return Posterior(pairs, pairs)
+
+
+def variances(covariance):
+    return np.einsum("qii->qi", covariance)
 
 
 def test_some_epochs_are_those_of_all(equations, parameters):
@@ -82,6 +87,27 @@ def test_doubt_about_parameters_widens_the_sigma(equations, parameters):
     rows = np.linspace(0, 2000, SETTINGS.prediction_epochs).round().astype(int)
     mean = (variance[1] + variance[2]) / 2
     assert (variance[0][rows] > (1 - 1e-6) * mean[rows]).all()
+
+
+def test_the_last_epoch_of_an_outage_has_its_own_sigma():
+    """Where sigma(t) falls at once and the path doesn't step, the epoch before it has the average
+    over all parameters, not half of what holds once GNSS is back.
+    """
+    rng = np.random.default_rng(3)
+    sigma = filtered_outage(rng)[1]
+    case = Case(EPOCHS, waves(rng, 0.01), even(8), rng, sigma)
+    equations = with_drift_history(case.equations())
+    history = equations.stated.history
+    assert len(history.steps) == 0 and len(history.restarts) == 1
+    last = np.searchsorted(case.recorded.gps_time, history.restarts) - 1
+    posterior = choose_parameters(equations, points=8)
+    mean, square = 0.0, 0.0
+    for chosen, weight in posterior.mixture:
+        pose, spread = predict_under(equations, chosen, last)
+        mean, square = mean + weight * pose, square + weight * (variances(spread) + pose**2)
+    pose, spread = predict_pose_error(equations, posterior)
+    assert variances(spread[last]) == pytest.approx(square - mean**2, rel=1e-6)
+    assert pose[last] == pytest.approx(mean, abs=1e-9)
 
 
 def test_parameters_of_no_weight_are_not_worked_out(equations, parameters):
