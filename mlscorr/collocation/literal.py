@@ -52,7 +52,7 @@ class LiteralCollocation:
 
     Parameters
     ----------
-    gps_time, misclosure, noise, design, signals
+    gps_time, misclosure, signals
         As in collocate_literal.
     least_squares : Collocation
         Of the trend, with V = B D_Lambda B^T + D_omega.
@@ -60,8 +60,6 @@ class LiteralCollocation:
 
     gps_time: np.ndarray
     misclosure: np.ndarray
-    noise: Noise
-    design: np.ndarray
     signals: tuple[LiteralSignal, ...]
     least_squares: Collocation
 
@@ -95,43 +93,6 @@ class LiteralCollocation:
                 predicted = signal.base * (correlation(lag) @ weighted)  # Eq. 20 in Eq. 15
                 mean[part] += np.einsum("qrk,qk->qr", partial[part], predicted)
         return mean, None
-
-    def leave_out(self, rows: np.ndarray) -> tuple[np.ndarray, None]:
-        """What the other epochs say of some: residuals (l - prediction), and None.
-
-        Parameters
-        ----------
-        rows : (k,) int array
-
-        Raises
-        ------
-        ValueError
-            Where the others don't determine the trend, and for rows that aren't whole epochs.
-        """
-        n, r = self.misclosure.shape
-        out = np.zeros(n * r, dtype=bool)
-        out[rows] = True
-        epochs = out.reshape(n, r).any(axis=1)
-        kept = np.flatnonzero(~epochs)
-        if epochs.sum() * r != len(rows):
-            raise ValueError(
-                f"{len(rows)} rows of {epochs.sum()} epochs are left out: an epoch's {r} rows go "
-                "together."
-            )
-        signals = [_select(signal, kept) for signal in self.signals]
-        given = self.gps_time[kept], self.misclosure[kept], self.noise.select(kept)
-        others = collocate_literal(*given, self.design[kept], signals)
-        partials = [signal.partials[epochs] for signal in self.signals]
-        mean, _ = others.predict(self.gps_time[epochs], self.design[epochs], partials)
-        residuals = np.full((n, r), np.nan)
-        residuals[epochs] = self.misclosure[epochs] - mean
-        return residuals.ravel()[rows], None
-
-
-def _select(signal, epochs):
-    """The signal at some of the epochs."""
-    variance = signal.variance if np.ndim(signal.variance) == 1 else signal.variance[epochs]
-    return LiteralSignal(signal.partials[epochs], variance, signal.base, signal.correlation_time)
 
 
 def collocate_literal(
@@ -176,4 +137,4 @@ def collocate_literal(
         raise ValueError(NOT_POSITIVE.format(n * r)) from problem
     solver = DenseSolver(np.repeat(gps_time, r), (), (), np.arange(len(factor)), factor)
     solved = solve_trend(solver, misclosure.ravel(), design.reshape(n * r, -1))  # Eq. 13
-    return LiteralCollocation(gps_time, misclosure, noise, design, tuple(signals), solved)
+    return LiteralCollocation(gps_time, misclosure, tuple(signals), solved)

@@ -120,24 +120,6 @@ def test_its_covariances_are_those_of_no_signal():
     assert (1.0 - cross @ cross.T)[10, 10] < -1.5
 
 
-def test_leave_out_equals_leaving_out():
-    "Residuals of two epochs are those of a solution without them; half an epoch is refused"
-    drive = Drive(2)
-    base = np.array([0.06, 0.09, 0.09])
-    rows = [12, 13, 14, 30, 31, 32]
-    residuals, covariance = drive.solve(base).leave_out(rows)
-    kept = np.setdiff1d(np.arange(21), [4, 10])
-    whole = Drive(2)
-    drive.gps_time, drive.misclosure = drive.gps_time[kept], drive.misclosure[kept]
-    drive.noise, drive.partials = drive.noise.select(kept), drive.partials[kept]
-    drive.epochs = whole.gps_time[[4, 10]]
-    expected = whole.misclosure[[4, 10]] - drive.predict(drive.solve(base))
-    assert covariance is None
-    assert residuals == pytest.approx(expected.ravel(), abs=1e-12)
-    with pytest.raises(ValueError, match="2 rows of 1 epochs are left out: an epoch's 3 rows go"):
-        whole.solve(base).leave_out([3, 4])
-
-
 def test_too_few_control_points_are_refused():
     "Five epochs don't determine a polynomial of order five"
     drive = Drive(3, n=5)
