@@ -2,10 +2,12 @@
 
 A misread control point stands alone. Where neighbours in time are all rejected and deviate the same
 way, the error is the POS's: its sigma is raised there as it grows between two places where
-GNSS holds it, and everything is estimated anew.
+GNSS holds it, and everything is estimated anew. Where another pass sees them deviate likewise, it
+is the points', as by one setup of the instrument: no POS drifts twice alike.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from mlscorr.estimate.screening import Screening
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.pos import SETTINGS as POS_SETTINGS
+from mlscorr.pos.changes import runs
 from mlscorr.survey import Trajectory
 
 
@@ -55,8 +58,8 @@ class DriftWindow:
     def __str__(self):
         return (
             f"{', '.join(self.names)} deviate together by {self.size:.2f} m and more per axis from "
-            f"{self.first:.1f} to {self.last:.1f} s: the POS drifts there by more than it states. "
-            "They were used, and its sigma was raised there."
+            f"{self.first:.1f} to {self.last:.1f} s: the POS drifts there by more than it states, "
+            "so that its sigma was raised."
         )
 
 
@@ -74,38 +77,57 @@ def find_windows(equations: Equations, screening: Screening) -> tuple[DriftWindo
     order = np.argsort(equations.observed, kind="stable")
     names, times = equations.names[order], equations.observed[order]
     is_out = np.isin(names, list(rejected))
-    starts = np.flatnonzero(is_out & ~np.append(False, is_out[:-1]))
-    ends = np.flatnonzero(is_out & ~np.append(is_out[1:], False))
+    passes = np.flatnonzero(np.diff(equations.trajectory.segment(times))) + 1
     windows = []
-    for start, end in zip(starts, ends, strict=True):
-        run = tuple(dict.fromkeys(names[start : end + 1].tolist()))
-        if _deviate_together([rejected[name] for name in run]):
-            windows.append(_window(equations, times, start, end, run, rejected))
+    for start, end in runs(is_out, passes):
+        rows, run = order[start:end], dict.fromkeys(names[start:end].tolist())
+        deviations = [_Deviation.of(equations, rejected[name], rows) for name in run]
+        if _is_drift(deviations):
+            windows.append(_window(equations.trajectory, times, start, end, deviations))
     return tuple(w for w in windows if w.first < w.last)  # others passed there at the same time
 
 
-def _deviate_together(tests: list[TargetTest]):
-    """Whether a run is drift: two that differ, or three and more, of about one direction."""
-    ways = np.array([test.left_out.mean(axis=0) for test in tests])
+class _Deviation(NamedTuple):
+    """What a rejected target is off in a run (i, 3), with its sigma, and beyond the run (o, 3)."""
+
+    name: str
+    inside: np.ndarray
+    sigma: np.ndarray
+    beyond: np.ndarray
+
+    @classmethod
+    def of(cls, equations, test: TargetTest, rows):
+        inside = np.isin(np.flatnonzero(equations.names == test.name), rows)
+        return cls(test.name, test.left_out[inside], test.sigma[inside], test.left_out[~inside])
+
+
+def _is_drift(run):
+    """Whether a run is drift: two that differ, or three and more, of about one direction, which are
+    not as far off the same way where they were seen beyond it.
+    """
+    ways = np.array([deviation.inside.mean(axis=0) for deviation in run])
     if len(ways) < 2:
         return False
     if len(ways) == 2:
-        sigma = np.linalg.norm(np.vstack([test.sigma for test in tests]))
+        sigma = np.linalg.norm(np.vstack([deviation.sigma for deviation in run]))
         if np.linalg.norm(ways[1] - ways[0]) < SETTINGS.setup_sigmas * sigma:
             return False
+    beyond = np.vstack([deviation.beyond for deviation in run])
+    apart = beyond - np.repeat(ways, [len(deviation.beyond) for deviation in run], axis=0)
+    if np.sum(apart**2) < np.sum(beyond**2):
+        return False
     return np.linalg.norm(ways.mean(axis=0)) > 0.5 * np.linalg.norm(ways, axis=1).mean()
 
 
-def _window(equations, times, start, end, run, rejected):
-    trajectory = equations.trajectory
-    inside = (trajectory.passes[:, 0] <= times[start]) & (times[start] <= trajectory.passes[:, 1])
-    begin, finish = trajectory.passes[np.argmax(inside)]
+def _window(trajectory, times, start, end, run):
+    begin, finish = trajectory.passes[trajectory.segment(times[start])]
     last_before = times[start - 1] if start > 0 else -np.inf
-    first_after = times[end + 1] if end + 1 < len(times) else np.inf
-    ways = np.vstack([rejected[name].left_out for name in run])
+    first_after = times[end] if end < len(times) else np.inf
+    ways = np.vstack([deviation.inside for deviation in run])
     size = float(np.sqrt(np.mean(np.sum(ways**2, axis=1)) / 3))
     first, last = max(begin, last_before), min(finish, first_after)
-    return DriftWindow(float(first), float(last), size, bool(first_after > finish), run)
+    names = tuple(deviation.name for deviation in run)
+    return DriftWindow(float(first), float(last), size, bool(first_after > finish), names)
 
 
 def with_windows(trajectory: Trajectory, windows: tuple[DriftWindow, ...]) -> Trajectory:
