@@ -69,7 +69,7 @@ def read_gate(text: str) -> Gate:
     >>> read_gate("check.rmse_3d > 0.05")
     Gate(quantity='check.rmse_3d', operator='>', limit=0.05)
     """
-    match = re.fullmatch(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*(\S+)\s*", text)
+    match = re.fullmatch(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([-+.\deE]+)\s*", text)
     try:
         quantity, sign, limit = match.groups()
         gate = Gate(quantity, sign, float(limit))

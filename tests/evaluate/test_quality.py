@@ -96,6 +96,8 @@ def test_every_quantity_can_be_asked():
         ("check.rmse_e", "QUANTITY > NUMBER"),
         ("check.rmse_e > 3 cm", "QUANTITY > NUMBER"),
         ("check.rmse_e == 0.03", "QUANTITY > NUMBER"),
+        ("check.rmse_e > nan", "QUANTITY > NUMBER"),  # which no value ever is
+        ("check.rmse_e > inf", "QUANTITY > NUMBER"),
         ("", "QUANTITY > NUMBER"),
     ],
 )
