@@ -140,8 +140,11 @@ class Calibration(Summary):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on what this geometry can't tell, and what is doubtful."""
-        return *self.shared_warnings, *self.own_warnings
+        """Sentences on what is doubtful, and what this geometry can't tell of the one scanner.
+
+        Of several scanners each has its own: those of ``of``.
+        """
+        return *self.shared_warnings, *(self.own_warnings if len(self.recorded) == 1 else ())
 
     @property
     def own_warnings(self) -> tuple[str, ...]:

@@ -51,6 +51,13 @@ def alone(sites):
     return [list(separate(site)) for site in sites]
 
 
+def test_sentences_of_two_mountings_are_those_that_both_share(joint):
+    "What this geometry can't tell of a mounting stands with the calibration of that scanner"
+    for calibration in joint:
+        assert calibration.warnings == calibration.shared_warnings
+        assert not calibration.determined.all()
+
+
 def test_both_mountings_are_found(joint):
     "Lever arms to 7 mm and boresights to 3 mdeg, within 3 sigmas, over seeds"
     for calibration in joint:
