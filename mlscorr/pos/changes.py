@@ -73,9 +73,10 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.n
     """
     time, sigma = trajectory.gps_time, trajectory.position_sigma.copy()
     steady = np.empty_like(sigma)
-    beside = round(SETTINGS.step_duration / float(np.median(np.diff(time))))
     for first, last in np.searchsorted(time, trajectory.passes):
         own = slice(first, last + 1)
+        step = np.median(np.diff(time[max(first - 1, 0) : last + 2]))  # sessions differ in rate
+        beside = round(SETTINGS.step_duration / float(step))
         for axis, stated in enumerate(sigma.T):
             steady[own, axis] = median_filter(stated[own], 2 * beside + 1, mode="nearest")
     changes = quick_changes(time, np.linalg.norm(steady, axis=1))

@@ -77,6 +77,19 @@ def test_the_noise_of_epochs_is_no_change():
     assert np.std(sigma[FLOATED]) < 0.5 * np.std((SIGMA * noise)[FLOATED])
 
 
+def test_a_session_of_another_rate_keeps_its_outage():
+    "40 s of growth at 1 Hz are no noise of epochs, though a session of 200 Hz is beside it"
+    seconds = np.arange(1000.0, 1120.0)
+    time = START + np.concatenate([np.arange(0.0, 60.0, 0.005), seconds])
+    since = np.clip(seconds - 1040.0, 0.0, 40.0) * (seconds < 1080.0)
+    sigma = np.full((len(time), 3), 0.02)
+    sigma[-len(seconds) :] += 0.5 * (since[:, None] / 40.0) ** 1.5  # m
+    session = np.repeat([0, 1], [len(time) - len(seconds), len(seconds)])
+    path = CORNER + np.outer(time - START, [0.0, 10.0, 0.0])
+    driven = Trajectory(time, path, Rotation.identity(len(time)), sigma, session=session)
+    assert timely_sigma(driven, find_steps(driven))[1] == pytest.approx(sigma)
+
+
 def test_runs_are_parted_at_cuts_within_them():
     "Rows 2 to 4 and 6; a cut at 3 parts the first run, at 6 and 0 none"
     flags = np.array([False, False, True, True, True, False, True])
