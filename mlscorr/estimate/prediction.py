@@ -34,13 +34,19 @@ class GridPredictions:
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """Numbers of regular epochs, those about gaps, steps and restarts, those beside control."""
+        """Numbers of regular epochs, those about gaps, steps and restarts, those beside control.
+
+        Regular in time: sessions may differ in rate.
+        """
         trajectory, n = self.equations.trajectory, len(self.equations.trajectory)
         history = self.equations.stated.history
         steps = np.concatenate([history.steps.before, history.steps.after, history.restarts])
         edges = np.searchsorted(trajectory.gps_time, [*trajectory.gaps.ravel(), *steps])
         control = np.searchsorted(trajectory.gps_time, self.equations.observed)
-        regular = np.linspace(0, n - 1, min(n, SETTINGS.prediction_epochs)).round().astype(int)
+        time, begins = trajectory.gps_time, np.isin(trajectory.gps_time, trajectory.gaps[:, 1])
+        passed = np.cumsum(np.where(begins, 0.0, np.diff(time, prepend=time[0])))
+        shares = np.linspace(0.0, passed[-1], min(n, SETTINGS.prediction_epochs))
+        regular = np.interp(shares, passed, np.arange(n)).round().astype(int)
         return np.unique(np.clip(np.concatenate([regular, edges, edges - 1, control]), 0, n - 1))
 
     def add(self, parameters: SignalParameters, solved: Collocation) -> None:

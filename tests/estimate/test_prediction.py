@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mlscorr.estimate.assembly import position_equations
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.posterior import Posterior, choose_parameters
 from mlscorr.estimate.prediction import (
@@ -14,10 +15,11 @@ from mlscorr.estimate.prediction import (
     predict_pose_error,
     predict_under,
 )
+from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.target_tests import all_tests
 from mlscorr.pos import find_steps
-from mlscorr.survey import Trajectory
+from mlscorr.survey import Matched, Pos, Trajectory
 from tests.beds.pos_errors import EPOCHS, START, Case, even, filtered_outage, smooth_case, waves
 
 ROWS = np.array([0, 137, 900, 1500, 2000])
@@ -108,6 +110,17 @@ def test_the_last_epoch_of_an_outage_has_its_own_sigma():
     pose, spread = predict_pose_error(equations, posterior)
     assert variances(spread[last]) == pytest.approx(square - mean**2, rel=1e-6)
     assert pose[last] == pytest.approx(mean, abs=1e-9)
+
+
+def test_a_session_of_a_lower_rate_has_as_many_epochs_a_second():
+    "100 s at 1 Hz beside 100 s at 200 Hz are half of the epochs that are averaged over"
+    time = START + np.concatenate([np.arange(0.0, 100.0, 0.005), np.arange(1000.0, 1100.0)])
+    position = np.outer(time - START, [10.0, 0.0, 0.0])
+    session = np.repeat([0, 1], [20_000, 100])
+    drive = Trajectory(time, position, Rotation.identity(len(time)), session=session)
+    equations = position_equations(drive, Matched.none(), Pos(), 0, position_prior)
+    rows = GridPredictions(equations).rows
+    assert 95 <= np.sum(rows >= 20_000) <= 100 and 145 <= np.sum(rows < 20_000) <= 160
 
 
 def test_parameters_of_no_weight_are_not_worked_out(equations, parameters):
