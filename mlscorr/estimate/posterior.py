@@ -273,5 +273,5 @@ def _blocks(equations):
     before, rank = np.empty(len(first), int), np.argsort(first)
     before[rank] = np.cumsum(counts[rank]) - counts[rank]
     block = (before * number // len(order))[target]
-    parts = (equations.select(order[block == k]) for k in np.unique(block))
+    parts = (equations.select(np.sort(order[block == k])) for k in np.unique(block))
     return tuple(part.without_outer_fallbacks() for part in parts)

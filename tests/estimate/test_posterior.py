@@ -208,6 +208,17 @@ def test_a_target_is_in_one_block_with_all_its_passes():
     assert all(len(rows) == 6 for block in blocks for rows in block.target_rows.values())
 
 
+def test_looks_of_a_target_keep_their_order_in_a_block():
+    "Of 75 targets seen twice, in no order of time: what is said of each look is said of that look"
+    times = np.random.default_rng(4).uniform(2.0, 198.0, 150)
+    case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4))
+    equations = replace(case.equations(), names=np.array(case.control.name[:75] * 2))
+    for block in Objective.of(equations).blocks:
+        for name in block.target_rows:
+            looks = (part.observed[part.names == name] for part in (block, equations))
+            np.testing.assert_array_equal(*looks)
+
+
 def test_large_surveys_are_cut_into_blocks_of_time():
     "250 targets are three blocks, one after the other in time, of all targets together"
     times = np.sort(np.random.default_rng(4).uniform(2.0, 198.0, 250))
