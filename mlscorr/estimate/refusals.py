@@ -9,7 +9,6 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import betaln
 
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import choose_parameters
@@ -17,6 +16,7 @@ from mlscorr.estimate.screening import Screening
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import all_tests, gross_evidence
+from mlscorr.matching import log_share
 from mlscorr.pos import SETTINGS as POS_SETTINGS
 
 
@@ -90,9 +90,9 @@ def drift_odds(
         odds += sum(drift) - max(misread, sum(mistaken))
         drifts += len(drift)
     if windows:  # with none the POS may as well never drift so
-        odds -= _log_share(windows, len(equations.names), 1.0)
-    odds += _log_share(drifts, len(equations.names), 1.0)
-    return odds - _log_share(len(names), len(equations.target_rows), 1 / SETTINGS.gross_share - 1)
+        odds -= log_share(windows, len(equations.names), 0.5)
+    odds += log_share(drifts, len(equations.names), 0.5)
+    return odds - log_share(len(names), len(equations.target_rows), SETTINGS.gross_share)
 
 
 def _positive(solved, rows_of):
@@ -108,8 +108,3 @@ def _beside(equations, number):
 
 def _rows(numbers):
     return (3 * np.array(numbers)[:, None] + np.arange(3)).ravel()
-
-
-def _log_share(count, total, others):
-    """Log probability of given ones of a number of things under a share of Beta(1, others)."""
-    return float(betaln(1 + count, others + total - count) - betaln(1, others))

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit, logit
+from scipy.special import betaln, expit, logit
 
 from mlscorr.matching.marginals import Marginals
 from mlscorr.matching.pairs import CandidatePairs
@@ -70,15 +70,42 @@ def decide(pairs: CandidatePairs, marginals: Marginals, count: int, share: np.nd
     odds = _odds(marginals, share)
     total = np.bincount(pairs.control[probable], odds[probable], count)
     wrong = expit(logit(SETTINGS.moved_share) + total)
-    certainty = sound / (sound + rest)
+    passes = np.bincount(pairs.control[probable], minlength=count)
+    is_wrong = wrong > 1.0 - SETTINGS.smallest_sound
+    drifts = _in_drift(is_wrong, passes)[pairs.control]
+    certainty = np.where(drifts, sound + moved, sound / (sound + rest))
     used = pairs.same & (certainty >= SETTINGS.smallest_probability)
-    used = np.flatnonzero(used & (wrong[pairs.control] <= 1.0 - SETTINGS.smallest_sound))
+    used = np.flatnonzero(used & (drifts | ~is_wrong[pairs.control]))
     n = len(pairs.first) - 1
     row = np.repeat(np.arange(n), np.diff(pairs.first))[used]
     column, probability = np.full(n, -1), np.zeros(n)
     column[row], probability[row] = pairs.control[used], certainty[used]
-    passes = np.bincount(pairs.control[probable], minlength=count)
     return Decision(column, probability, wrong, passes, marginals)
+
+
+def _in_drift(is_wrong, passes):
+    """Which control points (k,) seem wrong, but are too many for it: the estimate decides on them.
+
+    Where one pass tells it, a short drift of the POS looks alike. A single point tells of no habit.
+    """
+    lone = is_wrong & (passes == 1)
+    number, seen = np.sum(lone), np.sum(passes > 0)
+    wrong = log_share(number, seen, SETTINGS.moved_share)
+    return lone & (number > 1) & (log_share(number, seen, 0.5) > wrong)
+
+
+def log_share(number: int, total: int, share: float) -> float:
+    """Log probability that just some of a number of things are wrong, where few or many may be.
+
+    Parameters
+    ----------
+    number, total : int
+        Of those, and of all things.
+    share : float
+        Of all things that are expected to be wrong; nothing else is known of it, Beta(1, b).
+    """
+    others = 1.0 / share - 1.0
+    return float(betaln(1.0 + number, others + total - number) - betaln(1.0, others))
 
 
 def moved_share_by_others(

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mlscorr.matching import SETTINGS
-from mlscorr.matching.decision import decide, moved_share_by_others
+from mlscorr.matching.decision import decide, log_share, moved_share_by_others
 from mlscorr.matching.marginals import Marginals
 from mlscorr.matching.pairs import CandidatePairs
 
@@ -44,3 +44,29 @@ def test_other_passes_tell_that_a_point_is_in_its_place():
     share = moved_share_by_others(pairs, marginals, 1, np.full(2, SETTINGS.moved_share))
     assert share[1] <= 1e-3
     assert share[0] > 0.5
+
+
+def test_many_points_that_seem_wrong_are_left_to_the_estimate():
+    "Three of 12 that one pass each finds elsewhere may be short drift, two are likelier wrong"
+    for count, expected in ((2, -1), (3, 0)):
+        sound = np.where(np.arange(12) < count, 0.005, 0.9999)
+        moved = np.where(np.arange(12) < count, 0.994, 0.0)
+        decision = decided(sound, moved, np.arange(12), count=12)
+        assert decision.column[0] == expected and decision.column[11] == 11
+        assert decision.wrong[0] > 0.9
+
+
+def test_what_two_passes_find_elsewhere_is_no_drift():
+    "Three of 12 points that are off in both of two passes were moved, however many they are"
+    control = np.repeat(np.arange(12), 2)
+    sound, moved = np.where(control < 3, 0.005, 0.9999), np.where(control < 3, 0.994, 0.0)
+    decision = decided(sound, moved, control, count=12)
+    assert decision.column[:6].tolist() == [-1] * 6 and decision.column[6] == 3
+
+
+def test_shares_that_are_not_known():
+    "Of two things any number is as probable under a mean of 1/2: one given of them has a half of it"
+    assert [log_share(number, 2, 0.5) for number in range(3)] == pytest.approx(
+        np.log([1 / 3, 1 / 6, 1 / 3])
+    )
+    assert log_share(1, 1, 0.05) == pytest.approx(np.log(0.05))
