@@ -251,7 +251,7 @@ def _estimate(trajectory, names, predictions, screening, notes):
     kept = predictions.equations
     posterior, used = screening.posterior, np.isin(np.asarray(names, dtype=object), kept.names)
     parameters = posterior.modes[0][0]
-    solved = kept.solve(parameters)
+    solved = predictions.take(parameters)
     left_out = np.full((len(names), 3), np.nan)
     left_out[used] = leave_targets_out(kept, solved) if len(kept.target_rows) > 1 else np.nan
     pose_error = predict_pose_error(kept, posterior, predictions, solved)

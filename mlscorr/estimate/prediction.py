@@ -24,13 +24,16 @@ class GridPredictions:
     Parameters
     ----------
     equations : Equations
-    by_parameters : dict
+    poses : dict
+    mode : SignalParameters, optional
+        Whose Collocation is kept once it is added, until it is taken.
+    kept : dict
     """
 
     equations: Equations
-    by_parameters: dict[SignalParameters, tuple[np.ndarray, np.ndarray]] = field(
-        default_factory=dict
-    )
+    poses: dict[SignalParameters, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    mode: SignalParameters | None = None
+    kept: dict[SignalParameters, Collocation] = field(default_factory=dict)
 
     @cached_property
     def rows(self) -> np.ndarray:
@@ -58,7 +61,18 @@ class GridPredictions:
         solved : Collocation
         """
         pose, spread = solved.predict(*pose_rows(self.equations, parameters, self.rows))
-        self.by_parameters[parameters] = pose, np.einsum("qii->qi", spread)
+        self.poses[parameters] = pose, np.einsum("qii->qi", spread)
+        if parameters == self.mode:
+            self.kept[parameters] = solved
+
+    def take(self, parameters: SignalParameters) -> Collocation:
+        """The Collocation under parameters; nobody keeps it any longer.
+
+        Parameters
+        ----------
+        parameters : SignalParameters
+        """
+        return self.kept.pop(parameters, None) or self.equations.solve(parameters)
 
     def under(self, parameters: SignalParameters) -> tuple[np.ndarray, np.ndarray]:
         """The POS errors and variances under parameters.
@@ -67,9 +81,9 @@ class GridPredictions:
         ----------
         parameters : SignalParameters
         """
-        if parameters not in self.by_parameters:
+        if parameters not in self.poses:
             self.add(parameters, self.equations.solve(parameters))
-        return self.by_parameters[parameters]
+        return self.poses[parameters]
 
 
 def predict_pose_error(

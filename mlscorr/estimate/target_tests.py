@@ -96,14 +96,14 @@ def _tests(equations, names, posterior, targets, visit=None):
     # targets of several passes first: sparse rows part with the factor that these need for the
     # inverse, which those of one pass need, and the visitor
     largest_first = sorted(names, key=lambda name: -len(equations.target_rows[name]))
-    for chosen, weight in posterior.mixture:
+    for chosen, weight in reversed(posterior.mixture):  # a visitor may keep the most probable
         solved = equations.solve(chosen)
         for name in largest_first:
             left_out[name].append((weight, *solved.leave_out(equations.target_rows[name])))
         if visit is not None:
             visit(chosen, solved)
         del solved  # before the next one takes as much
-    return [_test(equations, name, parts, targets) for name, parts in left_out.items()]
+    return [_test(equations, name, parts[::-1], targets) for name, parts in left_out.items()]
 
 
 def _test(equations, name, left_out, targets):

@@ -155,7 +155,7 @@ def screen_with_ties(
         tied = add_ties(kept, parameters, ties)
         if tied.used.mean() < SETTINGS.tie_majority:
             return untied
-        predictions = GridPredictions(tied.equations)
+        predictions = GridPredictions(tied.equations, mode=tied.posterior.modes[0][0])
         tests = all_tests(tied.equations, tied.posterior, predictions.add)
         doubtful = sorted((t for t in tests if t.excess > 1.0), key=lambda t: -t.excess)
         if not doubtful or not may_go(equations, {t.name for t in (*rejected, doubtful[0])}):

@@ -145,7 +145,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
 
     Pairs are looked for as far apart as the sigmas of the estimate allow; with each correction that
     they make, within the geometric mean of that and of the scatter of what is left of them, half as
-    far at most, down to that scatter.
+    far at most, down to that scatter: at once, where a round left no less of them than that before.
 
     Parameters
     ----------
@@ -181,8 +181,9 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
             return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
         half = thinned_ties(ties, SETTINGS.ties // 2)  # shows as well how near partners are
         moved = _moved(previewed_correction(estimate, half, mountings), features)
-        limit = narrowest_gate(ties, moved)
-        radius = max(min(radius / 2, np.sqrt(radius * limit)), limit)
+        before, limit = limit, narrowest_gate(ties, moved)
+        is_settled = 0.0 < before < 1.1 * limit
+        radius = limit if is_settled else max(min(radius / 2, np.sqrt(radius * limit)), limit)
 
 
 def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) -> np.ndarray:

@@ -136,13 +136,24 @@ def test_solutions_that_others_made_predict_the_same(equations, posterior):
     "What the tests of targets solved serves the prediction to the last bit, and isn't solved again"
     known = GridPredictions(equations)
     all_tests(equations, posterior, known.add)
-    assert set(known.by_parameters) == {parameters for parameters, _ in posterior.mixture}
+    assert set(known.poses) == {parameters for parameters, _ in posterior.mixture}
     for here, there in zip(
         predict_pose_error(equations, posterior, known),
         predict_pose_error(equations, posterior),
         strict=True,
     ):
         np.testing.assert_array_equal(here, there)
+
+
+def test_the_most_probable_solution_is_handed_on_once(equations, posterior):
+    "What a test of targets solved last is taken as it is; asked again, it is solved anew, alike"
+    mode = posterior.mixture[0][0]
+    known = GridPredictions(equations, mode=mode)
+    all_tests(equations, posterior, known.add)
+    (held,) = known.kept.values()
+    assert known.take(mode) is held
+    assert known.take(mode) is not held
+    np.testing.assert_array_equal(known.take(mode).weights, held.weights)
 
 
 def test_covariances_are_covariances(equations, posterior):

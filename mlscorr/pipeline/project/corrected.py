@@ -131,17 +131,18 @@ def _ties(part, number, area):
     if residuals is None:
         return shared
     owner = part.joint.drive_numbers(residuals.ties.pass_number)
-    counted = residuals.used
+    counted = residuals.used & (owner == number).any(axis=1)
     if area is not None:
-        counted = counted & area.contains(residuals.ties.place[:, 0])
-    for other, drive in enumerate(part.joint.drives):
-        rows = counted & (np.sort(owner) == sorted((number, other))).all(axis=1)
-        if other != number and rows.any():
-            shared[drive.survey.name] = {
-                "n": int(rows.sum()),
-                "before": misfit(residuals.ties.misclosure[rows])["rms"],
-                "after": misfit(residuals.after[rows])["rms"],
-            }
+        counted &= area.contains(residuals.ties.place[:, 0])
+    own = np.flatnonzero(counted)
+    others = owner[own].sum(axis=1) - number
+    for other in np.unique(others[others != number]).tolist():
+        rows = own[others == other]
+        shared[part.joint.drives[other].survey.name] = {
+            "n": len(rows),
+            "before": misfit(residuals.ties.misclosure[rows])["rms"],
+            "after": misfit(residuals.after[rows])["rms"],
+        }
     return shared
 
 

@@ -259,20 +259,12 @@ class _Work:
 
     def _reports(self, planned, keys, clouds):
         """What each drive's report wrote, by the drive's name."""
-        tasks = [
-            stages.report_task(
-                ReportInput(
-                    self.run.store.folder,
-                    keys[d.survey.name],
-                    clouds[d.survey.name],
-                    self.out / d.survey.name,
-                    self.options.page,
-                    self.options.trajectories,
-                ),
-                d,
-            )
-            for d in planned
-        ]
+        store, page, exports = self.run.store.folder, self.options.page, self.options.trajectories
+        tasks = []
+        for drive in planned:
+            name = drive.survey.name
+            inputs = ReportInput(store, keys[name], clouds[name], self.out / name, page, exports)
+            tasks.append(stages.report_task(inputs, drive))
         self.progress.begin("reports", tasks)
         return self.run.results(tasks)
 
