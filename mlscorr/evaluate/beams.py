@@ -39,7 +39,7 @@ class BeamCheck:
             for chunk in read(file):
                 step = step or max(1, len(chunk) // IO.sampled_points)  # of the last, short one too
                 some = chunk[::step]
-                times.append(some.gps_time)
+                times.append(some.gps_time.copy())  # a view would hold the times of all points
                 some = some[self.survey.trajectory.segment(some.gps_time) >= 0]
                 rows.append(self._sample(some, self.survey.of(file).mounting))
                 yield chunk

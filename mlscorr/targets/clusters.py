@@ -89,12 +89,13 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
     """
     if len(points) == 0:
         return np.empty(0, int)
-    cells = points / (link / 3)
-    cells = np.floor(cells, out=cells).astype(np.int64)
-    cells -= cells.min(axis=0)
-    shape = cells.max(axis=0) + 3  # with room for two voxels: no edge is near another
-    keys = np.ravel_multi_index(tuple(cells.T), shape)
-    del cells  # large where a street is dense
+    keys, shape = np.zeros(len(points), np.int64), []
+    for column in points.T:  # one by one, as they are large where a street is dense
+        cells = np.floor(column / (link / 3)).astype(np.int64)
+        cells -= cells.min()
+        shape.append(int(cells.max()) + 3)  # with room for two voxels: no edge is near another
+        keys = keys * shape[-1] + cells
+    del cells
     order = np.argsort(keys, kind="stable")
     label = np.empty(len(keys), np.int64)
     steps = _offsets(len(shape)) @ np.cumprod([1, *shape[:0:-1]])[::-1]

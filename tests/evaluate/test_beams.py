@@ -45,6 +45,14 @@ def test_a_good_cloud_hears_nothing(survey):
     assert said(survey) == said(replace(survey, mounting=None)) == []
 
 
+def test_samples_hold_no_chunk(survey):
+    "A view of a chunk's times would hold them all: 8 B for each point of a file of any size"
+    check = BeamCheck(survey)
+    for _ in check.watched(read_chunks)(survey.clouds[0]):
+        pass
+    assert all(times.base is None for times in check.times[survey.clouds[0]])
+
+
 def test_times_that_run_backwards_are_named(survey):
     "No sampled point is later than the one before, and the scan plane is missed"
     sentences = said(survey, backwards)

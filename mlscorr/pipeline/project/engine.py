@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from mlscorr.io.preparation import temporary_folder
 
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
-LARGE_ARRAY = 1 << 22  # B; glibc keeps freed ones of up to 32 MB: 0.15 GB after some tasks
+LARGE_ARRAY = 1 << 20  # B; glibc keeps freed ones of up to 32 MB: 0.15 GB after some tasks
 
 
 class Loop:
