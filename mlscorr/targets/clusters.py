@@ -94,12 +94,14 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
         cells = np.floor(column / (link / 3)).astype(np.int64)
         cells -= cells.min()
         shape.append(int(cells.max()) + 3)  # with room for two voxels: no edge is near another
-        keys = keys * shape[-1] + cells
+        keys *= shape[-1]
+        keys += cells
     del cells
     order = np.argsort(keys, kind="stable")
-    label = np.empty(len(keys), np.int64)
+    label = np.empty(len(keys), np.int32)
     steps = _offsets(len(shape)) @ np.cumprod([1, *shape[:0:-1]])[::-1]
-    label[order] = _labels(keys[order], steps[steps > 0])
+    keys = keys[order]
+    label[order] = _labels(keys, steps[steps > 0])
     return label
 
 
@@ -114,7 +116,7 @@ def _offsets(dimensions):
 @njit(cache=True)
 def _labels(keys, steps):
     """Component number (n,) of keys in increasing order, which these steps connect."""
-    voxel, occupied, count = np.empty(len(keys), np.int64), np.empty_like(keys), 0
+    voxel, occupied, count = np.empty(len(keys), np.int32), np.empty_like(keys), 0
     for i in range(len(keys)):
         if count == 0 or keys[i] != occupied[count - 1]:
             occupied[count] = keys[i]
@@ -132,7 +134,7 @@ def _labels(keys, steps):
             if occupied[above] == key:
                 a, b = root_of(parent, low), root_of(parent, above)
                 parent[max(a, b)] = min(a, b)
-    number, components = np.empty(count, np.int64), 0
+    number, components = np.empty(count, np.int32), 0
     for i in range(count):  # the root of each is the lowest of its voxels
         is_root = parent[i] == i
         number[i] = components if is_root else number[root_of(parent, i)]
