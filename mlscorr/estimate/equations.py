@@ -153,10 +153,6 @@ class Equations(Summary):
         """
         return self.select(~np.isin(self.names, list(names))) if names else self
 
-    def with_order(self, order: int) -> Equations:
-        """The same misclosures with a polynomial trend of another order."""
-        return replace(self, order=order)
-
     @property
     def span(self) -> tuple[float, float]:
         """First and last control epoch; those of the trajectory without any. Units: s."""

@@ -1,7 +1,7 @@
 """Orders of the trend side by side: restricted likelihood, probability, leave-one-out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def compare_orders(
     start = [chosen for chosen, _ in families]
     rows = []
     for tried in orders:
-        with_order = equations.with_order(tried)
+        with_order = replace(equations, order=tried)
         objective = Objective.of(with_order)
         modes = families if tried == order else most_probable(with_order, start)
         for chosen, _ in modes:

@@ -271,7 +271,7 @@ def _screened(trajectory, matched, pos, order):
         windows += more
         raised = with_windows(trajectory, windows) if windows else trajectory
         equations = position_equations(raised, matched, pos, order, position_prior)
-        equations = equations.with_order(affordable_order(order, equations))
+        equations = replace(equations, order=affordable_order(order, equations))
         equations = with_drift_history(equations)
         plain = equations if plain is None else plain
         screening = screen(equations)

@@ -1,5 +1,6 @@
 """What ties bring to an estimate beside control points."""
 
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,16 +60,13 @@ def _sufficient(equations, parameters, solved):
     if len(names) < 2:
         return len(names) or None
     limit = SETTINGS.sufficient_ratio * _median_sigma(equations, parameters, solved)
-    low, high = 1, len(names)
-    while low < high:
-        number = (low + high) // 2
+
+    def suffices(number):
         chosen = {names[i] for i in np.linspace(0, len(names) - 1, number).round().astype(int)}
         part = equations.without([name for name in names if name not in chosen])
-        if _median_sigma(part, parameters, part.solve(parameters)) <= limit:
-            high = number
-        else:
-            low = number + 1
-    return low
+        return _median_sigma(part, parameters, part.solve(parameters)) <= limit
+
+    return 1 + bisect_left(range(1, len(names)), True, key=suffices)
 
 
 def _median_sigma(equations, parameters, solved):

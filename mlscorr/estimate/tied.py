@@ -124,7 +124,9 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
     tied, parameters = weighed.equations, weighed.parameters
     tied = tied.with_starts(with_likely_starts(sample(tied))[0].stated.starts)
     rows = tied.ties
-    parameters = _most_probable(tied, parameters)
+    objective = Objective.of(sample(tied))
+    at, _ = objective.maximum(parameters.family, objective.logarithms(parameters))
+    parameters = objective.parameters(parameters.family, at)  # the weights of the ties stay
     weighed = solved_ties(tied, parameters).graded((student,))
     tied, ratio = weighed.equations, np.abs(weighed.ratio)
     factor = float(np.clip(np.median(ratio) / MEDIAN, 1.0, SETTINGS.tie_cut))
@@ -187,13 +189,6 @@ def _contradiction(test, what):
         f"points: it is {off} m (E/N/H) off that, statistic {test.statistic:.1f} against "
         f"{test.critical:.1f}. {what}: survey it again, or see by --no-ties whether ties are wrong."
     )
-
-
-def _most_probable(tied, parameters):
-    """The most probable parameters of their family near some; the weights of the ties stay."""
-    objective = Objective.of(sample(tied))
-    at, _ = objective.maximum(parameters.family, objective.logarithms(parameters))
-    return objective.parameters(parameters.family, at)
 
 
 def sample(tied: Equations) -> Equations:

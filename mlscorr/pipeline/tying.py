@@ -21,7 +21,7 @@ from mlscorr.estimate import (
 from mlscorr.estimate.inputs import check_order
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
-from mlscorr.survey import Matched, Survey, TieFeatures, Ties
+from mlscorr.survey import Matched, Survey, TieFeatures, Ties, time_spans
 from mlscorr.survey.summary import counted
 from mlscorr.ties import (
     NORMAL_SCATTER,
@@ -33,7 +33,6 @@ from mlscorr.ties import (
     pair_features,
     residuals,
     thinned_ties,
-    time_spans,
     unheld_directions,
     unheld_sentence,
 )
@@ -274,13 +273,11 @@ def _unheld(estimate, features, ties):
     control = estimate.equations.observed
     first, last = time_spans(features.pass_number, features.gps_time)
 
-    def controlled(number):
-        return ((control >= first[number]) & (control <= last[number])).any()
-
     for part, axis in unheld_directions(ties):
         if np.median(np.diff(part.gps_time)) < SETTINGS.pause:  # of one pass: the POS holds it
             continue
-        if not all(map(controlled, part.pass_number[0])):
+        spans = zip(first[part.pass_number[0]], last[part.pass_number[0]], strict=True)
+        if not all(((control >= begin) & (control <= end)).any() for begin, end in spans):
             yield unheld_sentence(part, axis)
 
 

@@ -14,5 +14,5 @@ from mlscorr.survey.recording import (
     check_survey,
 )
 from mlscorr.survey.targets import KINDS, ControlPoints, Matched, TargetObservations
-from mlscorr.survey.ties import PAINTED, TIE_KINDS, TieFeatures, Ties
+from mlscorr.survey.ties import PAINTED, TIE_KINDS, TieFeatures, Ties, time_spans
 from mlscorr.survey.trajectory import GAP_FACTOR, SAME_EPOCH, Mounting, Trajectory, control_epochs

@@ -71,12 +71,9 @@ class TieFeatures(Columns):
         array of the rows' shape
             Not before the first or after the last feature of the pass.
         """
-        numbers, inverse = np.unique(self.pass_number, return_inverse=True)
-        low, high = np.full(len(numbers), np.inf), np.full(len(numbers), -np.inf)
-        np.minimum.at(low, inverse, self.gps_time)
-        np.maximum.at(high, inverse, self.gps_time)
+        low, high = (span[self.pass_number] for span in time_spans(self.pass_number, self.gps_time))
         times = self.gps_time[rows] + np.einsum("...i,...i->...", self.sweep[rows], way)
-        return np.clip(times, low[inverse][rows], high[inverse][rows])
+        return np.clip(times, low[rows], high[rows])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -174,3 +171,19 @@ def _midway(features, pairs, place):
     way, axis = place.mean(axis=1, keepdims=True) - place, features.direction[pairs]
     along = np.einsum("nvi,nvi->nv", axis, way)[:, :, None] * axis
     return np.where((features.kind[pairs[:, :1]] == "pole")[:, :, None], along, way - along)
+
+
+def time_spans(number: np.ndarray, gps_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First and last time (k,) of each number. Units: s.
+
+    Parameters
+    ----------
+    number : (n,) int array
+        From 0.
+    gps_time : (n,) array
+        Units: s.
+    """
+    first, last = np.multiply.outer([np.inf, -np.inf], np.ones(number.max(initial=-1) + 1))
+    np.minimum.at(first, number, gps_time)
+    np.maximum.at(last, number, gps_time)
+    return first, last

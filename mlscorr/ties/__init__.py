@@ -16,4 +16,4 @@ from mlscorr.ties.collector import TieCollector, join_features
 from mlscorr.ties.pairing import pair_features
 from mlscorr.ties.search import TieSearch, agreeing_ties, feature_sigma, least_pause, search_ties
 from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import thinned_ties, time_spans
+from mlscorr.ties.thinning import thinned_ties

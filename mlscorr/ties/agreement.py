@@ -59,18 +59,11 @@ def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
     votes[rows == np.arange(len(ties))[:, None]] = np.nan  # its own
     judged = np.isfinite(votes).sum(axis=1) >= 5
     agree = np.ones(len(ties), bool)
-    middle = _median(votes[judged])
-    scatter = NORMAL_SCATTER * _median(np.abs(votes[judged] - middle[:, None]))
+    middle = np.nanmedian(votes[judged], axis=1)
+    scatter = NORMAL_SCATTER * np.nanmedian(np.abs(votes[judged] - middle[:, None]), axis=1)
     limit = SETTINGS.gate_sigmas * np.sqrt(scatter**2 + variance[judged])
     agree[order[judged]] = np.abs(left[judged] - middle) <= limit
     return agree
-
-
-def _median(values):
-    """Medians (n,) of the finite values (n, k) of each row."""
-    values, count = np.sort(values, axis=1), np.isfinite(values).sum(axis=1)
-    middle = np.column_stack([(count - 1) // 2, count // 2])
-    return np.take_along_axis(values, middle, axis=1).sum(axis=1) / 2
 
 
 def information(ties: Ties, group: np.ndarray) -> np.ndarray:

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.pos import stated_sigma
-from mlscorr.survey import Survey, TieFeatures, Ties
+from mlscorr.survey import Survey, TieFeatures, Ties, time_spans
 from mlscorr.ties.agreement import NORMAL_SCATTER, consistent_ties, residuals, weigh_by_time
 from mlscorr.ties.candidates import visit_number
 from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.pairing import pair_features
 from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import thinned_ties, time_spans
+from mlscorr.ties.thinning import thinned_ties
 
 
 @dataclass(frozen=True)

@@ -127,22 +127,6 @@ def _least(group, order, number):
     return np.sort(rows[rank < number])
 
 
-def time_spans(number: np.ndarray, gps_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First and last time (k,) of each number. Units: s.
-
-    Parameters
-    ----------
-    number : (n,) int array
-        From 0.
-    gps_time : (n,) array
-        Units: s.
-    """
-    first, last = np.multiply.outer([np.inf, -np.inf], np.ones(number.max(initial=-1) + 1))
-    np.minimum.at(first, number, gps_time)
-    np.maximum.at(last, number, gps_time)
-    return first, last
-
-
 def integer_hash(numbers: np.ndarray) -> np.ndarray:
     """A 64-bit number (n,) of integers (n, k): random, but the same for the same ones.
 

@@ -95,7 +95,7 @@ def test_probabilities_follow_likelihood_and_prior(equations, alternatives):
     "Their ratios are those of the posterior, and sum to one"
     values = []
     for row in alternatives:
-        objective = Objective.of(equations.with_order(row.order))
+        objective = Objective.of(replace(equations, order=row.order))
         values.append(objective(row.parameters.family, objective.logarithms(row.parameters)))
     share = np.exp(np.array(values) - max(values))
     np.testing.assert_allclose([row.probability for row in alternatives], share / share.sum())

@@ -109,4 +109,4 @@ def test_a_trend_is_believed_to_be_of_a_decimetre_or_of_none():
     "Its coefficients' sigma starts at 0.1 m; without any coefficient it is no parameter"
     equations = equations_of(GROWING)
     assert start(position_prior(equations), "trend_sigma") == pytest.approx(0.1)  # m
-    assert spread(position_prior(equations.with_order(NO_TREND)), "trend_sigma") is None
+    assert spread(position_prior(replace(equations, order=NO_TREND)), "trend_sigma") is None
