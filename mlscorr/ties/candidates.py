@@ -30,7 +30,9 @@ def candidate_pairs(
         Largest between directions: twice a boresight error and more, at first. Units: rad.
     """
     place = features.centre + correction
-    limit = np.hypot(min(radius, 2 * SETTINGS.gate_sigmas * sigma.max(initial=0.0)), SETTINGS.cell)
+    sigmas, noise = SETTINGS.gate_sigmas, features.variance.max(initial=0.0)
+    limit = np.hypot(min(radius, 2 * sigmas * sigma.max(initial=0.0)), SETTINGS.cell)
+    limit = np.hypot(limit, sigmas * np.sqrt(2 * (noise + SETTINGS.surface_sigma**2)))
     edge = np.sqrt(2) * limit
     cell = np.floor(place[:, :2] / edge) @ [1 << CELL_BITS, 1]
     order = np.argsort(cell, kind="stable")
@@ -41,7 +43,7 @@ def candidate_pairs(
     displaced = np.zeros_like(place) if shift is None else shift[order]
     views = (
         points, displaced, features.direction, kind_number(features), features.gps_time,
-        features.scanner, features.extent, features.variance, sigma**2 + features.variance,
+        features.scanner, features.extent, features.variance, sigma**2,
     )  # fmt: skip
     limits = (
         float(radius), np.cos(angle), pause, SETTINGS.cell, SETTINGS.gate_sigmas,
@@ -151,8 +153,9 @@ def _distance(views, first, second, limits):
     along = abs(along)
     across = np.sqrt(max(square - along**2, 0.0))
     misfit, beside = (across, along) if kind == POLE else (along, across)
-    variance = variances[first] + variances[second] + surface_variance
-    gate = min(radius, sigmas * np.sqrt(variance))
+    gate = min(radius, sigmas * np.sqrt(variances[first] + variances[second]))
+    # however well places are known, what poles leave open doesn't shrink
+    gate = np.hypot(gate, sigmas * np.sqrt(noise[first] + noise[second] + surface_variance))
     # a dash as long as the other, to twice the sigma of its middle: else one was hidden in part
     longer = np.sqrt(12.0) * abs(extent[first] - extent[second])
     sigma = 2.0 * np.sqrt(noise[first] + noise[second])

@@ -33,7 +33,8 @@ def pair_features(
         One sigma of the correction, along any direction. Units: m.
     radius : float
         Two features are no pair where they are farther apart than this, or than three sigmas of
-        the difference, along a plane's normal or across a pole. Units: m.
+        the correction's difference, and their own noise explains, along a plane's normal or across
+        a pole. Units: m.
     turned : (n, 3) array, optional
         The features' directions as the correction turns them; as recorded by default.
     pause : float
@@ -60,7 +61,7 @@ def pair_features(
     # each direction is taken to the middle between both centres
     variance = features.variance[pairs].sum(axis=1) + lever * features.tilt[pairs].sum(axis=1) / 4
     variance += 2 * SETTINGS.surface_sigma**2
-    sides = _across(direction[is_pole])
+    sides = _across(direction[is_pole], _wall_normals(features, pairs, is_pole))
     return Ties.between(
         features,
         np.concatenate([pairs[~is_pole], *[pairs[is_pole]] * 2]),
@@ -162,9 +163,22 @@ def _count(values, others):
     return others.searchsorted(values, "right") - others.searchsorted(values, "left")
 
 
-def _across(axis):
-    """Two unit vectors (n, 3) across axes and each other, the first of them horizontal."""
-    side = np.cross(axis, [0.0, 1.0, 0.0])
+def _wall_normals(features, pairs, is_pole):
+    """Normals (n, 3) of the walls that were seen next to the poles of pairs; north without any.
+
+    Along a wall and across it poles tell things apart: what walls hold better is weighed down.
+    """
+    first = features[pairs[:, 0]]
+    walls = first[(first.kind == "plane") & (np.abs(first.direction[:, 2]) < 0.5)]
+    if len(walls) == 0:
+        return np.array([0.0, 1.0, 0.0])
+    nearest = cKDTree(walls.gps_time[:, None]).query(first.gps_time[is_pole, None])[1]
+    return walls.direction[nearest]
+
+
+def _across(axis, normal=(0.0, 1.0, 0.0)):
+    """Two unit vectors (n, 3) across axes and each other, the first of them along walls."""
+    side = np.cross(axis, normal)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     return side, np.cross(axis, side)
 

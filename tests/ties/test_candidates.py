@@ -43,10 +43,11 @@ def all_pairs(features, place, sigma, radius, shift):
     across = np.linalg.norm(apart - np.einsum("ni,ni->n", apart, axis)[:, None] * axis, axis=1)
     misfit, beside = np.where(kind[first] == "pole", [across, along], [along, across])
     noise = features.variance[first] + features.variance[second]
-    variance = noise + sigma[first] ** 2 + sigma[second] ** 2 + 2 * SETTINGS.surface_sigma**2
+    gate = np.minimum(radius, 3 * np.hypot(sigma[first], sigma[second]))
+    gate = np.hypot(gate, 3 * np.sqrt(noise + 2 * SETTINGS.surface_sigma**2))
     longer = np.abs(features.extent[first] - features.extent[second]) * np.sqrt(12)
     good = (kind[first] == kind[second]) & (cosine * sign >= np.cos(SETTINGS.parallel))
-    good &= (misfit <= np.minimum(radius, 3 * np.sqrt(variance))) & (beside <= SETTINGS.cell)
+    good &= (misfit <= gate) & (beside <= SETTINGS.cell)
     good &= (kind[first] != "dash") | (longer <= 6 * np.sqrt(noise))
     good &= (np.abs(features.gps_time[first] - features.gps_time[second]) > SETTINGS.pause) | (
         features.scanner[first] != features.scanner[second]

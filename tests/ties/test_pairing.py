@@ -212,6 +212,31 @@ def test_a_pole_ties_both_directions_across_it():
     assert np.allclose(shift, [0.1, 0.05], atol=1e-9)
 
 
+@pytest.mark.parametrize(("kind", "count"), [("pole", 2), ("plane", 0)])
+def test_a_gate_is_no_narrower_than_the_noise(kind, count):
+    "Where places are known to 3 mm, poles of 2 cm are a pair 5 cm apart, walls of 1 mm are none"
+    features = walls([[10, 5, 1], [10.05, 5, 1]], [1, 2], [0.0, 0.0, 1.0])
+    features = replace(features, kind=np.full(2, kind))
+    if kind == "pole":
+        features = replace(features, variance=np.full(2, 0.02**2))
+    else:
+        features = replace(features, direction=np.tile([1.0, 0.0, 0.0], (2, 1)))
+    assert len(pair(features, 0.003, radius=0.015)) == count
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 20.0, 45.0])  # deg
+def test_poles_hold_along_walls_and_across_them(azimuth):
+    "In a street turned by an azimuth, a pole's rows are across the walls and along them alone"
+    across = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0.0])
+    place = [[10, 5, 1], [10, 5, 1], [14, 5, 1], [14, 5, 1]]
+    features = walls(place, [1, 2, 1, 2], across)
+    direction = np.where(np.arange(4)[:, None] < 2, [0.0, 0.0, 1.0], across)
+    kind = np.repeat(["pole", "plane"], 2)
+    ties = pair(replace(features, kind=kind, direction=direction), 0.02)
+    held = np.abs(ties.direction[ties.kind == "pole"] @ across)
+    assert np.sort(held) == pytest.approx([0.0, 1.0], abs=1e-9)
+
+
 @pytest.mark.parametrize("azimuth", [0.0, 45.0, 70.0, 135.0])
 def test_paint_is_paired_whichever_way_it_was_crossed(azimuth):
     "Passes 15 cm apart across, 20 along: lines tell the one, dashes the other, to their sigmas"
