@@ -1,4 +1,4 @@
-"""Planes that lie in the face between two cells."""
+"""Planes that lie in the face between two cells, and poles that the face cuts."""
 
 import numpy as np
 
@@ -9,10 +9,11 @@ ROWS, COLUMNS = np.triu_indices(3)  # of the products: xx, xy, xz, yy, yz, zz
 
 def join_across_faces(
     middle: np.ndarray, begin: np.ndarray, group: np.ndarray, moments: np.ndarray
-) -> np.ndarray:
-    """Moments (n, 21) of cells; those of two that share a plane in their face stand in one.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Moments of cells, of which those of two that share a plane or pole in their face are joined.
 
-    Each would hold half of the plane's noise, whose mean lies 0.8 sigmas off the plane.
+    Each would hold half of the plane's noise, whose mean lies 0.8 sigmas off the plane, or a part
+    of the pole, whose middle is not the whole's.
 
     Parameters
     ----------
@@ -23,29 +24,39 @@ def join_across_faces(
     group : (n,) int array
     moments : (n, 21) array
         See mlscorr.ties.cells.
+
+    Returns
+    -------
+    joined : (n, 21) array
+    way : (n, 3) array
+        To the cells beyond, whose points stand in each one too, if there are any. Units: cells.
     """
     points = moments[:, 0]
     mean = moments[:, 2:5] / points[:, None]
     spread = moments[:, [5, 8, 10]] / points[:, None] - mean**2
     spread = np.sqrt(np.maximum(spread, SETTINGS.rounding**2))
+    # a pole's points are spread by its radius over sqrt(3), which along both axes no wall's are; of
+    # a square one a cell may hold a side alone, beyond which it is as wide
+    is_pole = (spread[:, :2] <= SETTINGS.thickest / np.sqrt(3)).all(axis=1, keepdims=True)
+    spread[:, :2] = np.where(is_pole, spread[:, :2].max(axis=1, keepdims=True), spread[:, :2])
+    is_thin = (spread <= SETTINGS.roughest) | (is_pole & [True, True, False])
     # 99 % of a plane's noise lies within 2.5 sigmas
-    is_cut = (spread <= SETTINGS.roughest) & (points >= SETTINGS.points)[:, None]
+    is_cut = is_thin & (points >= SETTINGS.points)[:, None]
     is_cut &= SETTINGS.cell / 2 - np.abs(mean) < 2.5 * spread
-    joined = moments.copy()
+    rank = np.argsort(np.argsort(points, kind="stable"))
+    joined, ways = moments.copy(), np.zeros_like(mean)
     for axis in np.flatnonzero(is_cut.any(axis=0)):
         rows = np.flatnonzero(is_cut[:, axis])
         way = np.sign(mean[rows, axis, None]) * np.eye(3)[axis]
+        ways[rows] += way
         beyond = _cells_at(middle, begin, group, rows, way)
         rows, beyond, way = (part[beyond >= 0] for part in (rows, beyond, way))
         is_half = is_cut[beyond, axis] & (mean[beyond, axis] * way[:, axis] < 0)
-        is_less = (points[rows] < points[beyond]) | (points[rows] == points[beyond]) & (
-            rows > beyond
-        )
-        kept = ~(is_half & is_less)  # it takes part there
+        kept = ~(is_half & (rank[rows] < rank[beyond]))  # the smaller half takes part there
         rows, beyond, way, is_half = (part[kept] for part in (rows, beyond, way, is_half))
         joined[rows] += _moved(joined[beyond], SETTINGS.cell * way)
         joined[beyond[is_half]] = 0.0
-    return joined
+    return joined, ways
 
 
 def _cells_at(middle, begin, group, rows, way):

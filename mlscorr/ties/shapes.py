@@ -12,8 +12,9 @@ from mlscorr.ties.settings import SETTINGS
 
 # Visible is the half of a pole that faces the scanner, its points evenly spread across the beam:
 # their mean lies pi / 4 of the radius before the axis, their variance across is radius^2 / 3, and
-# that along the beam (2/3 - pi^2 / 16) radius^2.
-DEPTH, ACROSS, ALONG = np.pi / 4, 1 / 3, 2 / 3 - np.pi**2 / 16
+# that along the beam (2/3 - pi^2 / 16) radius^2. Of a square one that shows two sides they lie
+# 1 / (1 + sin 2 a) of half its width before it, turned by a: 2 / pi on average.
+DEPTH, SQUARE_DEPTH, ACROSS, ALONG = np.pi / 4, 2 / np.pi, 1 / 3, 2 / 3 - np.pi**2 / 16
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,16 +85,16 @@ def find_shapes(
     moments : (n, 21) array
         See mlscorr.ties.cells.
     """
-    moments = join_across_faces(middle, begin, group, moments)
-    rows = np.flatnonzero(moments[:, 0] >= SETTINGS.points)
-    middle, begin, group, moments = middle[rows], begin[rows], group[rows], moments[rows]
-    covariance, noise = covariances(moments)
+    moments, way = join_across_faces(middle, begin, group, moments)
+    full = np.flatnonzero(moments[:, 0] >= SETTINGS.points)
+    covariance, noise = covariances(moments[full])
     # lambda_0 is not below det / (sum of the principal minors): spares what is no plane its axes
     minors = (np.trace(covariance, axis1=1, axis2=2) ** 2 - (covariance**2).sum(axis=(1, 2))) / 2
     is_thin = np.linalg.det(covariance) <= SETTINGS.roughest**2 * minors
     is_thin |= covariance[:, 0, 0] + covariance[:, 1, 1] <= SETTINGS.thickest**2
     rows = np.flatnonzero(is_thin)
-    middle, begin, group, moments = middle[rows], begin[rows], group[rows], moments[rows]
+    cells = middle, begin, group, moments, way
+    middle, begin, group, moments, way = (column[full[rows]] for column in cells)
     values, axes = np.linalg.eigh(covariance[rows])
     values = np.maximum(values, SETTINGS.rounding**2)  # points of a file may be the same
     count = moments[:, 0]
@@ -103,7 +104,7 @@ def find_shapes(
     believed = survey.scanner.range_noise**2 * np.eye(3)
     between = np.where(np.isnan(noise[rows]), believed, noise[rows])
     planes = _planes(moments, values, axes, between, sight)
-    poles = _poles(moments, values, axes, between, sight)
+    poles = _poles(moments, values, axes, between, sight, way)
     poles = poles[_stacked(middle[poles.rows], begin[poles.rows], group[poles.rows])]
     rows = np.concatenate([planes.rows, poles.rows])
     shapes = Shapes.concatenate([planes, poles])
@@ -173,7 +174,7 @@ def _is_ordered(moments):
     return moments[:, 11] >= moments[:, 0] / 4
 
 
-def _poles(moments, values, axes, noise, sight):
+def _poles(moments, values, axes, noise, sight, way):
     """Those of cells that hold a pole and nothing else."""
     points, axis = moments[:, 0], axes[:, :, 2] * np.where(axes[:, 2, 2:] < 0, -1.0, 1.0)
     across = np.cross(axis, sight)
@@ -182,14 +183,23 @@ def _poles(moments, values, axes, noise, sight):
     matrix = np.einsum("nik,nk,njk->nij", axes, values, axes)
     side, deep, between = _along(across, matrix), _along(beam, matrix), _along(beam, noise)
     radius = np.sqrt(side / ACROSS)
-    # a bush is deeper than a round pole, the face of a square one flatter
-    is_pole = deep <= 1.5 * ALONG * radius**2 + 2 * between
+    # by variance a round pole is a seventh as thick as wide; a square one, turned by 5 deg or more,
+    # shows two sides, a fifth as thick as wide and up to a third as deep; a cut arc is a
+    # twentieth as thick as wide, a strip seen askew not at all, and a bush as deep as wide
+    is_thick = values[:, 0] >= values[:, 1] / 10
+    is_round = deep <= 1.5 * ALONG * radius**2 + 2 * between
+    depth = np.where(is_round, DEPTH, SQUARE_DEPTH)
+    is_pole = is_round | is_thick & (deep <= side / 2 + 2 * between)
     is_pole &= (values[:, 2] >= 2 * SETTINGS.narrowest**2) & (radius <= SETTINGS.thickest)
     is_pole &= axis[:, 2] >= np.cos(SETTINGS.largest_lean)
     # what touches the border of its cell or moment goes on beyond: it is cut, and its mean is not
-    # the whole's. Of an even strip the border is sqrt(3) sigmas away, by few points up to 2.5
+    # the whole's. Of an even strip the border is sqrt(3) sigmas away, by few points up to 2.5. What
+    # is thick is joined with what is beyond, and as wide there; what is flat may be a wall's border
     spread = np.sqrt(np.einsum("nii->ni", matrix)[:, :2])
-    to_border = SETTINGS.cell / 2 - np.abs(moments[:, 2:4] / points[:, None])
+    spread = np.where(is_thick[:, None], spread.max(axis=1, keepdims=True), spread)
+    way = np.where(is_thick[:, None], way[:, :2], 0.0)
+    from_middle = moments[:, 2:4] / points[:, None] - way * SETTINGS.cell / 2
+    to_border = (1 + np.abs(way)) * SETTINGS.cell / 2 - np.abs(from_middle)
     is_pole &= (to_border >= 2.5 * spread).all(axis=1)
     time = np.einsum("ni,ni->n", across, _with_time(moments)) / np.sqrt(np.maximum(side, 1e-12))
     to_end = SETTINGS.moment / 2 - np.abs(moments[:, 1] / points - SETTINGS.moment / 2)
@@ -198,9 +208,9 @@ def _poles(moments, values, axes, noise, sight):
     # evenly spaced, scan lines leave the middle open by half of a step; one tells no width
     lines = _lines(moments)
     is_pole &= lines > 1
-    variance = side / lines**2 + DEPTH**2 * of_radius + (SETTINGS.roundness * radius) ** 2
+    variance = side / lines**2 + depth**2 * of_radius + (SETTINGS.roundness * radius) ** 2
     tilt, extent = side / lines**2 / values[:, 2], np.sqrt(values[:, 2])
-    shift, rows = DEPTH * radius[:, None] * beam, np.arange(len(points))
+    shift, rows = (depth * radius)[:, None] * beam, np.arange(len(points))
     return Shapes(rows, axis, variance, tilt, extent, shift)[is_pole]
 
 

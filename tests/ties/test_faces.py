@@ -21,7 +21,7 @@ def joined(axis, side=0.0):
     table = CellTable(ORIGIN, START, 1.0, 1.0)
     table.add(PointCloud(ORIGIN + place, time, np.ones(POINTS)), PASSES, 4, np.full(1, np.inf))
     middle, begin, group, moments = table.of(np.ones(table.count, bool))
-    return ORIGIN + place, time, middle, join_across_faces(middle, begin, group, moments)
+    return ORIGIN + place, time, middle, join_across_faces(middle, begin, group, moments)[0]
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
