@@ -53,9 +53,10 @@ def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
     for pause in (SETTINGS.pause, least_pause(survey, features)):
         ties = pair_features(features, correction, sigma, radius, pause=pause)
         agree = consistent_ties(ties, correction)
-        left = np.abs(residuals(ties[agree], correction))
-        if len(left):
-            sigma = np.minimum(sigma, 2 * NORMAL_SCATTER * np.median(left))
+        kinds, left = ties.kind[agree], np.abs(residuals(ties[agree], correction))
+        for kind in np.unique(kinds):  # along the way poles may be farther apart than walls tell
+            near = 2 * NORMAL_SCATTER * np.median(left[kinds == kind])
+            sigma = np.where(features.kind == kind, np.minimum(sigma, near), sigma)
     return TieSearch(weigh_by_time(ties[agree]), ties[~agree], correction, radius)
 
 
