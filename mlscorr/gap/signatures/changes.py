@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from mlscorr.effects import Effect, Returns
 from mlscorr.gap.observe.rows import Rows
@@ -143,22 +144,20 @@ class Bench:
 
     def _along(self, moved):
         """Shift of the residuals (m,) by moves (k, 3) of the pulses."""
-        number, count, place = self._items
-        total = np.column_stack(
-            [np.bincount(number, self._pulses.weight * v, count) for v in moved.T]
-        )
-        return np.einsum("mi,mi->m", self.rows.direction, total[place])
+        return np.einsum("mi,mi->m", self.rows.direction, self._weights @ moved)
 
     @cached_property
-    def _items(self):
-        """Which item each pulse (k,) is of, how many there are, and which each row (m,) is of."""
+    def _weights(self):
+        """Sparse (m, k): the weights of the pulses behind each row."""
         items, number = np.unique(self._pulses.item, return_inverse=True)
-        return number, len(items), np.searchsorted(items, self.rows.item)
+        entries = self._pulses.weight, (number, np.arange(len(number)))
+        return csr_array(entries)[np.searchsorted(items, self.rows.item)]
 
     def _mean(self, values):
-        """Sum (m,) over the visits of each row's item of the mean of values (k,) of its pulses."""
-        number, count, place = self._items
-        return np.bincount(number, np.abs(self._pulses.weight) * values, count)[place]
+        """Sum (m, ...) over the visits of each row's item of the mean of values (k, ...) of its
+        pulses.
+        """
+        return abs(self._weights) @ values
 
     @cached_property
     def _speeds(self):
@@ -190,10 +189,9 @@ class Bench:
         for name, total in sums.items():
             moved = self._speeds[name] * np.sqrt(total / SETTINGS.replicas)[pulse, None]
             along_normal += self._mean(np.einsum("ki,ki->k", moved, self._pulses.normal) ** 2)
-            for i in range(3):
-                for j in range(3):
-                    both = rows.direction[:, i] * rows.direction[:, j]
-                    variance += both * self._mean(moved[:, i] * moved[:, j])
+            squares = self._mean((moved[:, :, None] * moved[:, None, :]).reshape(-1, 9))
+            along = np.einsum("mi,mj->mij", rows.direction, rows.direction).reshape(-1, 9)
+            variance += np.einsum("mi,mi->m", along, squares)
         rough = rows.channel == "roughness"
         growth = np.where(rough, along_normal / np.where(rough, rows.believed, 1.0), 0.0)
         return variance / np.maximum(rows.points, 1), growth
@@ -226,37 +224,33 @@ class Bench:
     def _pose_shift(self, changed):
         """Shift (m,) of the residuals when this is recorded instead of the thinned trajectory."""
         recorded = self._trajectory
-        columns = [changed.position - recorded.position]
+        pose = np.zeros((len(recorded), 6))
+        pose[:, :3] = changed.position - recorded.position
         if changed.attitude is not recorded.attitude:
-            columns.append((changed.attitude * recorded.attitude.inv()).as_rotvec())
-        pose = np.hstack(columns)
-        shift = np.zeros(len(self.rows))
-        for before, weight, partials in self._legs:
-            at_rows = pose[before] * (1 - weight) + pose[before + 1] * weight
-            shift += np.einsum("mi,mi->m", partials[:, : at_rows.shape[1]], at_rows)
-        return shift
+            pose[:, 3:] = (changed.attitude * recorded.attitude.inv()).as_rotvec()
+        return self._by_pose @ pose.ravel()
 
     @cached_property
-    def _legs(self):
-        """For each row's first and second look: the epoch before (m,), the weight (m, 1) of the
-        one after, and the partials (m, 6).
+    def _by_pose(self):
+        """Derivative, sparse (m, 6 e), of the rows by the poses at the e epochs: each look, the
+        first and the second, lies between two of them.
         """
         rows, epochs = self.rows, self._trajectory.gps_time
         second = np.where(rows.two_times, rows.gps_time_2, rows.gps_time)
-        legs = []
+        m, legs = len(rows), []
         for time, partials in ((rows.gps_time, rows.partials), (second, rows.partials_2)):
             before = np.clip(np.searchsorted(epochs, time, side="right") - 1, 0, len(epochs) - 2)
             weight = (time - epochs[before]) / (epochs[before + 1] - epochs[before])
-            legs.append((before, weight[:, None], partials))
-        return legs if rows.two_times.any() else legs[:1]
+            for epoch, share in ((before, 1 - weight), (before + 1, weight)):
+                columns = 6 * epoch[:, None] + np.arange(6)
+                entries = (share[:, None] * partials).ravel(), columns.ravel(), 6 * np.arange(m + 1)
+                legs.append(csr_array(entries, shape=(m, 6 * len(epochs))))
+        return sum(legs)
 
     def _pose_variance(self, effect, rng):
         """Variance (m,) by noise of the recorded trajectory, which rows of a moment share."""
-        total = 0.0
-        for _ in range(SETTINGS.replicas):
-            changed = effect.apply(self._trajectory, self.rows.reference, rng)
-            total = total + self._pose_shift(changed) ** 2
-        return total / SETTINGS.replicas
+        given, replicas = (self._trajectory, self.rows.reference, rng), SETTINGS.replicas
+        return sum(self._pose_shift(effect.apply(*given)) ** 2 for _ in range(replicas)) / replicas
 
     def _control_shift(self, effect):
         """Shift (m,) of the residuals, observed - surveyed, by moved surveyed targets."""
