@@ -115,26 +115,16 @@ def _patches_behind(rows, patches):
     pulses = rows.pulses[~np.isin(rows.pulses.item, rows.item[rows.channel == "target"])]
     if len(pulses) == 0 or patches is None:
         return []
-    known = {(time, *xyz): i for i, (time, xyz) in enumerate(_first(patches.time, patches.xyz))}
-    second = pulses.weight < 0
-    order = np.lexsort((pulses.gps_time, second, pulses.item))
-    pulses, second = pulses[order], second[order]
-    first = np.flatnonzero(np.append(True, (np.diff(pulses.item) != 0) | np.diff(second)))
-    pulses, second = pulses[first], second[first]
-    behind = []
+    samples = zip(patches.time.ravel(), *patches.xyz.reshape(-1, 3).T, strict=True)
+    known = {sample: i // patches.time.shape[1] for i, sample in enumerate(samples)}
+    pulses = pulses[np.unique(2 * pulses.item + (pulses.weight < 0), return_index=True)[1]]
+    second, behind = pulses.weight < 0, []
     for i in np.argsort(place_key(pulses.xyz, pulses.gps_time), kind="stable"):
         number = known.get((pulses.gps_time[i], *pulses.xyz[i]))
         if number is not None:
             cloud = patches.cloud[number]
             behind.append(_Patch(pulses.item[i], bool(second[i]), pulses.normal[i], cloud))
     return behind
-
-
-def _first(time, xyz):
-    """The earliest of each patch's samples: pairs of time and place (3,)."""
-    earliest = np.argmin(time, axis=1)
-    patch = np.arange(len(time))
-    return zip(time[patch, earliest], xyz[patch, earliest], strict=True)
 
 
 def _beams(survey, rows, platform, origin, patches, targets):

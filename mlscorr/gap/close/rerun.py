@@ -78,7 +78,7 @@ def _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng):
     the _Patches of these.
     """
     boards = _boards(rows, beams, run.effects)
-    met = _meet(rows, beams, run.beams, boards, speckle)
+    met = _meet(rows, beams, views, run.beams, boards, speckle)
     xyz, kept = run.measure(met)
     xyz += dither
     patches = _Patches.of(beams, xyz, kept, np.isfinite(met.range))
@@ -142,12 +142,8 @@ def _views_of(rows, beams):
     views = np.full((len(rows), 2), -1)
     for column in (0, 1):
         numbers = np.flatnonzero(beams.second == bool(column))
-        numbers = numbers[np.argsort(beams.item[numbers])]
-        if len(numbers) == 0:
-            continue
-        place = np.minimum(np.searchsorted(beams.item[numbers], rows.item), len(numbers) - 1)
-        here = beams.item[numbers[place]] == rows.item
-        views[here, column] = numbers[place[here]]
+        of_item = dict(zip(beams.item[numbers].tolist(), numbers, strict=True))
+        views[:, column] = [of_item.get(item, -1) for item in rows.item.tolist()]
     other = (views[:, 0] >= 0) & (beams.gps_time[views[:, 0]] != rows.gps_time)
     if other.any():
         raise ValueError(
@@ -160,24 +156,19 @@ def _views_of(rows, beams):
 def _boards(rows, beams, effects):
     """Boards of the views at targets, where these truly are."""
     targets = true_targets(rows.targets, effects, rows.reference)
-    item = beams.item[beams.target >= 0]
-    known, row = np.unique(rows.item, return_index=True)
-    place = np.minimum(np.searchsorted(known, item), max(len(known) - 1, 0))
-    surveyed = np.where(known[place] == item, rows.survey_item[row[place]], -1)
+    of_item = dict(zip(rows.item.tolist(), rows.survey_item, strict=True))
+    items = beams.item[beams.target >= 0].tolist()
+    surveyed = np.array([of_item.get(item, -1) for item in items], dtype=int)
     centre = targets.position[surveyed] - beams.origin if len(targets) else np.empty((0, 3))
     return replace(beams.boards, centre=centre)
 
 
-def _meet(rows, beams, shot, boards, speckle):
+def _meet(rows, beams, views, shot, boards, speckle):
     """Met of all pulses: with the planes of patches, and with targets."""
     point, normal = beams.point.copy(), beams.normal.copy()
-    shared = np.flatnonzero(rows.channel == "shared")
-    order = shared[np.argsort(rows.item[shared])]
-    if len(order):  # one plane for both views
-        place = np.minimum(np.searchsorted(rows.item[order], beams.item), len(order) - 1)
-        both = rows.item[order[place]] == beams.item
-        point[both] = rows.position[order[place[both]]] - beams.origin
-        normal[both] = rows.direction[order[place[both]]]
+    shared, second = np.nonzero((views >= 0) & (rows.channel == "shared")[:, None])
+    both = views[shared, second]  # one plane for both views
+    point[both], normal[both] = rows.position[shared] - beams.origin, rows.direction[shared]
     offset = np.einsum("li,li->l", normal, point)
     on_target = beams.target[beams.view] >= 0
     flat, (start, direction) = ~on_target, shot
@@ -211,24 +202,19 @@ class _Patches:
     def of(cls, beams, xyz, kept, met):
         flat = beams.target[beams.view] < 0
         view, count = beams.view[flat], int((beams.target < 0).sum())
-        views = len(beams)
-        centre, normal = np.full((views, 3), np.nan), np.full((views, 3), np.nan)
-        variance = np.full(views, np.nan)
-        points, fired = np.zeros(views), np.zeros(views)
-        if count:
-            first = np.searchsorted(view, np.arange(count))
-            local = xyz[flat] - beams.origin - beams.point[view]
-            weight = (kept & met)[flat].astype(float)
-            local[weight == 0] = 0.0
-            mean, values, axes = moments(local, weight, first, view)
-            points[:count] = np.add.reduceat(weight, first)
-            fired[:count] = np.add.reduceat(met[flat].astype(float), first)
-            full = points[:count] >= SETTINGS.plane_points
-            centre[:count] = np.where(full[:, None], mean + beams.point[:count], np.nan)
-            turned = np.sign(np.einsum("li,li->l", axes[:, :, 0], beams.normal[:count]))
-            normal[:count] = axes[:, :, 0] * turned[:, None]
-            unbiased = values[:, 0] * points[:count] / freedom(points[:count])
-            variance[:count] = np.where(full, unbiased, np.nan)
+        local = xyz[flat] - beams.origin - beams.point[view]
+        weight = (kept & met)[flat].astype(float)
+        local[weight == 0] = 0.0
+        mean, values, axis = moments(local, weight, np.searchsorted(view, np.arange(count)))
+        points, fired = (np.bincount(view, v, len(beams)) for v in (weight, met[flat]))
+        full = points[:count] >= SETTINGS.plane_points
+        centre, normal = np.full((2, len(beams), 3), np.nan)
+        centre[:count] = np.where(full[:, None], mean + beams.point[:count], np.nan)
+        turned = np.sign(np.einsum("li,li->l", axis, beams.normal[:count]))
+        normal[:count] = axis * turned[:, None]
+        unbiased = values[:, 0] * points[:count] / freedom(points[:count])
+        variance = np.full(len(beams), np.nan)
+        variance[:count] = np.where(full, unbiased, np.nan)
         return cls(centre, normal, variance, points, fired)
 
 
@@ -259,32 +245,34 @@ def _surface(rows, survey, beams, on, view, run, dither, spread):
     Points farther from the middle one than the spread (l,), and than any surface is rough, are of
     another surface.
     """
-    met, triangle = beams.reference.meet(*run.beams, beams.pulses.intensity)
-    xyz, kept = run.measure(met)
+    fired = np.flatnonzero(np.isin(beams.view, view))  # the other pulses are not compared
+    of, facet = beams.view[fired], beams.facet[fired]
+    start, beam = (values[fired] for values in run.beams)
+    part, triangle = beams.reference.meet(start, beam, beams.pulses.intensity[fired])
+    met = Met(np.full(len(dither), np.nan), np.ones(len(dither)), beams.pulses.intensity)
+    met.range[fired], met.incidence[fired] = part.range, part.incidence
+    xyz, kept = (values[fired] for values in run.measure(met))
     normal, offset = beams.reference.mesh.normal, beams.reference.mesh.offset
     direction, largest = np.zeros((len(beams), 3)), np.zeros(len(beams))
     direction[view] = rows.direction[on]
     largest[view] = np.abs(rows.residual[on]) + gate(survey, rows.gps_time[on])
-    towards = direction[beams.view]
-    cosine = np.einsum("ni,ni->n", normal[triangle], towards)
+    cosine = np.einsum("ni,ni->n", normal[triangle], direction[of])
     used = kept & (triangle >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
-    cosine = np.einsum("ni,ni->n", normal[beams.facet], towards)
-    used &= (beams.facet >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
-    xyz += dither - beams.origin
-    away = np.einsum("ni,ni->n", normal[beams.facet], xyz)
-    away = (away - offset[beams.facet]) * np.sign(cosine)
-    used &= np.abs(away) <= largest[beams.view]
-
-    middle = _median(np.where(used, away, np.nan), beams.view, len(beams))
+    cosine = np.einsum("ni,ni->n", normal[facet], direction[of])
+    used &= (facet >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
+    away = np.einsum("ni,ni->n", normal[facet], xyz + dither[fired] - beams.origin)
+    away = (away - offset[facet]) * np.sign(cosine)
+    used &= np.abs(away) <= largest[of]
+    middle = _median(np.where(used, away, np.nan), of, len(beams))
     limit = np.fmax(spread, SETTINGS.roughest)
     with np.errstate(invalid="ignore"):
-        used &= np.abs(away - middle[beams.view]) <= limit[beams.view]
+        used &= np.abs(away - middle[of]) <= limit[of]
 
     def count(which):
-        return np.bincount(beams.view, which, len(beams))[view]
+        return np.bincount(of, which, len(beams))[view]
 
-    number, lost = count(used), count(np.isfinite(met.range) & ~kept)
-    known = number >= np.maximum(1, SETTINGS.facet_share * (count(beams.view >= 0) - lost))
+    number, lost = count(used), count(np.isfinite(part.range) & ~kept)
+    known = number >= np.maximum(1, SETTINGS.facet_share * (count(of >= 0) - lost))
     return np.where(known, count(np.where(used, away, 0.0)) / np.maximum(number, 1), np.nan)
 
 

@@ -1,6 +1,7 @@
 """Planes through the points of small cells of space and time."""
 
 import numpy as np
+from numba import njit
 
 from mlscorr.gap.observe.covariates import scanner_origin
 from mlscorr.gap.observe.patches import Patches
@@ -101,21 +102,21 @@ def _fit(survey, chunk, number, rows, count):
     """Planes through groups of points: rows (n,) of the chunk, count (g,) of each group."""
     first, group = np.cumsum(count) - count, np.repeat(np.arange(len(count)), count)
     local = chunk.xyz[rows] - chunk.xyz[rows[first]][group]
-    weight, (mean, values, axes) = _trimmed(local, first, group)
+    weight, (mean, values, normal) = _trimmed(local, first, group)
     held = np.add.reduceat(weight, first)
     variance = values[:, 0] * held / freedom(held)
     least = np.maximum(SETTINGS.plane_points, SETTINGS.rule * count)
     good = (held >= least) & (variance <= SETTINGS.roughest**2)
     good &= values[:, 1] >= SETTINGS.narrowest**2
-    good &= _is_whole(chunk.xyz[rows[first]] + mean, axes[:, :, 0], variance)
+    good &= _is_whole(chunk.xyz[rows[first]] + mean, normal, variance)
     if not good.any():
         return None
     fired, returned = _misses(chunk.gps_time[rows], number[rows], first, group)
-    away = np.einsum("ni,ni->n", local - mean[group], axes[group, :, 0])
+    away = _heights(local, mean, normal, group)
     sample = rows[_taken(weight > 0, first)[good]]
     begin = chunk.gps_time[rows[first]]
     time = np.add.reduceat(weight * (chunk.gps_time[rows] - begin[group]), first) / held
-    normal = axes[good, :, 0]
+    normal = normal[good]
     slant = np.einsum("pi,pi->p", normal, _sight(survey, chunk, sample))
     normal *= np.sign(slant)[:, None]
     return Patches(
@@ -141,35 +142,30 @@ def _trimmed(local, first, group):
     """Which points (n,) lie on their group's plane, as weights, and the moments of these."""
     weight = np.ones(len(local))
     for trim in SETTINGS.trims:
-        mean, values, axes = moments(local, weight, first, group)
-        away = np.abs(np.einsum("ni,ni->n", local - mean[group], axes[group, :, 0]))
+        mean, values, normal = moments(local, weight, first)
+        away = np.abs(_heights(local, mean, normal, group))
         held = np.add.reduceat(weight, first)
         sigma = np.sqrt(values[:, 0] * held / freedom(held))
         weight = (away <= trim * np.maximum(sigma, SETTINGS.file_step / 10)[group]).astype(float)
-    return weight, moments(local, weight, first, group)
+    return weight, moments(local, weight, first)
 
 
 def _on_planes(chunk, rows, count, sample, normal):
     """PointCloud of the points on each plane (g,), of groups of rows (n,) with counts (g,)."""
     first, group = np.cumsum(count) - count, np.repeat(np.arange(len(count)), count)
-    in_time = np.argsort(chunk.gps_time[sample], axis=1, kind="stable")[:, SETTINGS.samples // 2]
-    origin = chunk.xyz[sample[np.arange(len(count)), in_time]]
-    height = np.einsum("ni,ni->n", chunk.xyz[rows] - origin[group], normal[group])
+    origin = chunk.xyz[sample[:, 0]]
+    height = _heights(chunk.xyz[rows], origin, normal, group)
     heights = np.einsum("gsi,gi->gs", chunk.xyz[sample] - origin[:, None], normal)
     middle = np.median(heights, axis=1)
     sigma = np.maximum(heights.std(axis=1), SETTINGS.file_step / 2)
-    for _ in range(4):
-        on = np.abs(height - middle[group]) <= SETTINGS.trims[-1] * sigma[group]
-        held = np.add.reduceat(on.astype(float), first)
-        middle = np.add.reduceat(np.where(on, height, 0.0), first) / held
-        squares = np.where(on, height - middle[group], 0.0) ** 2
-        sigma = np.maximum(np.sqrt(np.add.reduceat(squares, first) / held), SETTINGS.file_step / 2)
+    _narrow(height, first, middle, sigma, SETTINGS.trims[-1], SETTINGS.file_step / 2)
     on = np.flatnonzero(np.abs(height - middle[group]) <= SETTINGS.trims[-1] * sigma[group])
     on = on[np.lexsort((chunk.gps_time[rows[on]], group[on]))]
     clouds, limit = np.empty(len(count), dtype=object), SETTINGS.patch_pulses
+    half = np.arange(limit) + 0.5
     for i, part in enumerate(np.split(rows[on], np.searchsorted(group[on], range(1, len(count))))):
-        taken = ((np.arange(limit) + 0.5) * len(part) / limit).astype(int)
-        clouds[i] = chunk[part[taken] if len(part) > limit else part]
+        some = part[(half * len(part) / limit).astype(int)] if len(part) > limit else part
+        clouds[i] = PointCloud(chunk.xyz[some], chunk.gps_time[some], chunk.intensity[some])
     return clouds
 
 
@@ -178,8 +174,30 @@ def freedom(points: np.ndarray) -> np.ndarray:
     return np.maximum(points - 3, 1)
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def _narrow(height, first, middle, sigma, trim, least):
+    """Make middles and sigmas (g,) those of the heights (n,) within so many sigmas, four times."""
+    ends = np.append(first[1:], len(height))
+    for g in range(len(first)):
+        part = height[first[g] : ends[g]]
+        for _ in range(4):
+            on = part[np.abs(part - middle[g]) <= trim * sigma[g]]
+            middle[g] = on.mean()
+            sigma[g] = max(on.std(), least)
+
+
+@njit(cache=True, nogil=True)
+def _heights(xyz, origin, normal, group):
+    """How far points (n, 3) lie over the planes (g,) of their groups (n,). Units: m."""
+    height = np.zeros(len(xyz))
+    for i in range(len(xyz)):
+        for axis in range(3):
+            height[i] += (xyz[i, axis] - origin[group[i], axis]) * normal[group[i], axis]
+    return height
+
+
 def moments(
-    local: np.ndarray, weight: np.ndarray, first: np.ndarray, group: np.ndarray
+    local: np.ndarray, weight: np.ndarray, first: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Moments of groups of points.
 
@@ -190,23 +208,32 @@ def moments(
     weight : (n,) array
     first : (g,) int array
         Where each group begins.
-    group : (n,) int array
 
     Returns
     -------
-    tuple of (g, 3), (g, 3) and (g, 3, 3) arrays
-        Mean (m), variances from the least (m^2), and their axes, in columns.
+    tuple of three (g, 3) arrays
+        Mean (m), variances from the least (m^2), and the axis of the least.
     """
-    total = np.maximum(np.add.reduceat(weight, first), 1.0)
-    mean = np.add.reduceat(weight[:, None] * local, first) / total[:, None]
-    centred = local - mean[group]
-    covariance = np.empty((len(first), 3, 3))
-    for i in range(3):
-        for j in range(i, 3):
-            entry = np.add.reduceat(weight * centred[:, i] * centred[:, j], first) / total
-            covariance[:, i, j] = covariance[:, j, i] = entry
-    values, axes = np.linalg.eigh(covariance)
-    return mean, np.maximum(values, 0.0), axes  # of points in a line rounding makes it negative
+    values, axes = np.linalg.eigh((sums := _sums(local, weight, first))[:, 1:])
+    # of points in a line rounding makes it negative
+    return sums[:, 0], np.maximum(values, 0.0), np.ascontiguousarray(axes[:, :, 0])
+
+
+@njit(cache=True, nogil=True)
+def _sums(local, weight, first):
+    """Means, and below them the lower halves of covariances, of groups of points: (g, 4, 3)."""
+    sums, ends = np.zeros((len(first), 4, 3)), np.append(first[1:], len(local))
+    for g in range(len(first)):
+        total = max(weight[first[g] : ends[g]].sum(), 1.0)
+        for i in range(first[g], ends[g]):
+            for a in range(3):
+                sums[g, 0, a] += weight[i] * local[i, a] / total
+        for i in range(first[g], ends[g]):
+            for a in range(3):
+                for b in range(a + 1):
+                    square = (local[i, a] - sums[g, 0, a]) * (local[i, b] - sums[g, 0, b])
+                    sums[g, 1 + a, b] += weight[i] * square / total
+    return sums
 
 
 def _between(away, weight, first, group):

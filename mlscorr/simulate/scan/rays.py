@@ -153,6 +153,16 @@ class Platform:
         in_slices(n, _aim, rows, constants)
         return rays
 
+    def scanner(self, gps_time: np.ndarray) -> np.ndarray:
+        """Where the scanner is (n, 3), about the origin. Units: m.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Within the epochs. Units: s.
+        """
+        return self.place(gps_time, *np.zeros((3, len(gps_time))), np.zeros(3))
+
     def place(
         self, gps_time: np.ndarray, angle: np.ndarray, elevation: np.ndarray, distance: np.ndarray,
         origin: np.ndarray,

@@ -49,9 +49,13 @@ def aim(
     elevation : (n,) array
         Out of the scan plane. Units: rad.
     """
-    nothing, zero = np.zeros(len(gps_time)), np.zeros(3)
-    start = platform.place(gps_time, angle, elevation, nothing, zero)
-    return start, platform.place(gps_time, angle, elevation, nothing + 1.0, zero) - start
+    start = platform.scanner(gps_time)
+    return start, _towards(platform, gps_time, angle, elevation) - start
+
+
+def _towards(platform, gps_time, angle, elevation):
+    """Where pulses are (n, 3), about the platform's origin, a metre after their start."""
+    return platform.place(gps_time, angle, elevation, np.ones(len(gps_time)), np.zeros(3))
 
 
 def recorded_platform(survey: Survey, origin: np.ndarray) -> Platform:
@@ -83,7 +87,8 @@ def recorded_pulses(
     """
     time, level, quarter = cloud.gps_time, np.zeros(len(cloud)), np.full(len(cloud), np.pi / 2)
     start, x = aim(platform, time, level, level)
-    axes = x, aim(platform, time, quarter, level)[1], aim(platform, time, level, quarter)[1]
+    ends = _towards(platform, time, quarter, level), _towards(platform, time, level, quarter)
+    axes = x, *(end - start for end in ends)
     sight = cloud.xyz - origin - start
     x, y, z = (np.einsum("ni,ni->n", sight, axis) for axis in axes)
     away = np.sqrt(x**2 + y**2 + z**2)

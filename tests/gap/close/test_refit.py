@@ -85,7 +85,7 @@ def simulated_points(case):
     survey, _, rows, beams = case
     run, dither, speckle, _ = _drawn(rows, survey, beams, (), np.random.default_rng(9))
     boards = _boards(rows, beams, ())
-    met = _meet(rows, beams, run.beams, boards, speckle)
+    met = _meet(rows, beams, _views_of(rows, beams), run.beams, boards, speckle)
     xyz, kept = run.measure(met)
     return xyz + dither, kept, met, run.beams, boards
 
