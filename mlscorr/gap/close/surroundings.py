@@ -11,7 +11,7 @@ from mlscorr.gap.close.unreturned import unreturned
 from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
 from mlscorr.simulate.scan import Platform, RecordedPulses, aim, recorded_platform, recorded_pulses
 from mlscorr.survey import PointCloud, Survey
-from mlscorr.targets.candidates import search_radius
+from mlscorr.targets.candidates import NO_POINTS, search_radius
 from mlscorr.targets.fit import FittedTarget
 
 
@@ -79,12 +79,11 @@ class Surroundings:
 
     def _passing(self, cloud, place, extent):
         """Which beams (n,) of a cloud pass places (k, 3) within extents (k,), or would. m."""
-        level = np.zeros(len(cloud))
-        start = self._platform.place(cloud.gps_time, level, level, level, np.zeros(3))
+        start = self._platform.scanner(cloud.gps_time)
         return _passing_any(start, cloud.xyz - self._origin, place - self._origin, extent**2)
 
     def about(self, platform: Platform, sighting: Sighting, origin: np.ndarray) -> list:
-        """Pulses about a Sighting, whether they returned or not.
+        """Pulses about a Sighting, whether they returned or not, wherever chunks end.
 
         Parameters
         ----------
@@ -97,19 +96,32 @@ class Surroundings:
         Returns
         -------
         list of (RecordedPulses, (n,) array, (n,) array, (n, 2) array)
-            Of each chunk: pulses, and their distance (m), cosine of incidence and place where they
+            One or none: pulses, and their distance (m), cosine of incidence and place where they
             cross the target's plane (m).
         """
-        target, parts = sighting.fitted, []
-        times = _scanned(target)
+        target, times = sighting.fitted, np.array(_scanned(sighting.fitted))
         extent = _extent(target, np.linalg.norm(target.position - sighting.surveyed))
+        clouds, read = [NO_POINTS], []
         for chunk, limits in [*self._settled, *self._open]:
-            cloud = chunk[slice(*np.searchsorted(chunk.gps_time, times))]
-            if len(cloud):
-                first, last = platform.epochs[[0, -1]]
-                span = np.clip(times, max(limits[0], first), min(limits[1], last))
-                parts += _about_target(platform, cloud, target, origin, span, extent)
-        return parts
+            if limits[0] <= times[1] and limits[1] >= times[0]:
+                clouds.append(chunk[slice(*np.searchsorted(chunk.gps_time, times))])
+                read += np.clip(times, *limits).tolist()
+        cloud, place = PointCloud.concatenate(clouds), target.position - origin
+        start = platform.scanner(cloud.gps_time)
+        near = _passing_any(start, cloud.xyz - origin, place[None], np.array([extent**2]))
+        if not near.any():
+            return []
+        nearest = np.linalg.norm(start[near] - place, axis=1).min()
+        span = np.clip([min(read), max(read)], *platform.epochs[[0, -1]])
+        cloud = cloud[np.flatnonzero(near)[np.argsort(cloud.gps_time[near], kind="stable")]]
+        pulses = _first_returns(recorded_pulses(platform, cloud, origin, target.normal))
+        pulses = RecordedPulses.concatenate([pulses, unreturned(pulses, span, extent / nearest)])
+        beams = aim(platform, pulses.gps_time, pulses.angle, pulses.elevation)
+        board, number = board_of(target, origin), np.zeros(len(pulses), int)
+        distance, slant, place = board.crossings(number, *beams)
+        with np.errstate(invalid="ignore"):
+            near = np.isfinite(distance) & (np.hypot(*place.T) <= extent)
+        return [(pulses[near], distance[near], slant[near], place[near])] if near.any() else []
 
 
 def _scanned(target):
@@ -121,20 +133,6 @@ def _scanned(target):
 def _extent(target, apart):
     """How far from a target, observed apart from where it was surveyed, beams matter. m."""
     return SETTINGS.around * target.size + SETTINGS.margin + apart
-
-
-def _about_target(platform, cloud, target, origin, span, extent):
-    """Part of Surroundings.about: of the points of one chunk, within a span of time."""
-    cloud, nearest = _passing(platform, cloud, origin, target.position, extent)
-    if len(cloud) == 0:
-        return []
-    pulses = _first_returns(recorded_pulses(platform, cloud, origin, target.normal))
-    pulses = RecordedPulses.concatenate([pulses, unreturned(pulses, span, extent / nearest)])
-    beams = aim(platform, pulses.gps_time, pulses.angle, pulses.elevation)
-    distance, slant, place = board_of(target, origin).crossings(np.zeros(len(pulses), int), *beams)
-    with np.errstate(invalid="ignore"):
-        near = np.isfinite(distance) & (np.hypot(*place.T) <= extent)
-    return [(pulses[near], distance[near], slant[near], place[near])] if near.any() else []
 
 
 @njit(cache=True)
@@ -153,19 +151,6 @@ def _passing_any(start, end, place, squared_extent):
                 near[i] = True
                 break
     return near
-
-
-def _passing(platform, cloud, origin, place, extent):
-    """Points of a cloud whose beams pass a place (3,) within an extent, and the least distance of
-    the scanner from the place. Units: m.
-    """
-    level = np.zeros(len(cloud))
-    start = platform.place(cloud.gps_time, level, level, level, origin)
-    sight, towards = cloud.xyz - start, place - start
-    along = np.einsum("ni,ni->n", sight, towards) / np.linalg.norm(sight, axis=1)
-    squared = np.einsum("ni,ni->n", towards, towards)
-    passing = (along > 0) & (squared - along**2 <= extent**2)
-    return cloud[passing], np.sqrt(squared[passing].min(initial=np.inf))
 
 
 def _first_returns(pulses):

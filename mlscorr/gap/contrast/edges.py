@@ -10,11 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.gap.contrast.settings import SETTINGS
+from mlscorr.gap.observe.patch_search import moments_before
 from mlscorr.gap.observe.plane_fit import chance
 from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
 from mlscorr.simulate.scan import recorded_platform
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.survey.columns import Columns
+from mlscorr.targets import NO_POINTS
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,7 +47,7 @@ class Edges(Columns):
 
 
 class EdgeCollector:
-    """Keeps about `limit` depth edges of the chunks that it is given.
+    """Keeps about `limit` depth edges of the chunks that it is given, wherever these end.
 
     Parameters
     ----------
@@ -58,17 +60,25 @@ class EdgeCollector:
         self._origin = survey.trajectory.position.mean(axis=0)
         self._platform = recorded_platform(survey, self._origin)
         self._parts, self.share = [Edges(np.empty(0), np.empty((0, 3)), *np.empty((2, 0)))], 1.0
+        self._held = NO_POINTS
 
     def add(self, chunk: PointCloud) -> None:
-        """Take the edges of a chunk."""
+        """Take the edges of a chunk, but those of the moments about its last point."""
         inside = chunk[self._survey.trajectory.segment(chunk.gps_time) >= 0]
-        if len(inside) == 0:
-            return
-        if (np.diff(inside.gps_time) < 0).any():
-            inside = inside[np.argsort(inside.gps_time, kind="stable")]
-        level = np.zeros(len(inside))
-        sight = inside.xyz - self._origin
-        sight -= self._platform.place(inside.gps_time, level, level, level, np.zeros(3))
+        self._held = PointCloud.concatenate([self._held, inside])
+        self._close(chunk.gps_time[-1] if len(chunk) else np.inf)
+
+    def _close(self, time):
+        """Take the edges of held points, but those of the moments about a time (s)."""
+        segment = self._survey.trajectory.segment(self._held.gps_time)
+        moments, is_open = moments_before(time, self._held.gps_time, segment)
+        for rows in moments:
+            self._take(self._held[rows[np.argsort(self._held.gps_time[rows], kind="stable")]])
+        self._held = self._held[is_open]
+
+    def _take(self, inside):
+        """Take the edges of the points of a moment, in order of time."""
+        sight = inside.xyz - self._origin - self._platform.scanner(inside.gps_time)
         rough = max(OBSERVE.roughest, 6 * np.sqrt(6) * self._survey.scanner.range_noise)
         edges = edges_of(inside, sight, rough)
         self._parts.append(edges[edges.chance < self.share])
@@ -77,7 +87,8 @@ class EdgeCollector:
             self._parts = [part[part.chance < self.share] for part in self._parts]
 
     def edges(self) -> Edges:
-        """Edges of all chunks so far."""
+        """Edges of all chunks, of which none follows."""
+        self._close(np.inf)
         return Edges.concatenate(self._parts)
 
 

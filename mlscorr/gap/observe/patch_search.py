@@ -52,14 +52,9 @@ class PatchCollector:
 
     def _close(self, time):
         """Keep the patches of held points, but those of the moments about a time (s)."""
-        moment = np.floor(self._held.gps_time / SETTINGS.moment)
-        # beams that take turns come a little late
-        is_open = np.abs(moment - np.floor(time / SETTINGS.moment)) <= 1
         segment = self._survey.trajectory.segment(self._held.gps_time)
-        rows = np.lexsort((moment, segment))
-        rows = rows[~is_open[rows]]
-        is_next = (np.diff(segment[rows]) != 0) | (np.diff(moment[rows]) != 0)
-        for part in np.split(rows, np.flatnonzero(is_next) + 1):  # memory follows the largest
+        moments, is_open = moments_before(time, self._held.gps_time, segment)
+        for part in moments:  # memory follows the largest
             patches = fit_patches(self._survey, self._held, self._number, part)
             if patches is not None:
                 key = self._file, int(segment[part[0]])
@@ -79,6 +74,35 @@ class PatchCollector:
         number = np.repeat([order[key] for key, _ in self._parts], [len(p) for _, p in self._parts])
         rows = np.lexsort((place_key(patches.xyz[:, 0], patches.time[:, 0]), number))
         return replace(patches, pass_number=number)[rows]
+
+
+def moments_before(
+    time: float, gps_time: np.ndarray, segment: np.ndarray
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Rows of the points of each moment and segment, but of those about a time.
+
+    Parameters
+    ----------
+    time : float
+        About which points are still to come. Units: s.
+    gps_time : (n,) array
+        Units: s.
+    segment : (n,) int array
+        Of the trajectory.
+
+    Returns
+    -------
+    moments : list of (k,) int array
+    is_open : (n,) bool array
+        Which points are of the moments about the time.
+    """
+    moment = np.floor(gps_time / SETTINGS.moment)
+    # beams that take turns come a little late
+    is_open = np.abs(moment - np.floor(time / SETTINGS.moment)) <= 1
+    rows = np.lexsort((moment, segment))
+    rows = rows[~is_open[rows]]
+    is_next = (np.diff(segment[rows]) != 0) | (np.diff(moment[rows]) != 0)
+    return [part for part in np.split(rows, np.flatnonzero(is_next) + 1) if len(part)], is_open
 
 
 def find_patches(

@@ -63,6 +63,20 @@ def test_a_missing_pulse_is_no_edge():
     assert len(edges_of(*line([10.0] * 10 + [14.0] * 10, numbers), ROUGH)) == 0
 
 
+def test_edges_do_not_depend_on_where_chunks_end(pair):
+    "A cloud in pieces of 499 points has the edges of the whole one, those at their ends among them"
+    survey, edges = pair[0], []
+    cloud = next(read_chunks(survey.clouds[0], 200_000))
+    for size in (len(cloud), 499):
+        collector = EdgeCollector(survey)
+        for first in range(0, len(cloud), size):
+            collector.add(cloud[first : first + size])
+        edges.append(collector.edges())
+    assert len(edges[0]) > 100
+    np.testing.assert_array_equal(edges[1].gps_time, edges[0].gps_time)
+    np.testing.assert_array_equal(edges[1].width, edges[0].width)
+
+
 def test_memory_is_bounded_by_whole_moments(pair):
     "Half of the edges: those of a share of the moments, all of them"
     survey, real, _ = pair
