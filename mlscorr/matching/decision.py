@@ -89,9 +89,9 @@ def _in_drift(is_wrong, passes):
     Where one pass tells it, a short drift of the POS looks alike. A single point tells of no habit.
     """
     lone = is_wrong & (passes == 1)
-    number, seen = np.sum(lone), np.sum(passes > 0)
-    wrong = log_share(number, seen, SETTINGS.moved_share)
-    return lone & (number > 1) & (log_share(number, seen, 0.5) > wrong)
+    number, total = np.sum(lone), np.sum(passes > 0)
+    wrong = log_share(number, total, SETTINGS.moved_share)
+    return lone & (number > 1) & (log_share(number, total, 0.5) > wrong)
 
 
 def log_share(number: int, total: int, share: float) -> float:

@@ -65,7 +65,7 @@ def test_what_two_passes_find_elsewhere_is_no_drift():
 
 
 def test_shares_that_are_not_known():
-    "Of two things any number is as probable under a mean of 1/2: one given of them has a half of it"
+    "Of two things any number is as probable under a mean of 1/2; one of them has half of its"
     assert [log_share(number, 2, 0.5) for number in range(3)] == pytest.approx(
         np.log([1 / 3, 1 / 6, 1 / 3])
     )
