@@ -228,21 +228,16 @@ def guard_warnings(
     time = parameters.bias_time
     if parameters.family != INTEGRATED:
         time = max(time, parameters.drift_time)
-    yield from _extrapolated(equations, time)
-    length = guards.gap[1] - guards.gap[0]
-    first, last = equations.span
-    scanned = _scanned_times(equations)
-    away = np.minimum(scanned - guards.gap[0], guards.gap[1] - scanned).max(initial=0.0)
-    if 2 * away > SETTINGS.faded_times * time and first <= guards.gap[0] and guards.gap[1] <= last:
-        yield (
-            f"No control point for {length:.0f} s from {guards.gap[0]:.1f} s "
-            f"({length / time:.1f} correlation times): only the trend applies in the middle of it."
-        )
+    ties = equations.ties
+    if ties is None:  # they hold what control doesn't, and Support says where nothing does
+        yield from _extrapolated(equations, time)
+        yield from _faded(equations, time, *guards.gap)
     for first, last in guards.passes_without_control:
-        yield (
-            f"The pass from {first:.1f} to {last:.1f} s has no control point: only the trend of "
-            "the other passes and what is left of their signal correct it."
-        )
+        if ties is None or not np.any((ties.gps_time >= first) & (ties.gps_time <= last)):
+            yield (
+                f"The pass from {first:.1f} to {last:.1f} s has no control point: only the trend "
+                "of the other passes and what is left of their signal correct it."
+            )
     yield from global_test_warnings(guards)
 
 
@@ -282,3 +277,15 @@ def _extrapolated(equations, time):
                 f"Signal extrapolated {length:.0f} s {where} control point ({length / time:.1f} "
                 f"correlation times): {effect} there."
             )
+
+
+def _faded(equations, time, start, end):
+    """A sentence about the longest gap between control points where signals fade in it."""
+    first, last = equations.span
+    scanned, length = _scanned_times(equations), end - start
+    away = np.minimum(scanned - start, end - scanned).max(initial=0.0)
+    if 2 * away > SETTINGS.faded_times * time and first <= start and end <= last:
+        yield (
+            f"No control point for {length:.0f} s from {start:.1f} s "
+            f"({length / time:.1f} correlation times): only the trend applies in the middle of it."
+        )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from mlscorr.estimate import estimate_correction
+from mlscorr.estimate import estimate_correction, with_ties
 from mlscorr.estimate.guards import (
     GlobalTest,
     Guards,
@@ -21,6 +21,7 @@ from mlscorr.estimate.guards import (
 from mlscorr.estimate.posterior import Objective, choose_parameters
 from mlscorr.survey import Trajectory
 from tests.beds.pos_errors import CONSTANT, EPOCHS, START, Case, even, smooth_case, waves
+from tests.beds.tied_passes import LENGTH, tied_passes
 
 
 @pytest.mark.long
@@ -210,3 +211,13 @@ def test_sparse_control_is_told_in_numbers(times, asked, expected):
     assert len(sentences) == len(expected)
     for sentence, start in zip(sentences, expected, strict=True):
         assert sentence.startswith(start)
+
+
+@pytest.mark.long
+def test_what_ties_hold_is_not_said_to_fade():
+    "Control in the first of two passes alone: without ties the second is warned of, with them not"
+    passes = tied_passes(0)
+    first = passes.matched.gps_time < passes.trajectory.gps_time[0] + LENGTH
+    alone = estimate_correction(passes.trajectory, passes.matched[first])
+    assert any("has no control point" in text for text in alone.warnings)
+    assert with_ties(alone, passes.ties).warnings == ()
