@@ -65,3 +65,15 @@ def test_a_full_disk_is_named_with_what_it_has_left(tmp_path):
     (tmp_path / "log.txt").symlink_to(full)
     with pytest.raises(OSError, match=words), logged(tmp_path / "log.txt", tmp_path, str) as log:
         log.note("x")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]x", "[1]", "3"])
+def test_a_damaged_list_of_tasks_is_named(tmp_path, text):
+    "Cut off or of another kind: the file and the way out, no words of a parser alone"
+    (tmp_path / "a.laz").write_bytes(b"whole")
+    run(tmp_path, tiles(tmp_path, "a.laz"))
+    plan = TaskStore(tmp_path / "tasks").plan
+    plan.write_text(text)
+    with pytest.raises(ValueError, match=f"{plan.name} is damaged .*--resume"):
+        project_status(tmp_path)
+    assert CliRunner().invoke(app, ["status", str(tmp_path)]).exit_code == 2

@@ -30,7 +30,7 @@ def project_status(out: str | Path) -> dict:
     Raises
     ------
     ValueError
-        Where no project was ever corrected into the folder.
+        Where no project was ever corrected into the folder, or the list of its tasks is damaged.
     """
     out = as_path(out)
     store = TaskStore(out / STORE)
@@ -39,7 +39,7 @@ def project_status(out: str | Path) -> dict:
             f"{out} holds no results of a project, or its run has not begun with any file yet: "
             "mlscorr correct project.toml -o OUT makes them."
         )
-    stages = json.loads(read_bytes(store.plan))
+    stages = _planned(store)
     done = {kind: store.keys(kind) for kind in stages}
     tasks = [
         {
@@ -65,6 +65,17 @@ def project_status(out: str | Path) -> dict:
             "is_running": is_running,
         },
     )
+
+
+def _planned(store):
+    """The tasks of each stage, as the run has written them down."""
+    try:
+        return dict(json.loads(read_bytes(store.plan)))
+    except (ValueError, TypeError) as error:
+        raise ValueError(
+            f"{store.plan} is damaged ({error}), so that nothing tells how far the run has come: "
+            "mlscorr correct project.toml -o OUT --resume writes it anew and keeps what is done."
+        ) from error
 
 
 def _is_left(store, kind, key):
