@@ -4,8 +4,9 @@ python benchmarks/pos_study.py [FILE of real POS errors (.err)] [--seeds 2] [--e
 
 RMS in 3D of the whole trajectory over many drives: windows of a real error series with and without
 its sigma(t); clones of the paper's car and boat; MEMS and tactical units, filtered and smoothed,
-with their stated sigmas, without any, and with sigmas ten times too small and too large; and a POS
-whose GNSS loses its fixed solution now and again. Beside it what practitioners use on the same
+with their stated sigmas, without any, and with sigmas ten times too small and too large; a POS
+whose GNSS loses its fixed solution now and again; and one that drifts for seconds, three to eight
+times in a window, and states 2 cm all along. Beside it what practitioners use on the same
 control points: linear and monotone interpolation, the former cut at the steps of the path, and a
 Gaussian process of scikit-learn. With --every 4 each fourth control point along the drive takes
 part, with its passes.
@@ -55,6 +56,7 @@ def surveys(series, seeds):
                 yield f"{name}{title}", recorded, survey.matched, error, pos
     for seed in range(seeds):
         yield "not fixed at times", *unfixed(seed), None
+        yield "drifting for seconds", *bumped(seed), None
 
 
 def unfixed(seed):
@@ -67,6 +69,17 @@ def unfixed(seed):
     fixed, floated = series[:, -len(time) :].T.reshape(-1, 2, 3).swapaxes(0, 1)
     error = size * np.where(size > size.min(axis=0), floated, fixed)
     return window(345_600.0 + time, error, size, seed)
+
+
+def bumped(seed):
+    """Recorded trajectory, matched control and error of a drive whose POS drifts unstated."""
+    rng, time = np.random.default_rng([seed, 1]), np.arange(0.0, WINDOW, 0.1)
+    error = HELD / 2 * rng.normal(size=3) + np.zeros((len(time), 3))
+    for _ in range(rng.integers(3, 9)):
+        begin, length = rng.uniform(0.0, WINDOW - 30.0), rng.uniform(10.0, 30.0)  # s
+        share = np.clip((time - begin) / length, 0.0, 1.0)[:, None]
+        error += FLOAT * rng.normal(size=3) * np.sin(np.pi * share) ** 2
+    return window(345_600.0 + time, error, np.full_like(error, HELD), seed)
 
 
 def drives():
