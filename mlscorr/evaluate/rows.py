@@ -43,22 +43,14 @@ class Statistics:
         >>> statistics.rmse[:3].round(4).tolist(), float(statistics.maximum[3])
         ([0.3536, 0.0, 0.1], 0.4)
         """
-        n = len(residuals)
+        n, unknown = len(residuals), np.full(5, np.nan)
+        if n == 0:
+            return cls(n, *[unknown] * len(NAMES))
         lengths = [np.linalg.norm(residuals[:, :axes], axis=1) for axes in (2, 3)]
-
-        def measured(function, smallest=1):
-            if n < smallest:
-                return np.full(5, np.nan)
-            return np.hstack([function(values) for values in (residuals, *lengths)])
-
-        return cls(
-            n,
-            measured(lambda values: np.sqrt(np.mean(values**2, axis=0))),
-            measured(lambda values: values.mean(axis=0)),
-            measured(lambda values: values.std(axis=0, ddof=1), smallest=2),
-            measured(lambda values: values.min(axis=0)),
-            measured(lambda values: values.max(axis=0)),
-        )
+        values = np.column_stack([residuals, *lengths])
+        rmse, mean = np.sqrt(np.mean(values**2, axis=0)), values.mean(axis=0)
+        std = values.std(axis=0, ddof=1) if n > 1 else unknown
+        return cls(n, rmse, mean, std, values.min(axis=0), values.max(axis=0))
 
     @property
     def table(self) -> np.ndarray:
