@@ -175,17 +175,8 @@ class TargetRow:
 
     def document(self) -> dict:
         """The row of ``targets[]`` in report.json."""
-        vectors = {name: _numbers(getattr(self, name)) for name in VECTORS}
-        return {
-            "name": self.name,
-            "pass": self.pass_number,
-            "gps_time": self.gps_time,
-            "role": self.role,
-            **vectors,
-            "used": self.used,
-            "reason": self.reason,
-            "scanned": self.scanned,
-        }
+        row = vars(self) | {name: _numbers(getattr(self, name)) for name in VECTORS}
+        return {"pass" if name == "pass_number" else name: row[name] for name in row}
 
 
 @dataclass(frozen=True)
