@@ -131,9 +131,11 @@ class CorrectedSurvey(Summary):
         ValueError
             Where there is no such figure.
         """
-        from mlscorr.report.figures import draw_figure
+        from mlscorr.report.figures import correction_figures
+        from mlscorr.report.style import draw
 
-        return draw_figure(name, self.estimate.correction, self._draft, self.estimate.ties)
+        estimate = self.estimate
+        return draw(correction_figures(estimate.correction, self._draft, estimate.ties), name)
 
     def _overview(self):
         """What a notebook shows."""

@@ -212,7 +212,8 @@ class DiagnosedSurvey(Summary):
         ValueError
             Where there is no such figure, or nothing to show in it.
         """
-        from mlscorr.report.gap import diagnosis_figures, draw
+        from mlscorr.report.gap import diagnosis_figures
+        from mlscorr.report.style import draw
 
         return draw(diagnosis_figures(self.document), name)
 

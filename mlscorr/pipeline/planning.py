@@ -189,7 +189,8 @@ class PlannedSurvey(Summary):
         ValueError
             Where there is no such figure, or nothing to show in it.
         """
-        from mlscorr.report.gap import draw, plan_figures
+        from mlscorr.report.gap import plan_figures
+        from mlscorr.report.style import draw
 
         return draw(plan_figures(self.document), name)
 

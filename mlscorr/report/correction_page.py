@@ -9,9 +9,9 @@ from mlscorr.estimate import TieResiduals
 from mlscorr.report import tables
 from mlscorr.report.cloud import CloudViews, cloud_content
 from mlscorr.report.correction_report import GROUPS, CorrectionReport, ordered
-from mlscorr.report.figures import drawings
+from mlscorr.report.figures import correction_figures
 from mlscorr.report.headline import statements, statements_section
-from mlscorr.report.pages import Page, data_uri
+from mlscorr.report.pages import Page, data_uri, drawn
 from mlscorr.report.provenance import coverage, files, systems
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.target_figures import target_drawings
@@ -84,7 +84,6 @@ def write_report(
 
 def _content(survey, correction, report, ties):
     """Everything that the templates show, except of cloud and model."""
-    figures = drawings(correction, report, ties).items()
     return {
         "survey": survey,
         "report": report,
@@ -94,7 +93,7 @@ def _content(survey, correction, report, ties):
         "tie_pairs": _largest(report.ties),
         "rmse_rows": tables.rmse_rows(report),
         "statistics": tables.statistics_rows(report),
-        "figures": {name: data_uri(picture) for name, picture in figures},
+        "figures": drawn(correction_figures(correction, report, ties)),
         "groups": [(name, ordered(report.targets, name)) for name in GROUPS],
         "has_left_out": any(np.isfinite(row.left_out).all() for row in report.targets),
         "coverage": coverage(correction, report),

@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from mlscorr.report import tables
+from mlscorr.report.style import Figures, svg
 
 TEMPLATES = Path(__file__).parent / "page"  # each section is a file there
 LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib")
@@ -109,6 +110,16 @@ def show(value: object) -> str:
 def data_uri(picture: bytes, kind: str = "svg+xml") -> str:
     """A picture as the address of an image that lies in the page itself."""
     return f"data:image/{kind};base64," + base64.b64encode(picture).decode()
+
+
+def drawn(figures: Figures) -> dict[str, str]:
+    """Figures by name, each as the address of an image.
+
+    Parameters
+    ----------
+    figures : dict of functions
+    """
+    return {name: data_uri(svg(draw())) for name, draw in figures.items()}
 
 
 def versions() -> list[tuple[str, str]]:

@@ -2,7 +2,7 @@
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -60,6 +60,7 @@ STYLE: Any = {
     "svg.hashsalt": "mlscorr",
 }
 styled = matplotlib.rc_context(STYLE)  # decorator
+Figures = dict[str, Callable[[], Figure]]
 
 
 @cache
@@ -134,6 +135,24 @@ def mark_handle(marker: str, color: str, words: str, size: float | None = None) 
     return Line2D(
         [], [], linestyle="none", marker=marker, markersize=size, color=color, label=words
     )
+
+
+def draw(figures: Figures, name: str) -> Figure:
+    """The figure of a name.
+
+    Parameters
+    ----------
+    figures : dict of functions
+    name : str
+
+    Raises
+    ------
+    ValueError
+        Where there is none.
+    """
+    if name not in figures:
+        raise ValueError(f"There is no figure '{name}' here: {', '.join(figures)}.")
+    return figures[name]()
 
 
 def svg(figure: Figure) -> bytes:

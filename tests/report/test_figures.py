@@ -2,7 +2,8 @@
 
 import pytest
 
-from mlscorr.report.figures import draw_figure, drawings, write_pictures
+from mlscorr.report.figures import correction_figures, write_pictures
+from mlscorr.report.style import draw, svg
 from tests.beds.reports import drive, fabricate, page, words
 from tests.beds.tied_reports import tied_report
 
@@ -18,34 +19,36 @@ def test_pictures_are_written_as_png(tmp_path):
 def test_ties_have_a_map_of_their_own(tmp_path):
     "ties.png and the page's figure, where something was seen twice"
     _, correction, report, residuals = tied_report()
-    assert "ties" in drawings(correction, report, residuals)
+    assert "ties" in correction_figures(correction, report, residuals)
     paths = write_pictures(tmp_path, correction, report, residuals)
     assert "ties.png" in [path.name for path in paths]
 
 
 def test_the_page_has_four_figures_as_svg():
     "Position, attitude, map and residuals, each below 1 MB"
-    figures = drawings(*fabricate(drive())[1:])
+    figures = correction_figures(*fabricate(drive())[1:])
     assert list(figures) == ["correction", "attitude", "map", "residuals"]
-    assert all(b"<svg" in picture and len(picture) < 1e6 for picture in figures.values())
+    pictures = [svg(figure()) for figure in figures.values()]
+    assert all(b"<svg" in picture and len(picture) < 1e6 for picture in pictures)
 
 
 def test_a_figure_by_name_shows_itself_in_a_notebook():
     "A notebook is given a PNG; a name that is none is answered with those that are"
-    correction, report = fabricate(drive())[1:]
-    assert draw_figure("map", correction, report)._repr_png_().startswith(b"\x89PNG")
-    with pytest.raises(ValueError, match="no figure 'ties' of this correction: correction, att"):
-        draw_figure("ties", correction, report)
+    figures = correction_figures(*fabricate(drive())[1:])
+    assert draw(figures, "map")._repr_png_().startswith(b"\x89PNG")
+    with pytest.raises(ValueError, match="no figure 'ties' here: correction, att"):
+        draw(figures, "ties")
 
 
 def test_without_targets_no_figure_of_them_is_drawn():
     "No residuals and no span of control where there is none; the rest is there"
     correction, report = fabricate(drive(), count=0)[1:]
-    assert list(drawings(correction, report)) == ["correction", "attitude", "map"]
-    assert draw_figure("map", correction, report).axes[0].get_title(loc="left") == "The trajectory"
+    figures = correction_figures(correction, report)
+    assert list(figures) == ["correction", "attitude", "map"]
+    assert draw(figures, "map").axes[0].get_title(loc="left") == "The trajectory"
     spans = [
-        sum(line.get_color() == "#8a6d00" for line in draw_figure("attitude", *case).axes[0].lines)
-        for case in ((correction, report), fabricate(drive())[1:])
+        sum(line.get_color() == "#8a6d00" for line in draw(case, "attitude").axes[0].lines)
+        for case in (figures, correction_figures(*fabricate(drive())[1:]))
     ]
     assert spans == [0, 2]
 

@@ -1,9 +1,6 @@
 """The figures of a diagnosis and of a plan by name: those that have something to show."""
 
-from collections.abc import Callable
 from functools import partial
-
-from matplotlib.figure import Figure
 
 from mlscorr.effects.wording import known
 from mlscorr.report.gap.accuracy import accuracy_figure
@@ -15,8 +12,7 @@ from mlscorr.report.gap.separability import detectable_figure, heat_figure
 from mlscorr.report.gap.shrinking import is_closed
 from mlscorr.report.gap.site_map import site_map
 from mlscorr.report.gap.splits import closure_figure, where_figure
-
-Figures = dict[str, Callable[[], Figure]]
+from mlscorr.report.style import Figures
 
 
 def diagnosis_figures(document: dict) -> Figures:
@@ -55,24 +51,6 @@ def plan_figures(document: dict) -> Figures:
     if document["map"]["trajectory"]:
         figures["map"] = partial(site_map, document)
     return figures | _separability(document)
-
-
-def draw(figures: Figures, name: str) -> Figure:
-    """The figure of a name.
-
-    Parameters
-    ----------
-    figures : dict of functions
-    name : str
-
-    Raises
-    ------
-    ValueError
-        Where there is none.
-    """
-    if name not in figures:
-        raise ValueError(f"There is no figure '{name}' here: {', '.join(figures)}.")
-    return figures[name]()
 
 
 def _separability(document):

@@ -20,8 +20,7 @@ from mlscorr.report.gap.verdict import (
     smallest,
     verdict,
 )
-from mlscorr.report.pages import Page, data_uri
-from mlscorr.report.style import svg
+from mlscorr.report.pages import Page, drawn
 
 SECTIONS = {  # in their order; one without anything to show is left out
     "where": "Where it shows",
@@ -63,7 +62,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
     answer, detectable = document["verdict"], separability["detectable"]
     is_clean = is_judged(document) and family(answer["label"]) == "none"
     probable, unlikely = _by_probability(rows.cause_rows(document))
-    figures = _drawn(diagnosis_figures(document))
+    figures = drawn(diagnosis_figures(document))
     is_empty = {key: key not in figures for key in ("where", "innovations", "evidence", "map")}
     is_empty["separability"] = not separability["correlation"]["names"]
     is_empty |= {"closure": not is_judged(document), "causes": not document["causes"]}
@@ -112,7 +111,7 @@ def plan_page(document: dict, name: str) -> Page:
     """
     detectable = rows.detectable_rows(document["detectable"])
     worst = rows.worst_rows(detectable)
-    figures = _drawn(plan_figures(document))
+    figures = drawn(plan_figures(document))
     is_empty = {key: key not in figures for key in ("map", "accuracy")}
     is_empty["left"] = not document.get("left_out")
     content = {
@@ -147,11 +146,6 @@ def _page(document, name, headline, summary, sections, separability, content):
     if document.get("created"):
         common["written"] = document["created"]
     return Page(headline, summary, sections, common | content, "gap-", ("gap.css",))
-
-
-def _drawn(figures):
-    """Figures by name, each as the address of an image."""
-    return {name: data_uri(svg(draw())) for name, draw in figures.items()}
 
 
 def _channels(document):
