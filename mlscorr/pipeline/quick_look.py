@@ -125,8 +125,6 @@ def _spans(survey):
 def _find(survey, windows) -> tuple[Matched, Candidates, NearPoints]:
     """The surveyed points that are found in what was read."""
     targets, candidates, near = fit_while_reading(survey, lambda file: iter(windows[file]))
-    if not targets:
-        return Matched.none(), candidates, near
     matches = match_targets(targets, candidates, survey).matches
     return Matched.by_name(matches.matched, survey.control), candidates, near
 
