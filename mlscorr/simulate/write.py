@@ -26,10 +26,7 @@ NOTHING_MET = "No pulse of {} met anything: look at drive, scene, max_range and 
 
 
 def write_survey(
-    survey: SimulatedSurvey,
-    folder: Path | str,
-    progress: Callable | None = None,
-    overwrite: bool = True,
+    survey: SimulatedSurvey, folder: Path | str, progress: Callable | None, overwrite: bool
 ) -> None:
     """Write a SimulatedSurvey, whole or not at all; see SimulatedSurvey.write.
 
@@ -37,7 +34,7 @@ def write_survey(
     ----------
     survey : SimulatedSurvey
     folder : path
-    progress : function, optional
+    progress : function or None
         As of SimulatedSurvey.write.
     overwrite : bool
         Whether files of the same name are replaced.
@@ -190,11 +187,6 @@ def _scanner_sections(survey):
 
 def _pos_sigmas(trajectory):
     """Median sigma of position (m) and of roll, pitch, heading (deg) that the POS reports."""
-    if trajectory.position_sigma is None or trajectory.attitude_sigma is None:
-        nominal = Pos()
-        return nominal.position_sigma, [
-            _short(sigma) for sigma in np.degrees(nominal.attitude_sigma)
-        ]
     attitude = np.degrees(np.median(trajectory.attitude_sigma, axis=0))
     return _short(np.median(trajectory.position_sigma)), [_short(sigma) for sigma in attitude]
 
