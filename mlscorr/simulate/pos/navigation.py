@@ -59,8 +59,6 @@ class Navigation:
         Of the error state from epoch to epoch.
     filtered, predicted : StateEstimate
         Of that error state.
-    fix_time : (k,) array
-        Units: s.
     fixes : Fixes
     """
 
@@ -70,7 +68,6 @@ class Navigation:
     transition: np.ndarray
     filtered: StateEstimate
     predicted: StateEstimate
-    fix_time: np.ndarray
     fixes: Fixes
 
     @cached_property
@@ -142,7 +139,7 @@ def navigate(
     at_fixes = _measurements(error[::every, POSITION], fixes, fix_scale, wheels)
     measurements = dict(zip(range(0, len(error), every), at_fixes, strict=True))
     filtered, predicted = kalman_filter(transition, noise, start_sigma(imu) ** 2, measurements)
-    return Navigation(gps_time, attitude, error, transition, filtered, predicted, fix_time, fixes)
+    return Navigation(gps_time, attitude, error, transition, filtered, predicted, fixes)
 
 
 def _measurements(position_error, fixes, fix_scale, wheels) -> Iterator[list[Measurement]]:
@@ -191,17 +188,10 @@ def angle_errors(
     covariance : (n, 3, 3) array
         Of the turn. Units: rad^2.
     """
-    _, pitch, heading = angles_from_attitude(attitude)
-    zero, unit = np.zeros_like(pitch), np.ones_like(pitch)
-    about = np.stack(
-        [
-            np.stack([np.sin(heading), np.cos(heading), np.tan(pitch)], -1)
-            * np.cos(pitch)[:, None],
-            np.stack([np.cos(heading), -np.sin(heading), zero], -1),
-            np.stack([zero, zero, -unit], -1),
-        ],
-        axis=-1,
-    )
+    heading = angles_from_attitude(attitude)[2]
+    right = np.column_stack([np.cos(heading), -np.sin(heading), np.zeros_like(heading)])
+    down = np.broadcast_to([0.0, 0.0, -1.0], right.shape)
+    about = np.stack([attitude.apply([0.0, 1.0, 0.0]), right, down], axis=-1)
     inverse = np.linalg.inv(about)
     variance = np.einsum("nij,njk,nik->ni", inverse, covariance, inverse)
     return np.einsum("nij,nj->ni", inverse, turn), np.sqrt(variance)
