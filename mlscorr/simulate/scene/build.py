@@ -7,6 +7,7 @@ import numpy as np
 from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
+from mlscorr.frames import angles_from_attitude, from_polar
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.mesh import MeshSite
@@ -98,20 +99,10 @@ def sky_elevation(scene: Scene, trajectory: Trajectory, origin: np.ndarray) -> n
     start, end = trajectory.gps_time[[0, -1]]
     times = np.linspace(start, end, max(2, round((end - start) * rate)))
     pose = trajectory.at(times)
-    forward = pose.attitude.apply([0.0, 1.0, 0.0])
-    heading = np.arctan2(forward[:, 0], forward[:, 1])
+    heading = angles_from_attitude(pose.attitude)[2]
     azimuth = heading[:, None, None] + np.array([-np.pi / 2, np.pi / 2])[:, None] + fan
-    shape = (*azimuth.shape, len(elevation))
-    level = np.cos(elevation)
-    azimuth = azimuth[..., None]
-    direction = np.stack(
-        [
-            np.sin(azimuth) * level,
-            np.cos(azimuth) * level,
-            np.broadcast_to(np.sin(elevation), shape),
-        ],
-        axis=-1,
-    )
+    grid = np.broadcast_arrays(1.0, np.pi / 2 - azimuth[..., None], elevation)
+    direction = from_polar(*map(np.ravel, grid)).reshape(*grid[0].shape, 3)
     eye = np.broadcast_to((pose.position - origin)[:, None, None, None], direction.shape)
     rays = np.concatenate([eye, direction], axis=-1).astype(np.float32)
     hit = np.isfinite(scene.mesh.caster.cast_rays(rays)["t_hit"].numpy())
