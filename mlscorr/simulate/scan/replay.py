@@ -123,14 +123,9 @@ class Replay:
         streams = {name: deepcopy(streams[name]) for name in used}
         return apply_effects(self.effects, stage, value, self.reference, streams)
 
-    def _has(self, stage):
-        return any(effect.stage == stage for effect in self.effects)
-
     @cached_property
     def _time(self):
         """True times (n,), held within the pass."""
-        if not self._has("clock"):
-            return self.pulses.gps_time
         trajectory, recorded = self.survey.trajectory, self.pulses.gps_time
         starts, ends = trajectory.passes.T
         number = trajectory.segment(recorded)
@@ -139,7 +134,7 @@ class Replay:
     @cached_property
     def _angle(self):
         """Angles (n,) as measured, with noise. Units: rad."""
-        return self._undone("angle", "angle") if self._has("angle") else self.pulses.angle
+        return self._undone("angle", "angle")
 
     def _undone(self, stage, name):
         """A field of the pulses without the effects of a stage."""
