@@ -42,8 +42,6 @@ def disturb(shots: Shots, effects: tuple, reference: Reference, streams: tuple) 
     def after(stage):
         name = CHANGES[stage]
         values = getattr(apply_effects(effects, stage, first, reference, streams[0]), name)
-        if len(later) == 0:
-            return values
         more = values[shots.pulse]
         if stage not in ON_PULSES:
             more = getattr(apply_effects(effects, stage, later, reference, streams[1]), name)

@@ -65,10 +65,8 @@ class ScannerNoise:
 
     def _of(self, source, more=0):
         """Numbers for the first echoes of all pulses, and for some later ones."""
-        first = self._first[source].result()
-        if more:
-            return np.append(first, DRAWS[source](self._later[source], more, self._size[source]))
-        return first
+        later = DRAWS[source](self._later[source], more, self._size[source])
+        return np.append(self._first[source].result(), later)
 
     def angle(self, angle: np.ndarray) -> np.ndarray:
         """Angles (n,) as measured. Units: rad.
