@@ -87,7 +87,7 @@ def _about(places, radius):
     low, high = (
         np.floor((places[:, :2] + s * radius) / SETTINGS.plan_cell).astype(int) for s in (-1, 1)
     )
-    cells = [np.empty(0, np.int64)]
+    cells = [[np.iinfo(np.int64).max]]  # is no cell, and ends any search
     for first, last in zip(low, high, strict=True):
         columns, rows = (np.arange(a, b + 1) for a, b in zip(first, last, strict=True))
         cells.append(_number(*np.meshgrid(columns, rows)).ravel())
@@ -101,7 +101,5 @@ def _number(column, row):
 
 def _is_near(chunk, cells):
     """Which points lie in the cells (sorted)."""
-    if len(cells) == 0:
-        return np.zeros(len(chunk), bool)
     number = _number(*np.floor(chunk.xyz[:, :2] / SETTINGS.plan_cell).astype(np.int64).T)
-    return cells[np.minimum(np.searchsorted(cells, number), len(cells) - 1)] == number
+    return cells[np.searchsorted(cells, number)] == number
