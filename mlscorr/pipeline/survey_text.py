@@ -98,8 +98,7 @@ class SurveyText:
         for section in self.entries:  # said of each entry
             self.given = {k: v for k, v in self.given.items() if not k.startswith(f"{section}.")}
         for dotted in list(self.given):
-            section, _, key = dotted.rpartition(".") if dotted.count(".") < 2 else (
-                dotted.split(".")[0], "", dotted.split(".", 1)[1])  # fmt: skip
+            section, _, key = dotted.partition(".") if "." in dotted else ("", "", dotted)
             self.put(section, key, self.given[dotted], "")
         parts = [HEAD, *self.lines.pop("")]
         for section, lines in self.lines.items():

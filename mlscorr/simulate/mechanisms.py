@@ -206,8 +206,7 @@ def _covariate(name, points):
         body = pose.attitude.inv().apply(points.xyz - pose.position)
         return body[:, 0] / 15.0 if name == "side" else body[:, 2] / 5.0
     if name == "heading":
-        forward = pose.attitude.apply([0.0, 1.0, 0.0])
-        return forward[:, 0]  # the same for angles a turn apart
+        return pose.attitude.apply([0.0, 1.0, 0.0])[:, 0]  # the same for angles a turn apart
     if name == "elapsed":
         return _spread(points.gps_time, trajectory.gps_time)
     if name == "elapsed in the pass":
