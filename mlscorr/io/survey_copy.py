@@ -104,7 +104,7 @@ def _listed(section):
 
 def _set_mounting(section, mounting, note):
     """Lever arm and boresight, and how well they are known."""
-    values = dict(zip(("lever_arm", "boresight"), mounting_values(mounting), strict=True))
+    values = mounting_values(mounting)
     if mounting.covariance is None:  # a calibration's sigmas hold together, measured ones apart
         is_calibrated = section.pop("correlation", None) is not None
         for key in [key for key in values if is_calibrated or values[key] != section[key]]:
@@ -131,8 +131,8 @@ def _set_covariance(section, covariance):
     return first
 
 
-def mounting_values(mounting: Mounting) -> tuple[list[float], list[float]]:
-    """Lever arm and boresight as survey.toml has them, to 0.01 mm and 1e-6 deg.
+def mounting_values(mounting: Mounting) -> dict[str, list[float]]:
+    """``lever_arm`` and ``boresight`` as survey.toml has them, to 0.01 mm and 1e-6 deg.
 
     Parameters
     ----------
@@ -140,15 +140,13 @@ def mounting_values(mounting: Mounting) -> tuple[list[float], list[float]]:
 
     Returns
     -------
-    lever_arm : list of three float
-        Units: m.
-    boresight : list of three float
-        Units: deg.
+    dict of lists of three float
+        Units: m, deg.
     """
     with warnings.catch_warnings(action="ignore"):  # of angles that are not unique: any will do
         boresight = mounting.boresight.as_euler("xyz", degrees=True)
-    lever_arm = np.round(mounting.lever_arm, 5) + 0.0
-    return lever_arm.tolist(), (np.round(boresight, 6) + 0.0).tolist()
+    rounded = np.round(mounting.lever_arm, 5) + 0.0, np.round(boresight, 6) + 0.0
+    return dict(zip(("lever_arm", "boresight"), map(np.ndarray.tolist, rounded), strict=True))
 
 
 def _way(old, new):

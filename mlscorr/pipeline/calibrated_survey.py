@@ -184,8 +184,8 @@ class CalibratedSurvey(CalibrationResult):
         content = {
             "name": self.survey.name,
             "mounting": {
-                "recorded": _mounting(self.survey.mounting),
-                "calibrated": _mounting(calibration.lsc.mounting),
+                "recorded": mounting_values(self.survey.mounting),
+                "calibrated": mounting_values(calibration.lsc.mounting),
             },
             **{method: self._method(method) for method in ("lsc", "ls")},
             "determined": calibration.determined.tolist(),
@@ -247,10 +247,6 @@ def estimate_section(correction: np.ndarray, sigma: np.ndarray) -> dict[str, obj
         "lever_arm": {name: value[:3].tolist() for name, value in values.items()},
         "boresight": {name: np.degrees(value[3:]).tolist() for name, value in values.items()},
     }
-
-
-def _mounting(mounting):
-    return dict(zip(("lever_arm", "boresight"), mounting_values(mounting), strict=True))
 
 
 def _scanner_errors(errors):

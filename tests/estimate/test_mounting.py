@@ -617,6 +617,6 @@ def test_a_beam_along_the_vehicle_keeps_its_turn():
     "At b = 90 deg many angles are one rotation: those that are written are it, without a warning"
     boresight = Rotation.from_euler("xyz", [0.0, -90.0, 30.0], degrees=True)
     with warnings.catch_warnings(action="error"):
-        angles = mounting_values(replace(RECORDED, boresight=boresight))[1]
+        angles = mounting_values(replace(RECORDED, boresight=boresight))["boresight"]
     turn = Rotation.from_euler("xyz", angles, degrees=True) * boresight.inv()
     assert turn.magnitude() < 1e-8
