@@ -97,10 +97,7 @@ def _round_document(number, diagnosed):
 
 
 def diagnose_until_none(
-    survey: Survey,
-    simulator: Simulator | None = None,
-    progress: Callable | None = None,
-    costs: Costs | None = None,
+    survey: Survey, simulator: Simulator | None, progress: Callable | None, costs: Costs | None
 ) -> DiagnosedRounds:
     """Diagnose, put what was named into the simulator, and again, until nothing is left.
 

@@ -38,10 +38,7 @@ NOTHING_CALIBRATES = (
 
 
 def estimate_site(
-    survey: Survey,
-    ties: bool,
-    rng: np.random.Generator | None = None,
-    progress: Callable | None = None,
+    survey: Survey, ties: bool, rng: np.random.Generator | None, progress: Callable | None
 ) -> tuple[Matched, Matched, Finding, Calibration]:
     """Read a survey's clouds once, and calibrate all its scanners together by what is in them.
 
