@@ -100,7 +100,8 @@ def read_control(
             warnings.warn(doubt, stacklevel=2)
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
-    refuse(path, [fault for row in rows for fault in row_faults(path, row)])
+    points = [(f"{shown(row['name'])} of {path}", row) for row in rows]
+    refuse(path, [(who, fault) for who, row in points for fault in row_faults(row)])
     for doubt in row_doubts(path, rows):
         warnings.warn(doubt, stacklevel=2)
     control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)

@@ -74,48 +74,38 @@ def doubled_names(path: str | Path, rows: Sequence[dict[str, Any]]) -> Iterator[
         yield path, f"names {names} more than once; every point needs a name of its own."
 
 
-def row_faults(path: str | Path, row: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Pairs (point, what is wrong) of each value of a row that can't be meant.
+def row_faults(row: dict[str, Any]) -> Iterator[str]:
+    """What is wrong with each value of a point's row that can't be meant.
 
     Parameters
     ----------
-    path : path
     row : dict
     """
-    who, (smallest, largest) = f"{shown(row['name'])} of {path}", SETTINGS.target_size
+    smallest, largest = SETTINGS.target_size
     for key, words in WORDS.items():
         if row[key] not in words:
             near = nearest(row[key], words) if key == "kind" else None  # words of roles are alike
             yield (
-                who,
-                (
-                    f"has the unknown {key} '{shown(row[key])}'; known are {_known(words)}."
-                    f"{f' Is {near} meant?' if near else ''}{AMBIGUOUS.get(row[key], '')}"
-                ),
+                f"has the unknown {key} '{shown(row[key])}'; known are {_known(words)}."
+                f"{f' Is {near} meant?' if near else ''}{AMBIGUOUS.get(row[key], '')}"
             )
     if not smallest <= row["size"] <= largest:
         yield (
-            who,
-            (
-                f"has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
-                f"{_likely_unit(row['size'])}"
-            ),
+            f"has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
+            f"{_likely_unit(row['size'])}"
         )
     for key in AXES:
         if abs(row[key]) > SETTINGS.largest_coordinate:
             yield (
-                who,
-                (
-                    f"has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
-                    "no map reaches that far (millimetres?)."
-                ),
+                f"has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
+                "no map reaches that far (millimetres?)."
             )
     for key in SIGMAS:
         if row[key] <= 0:
-            yield who, f"has the {key} {row[key]:g} m; it must be greater than zero."
+            yield f"has the {key} {row[key]:g} m; it must be greater than zero."
     normal = [row.get(name, np.nan) for name in NORMAL]
     if np.isfinite(normal).any() and not (np.isfinite(normal).all() and np.any(normal)):
-        yield who, f"has the normal {normal}; give three numbers, not all zero, or none."
+        yield f"has the normal {normal}; give three numbers, not all zero, or none."
 
 
 def row_doubts(path: str | Path, rows: Sequence[dict[str, Any]]) -> Iterator[str]:
