@@ -161,13 +161,7 @@ class Survey(Summary):
         The survey itself, without a name, where there is one scanner.
         """
         parts = {
-            mounted.name: replace(
-                self,
-                clouds=mounted.clouds,
-                mounting=mounted.mounting,
-                scanner=mounted.scanner,
-                scanners=(),
-            )
+            mounted.name: replace(self, **vars(mounted) | {"name": self.name, "scanners": ()})
             for mounted in self.scanners
         }
         return parts or {"": self}
