@@ -132,8 +132,8 @@ class Survey(Summary):
 
     def _overview(self):
         """What a notebook shows."""
-        start, end = self.trajectory.gps_time[[0, -1]]
-        passes = len(self.trajectory.gaps) + 1
+        (start, end), gaps = self.trajectory.gps_time[[0, -1]], len(self.trajectory.gaps)
+        driven = f"{len(self.trajectory)} epochs, {start:.1f} to {end:.1f} s, gaps {gaps}"
         mounted = ", ".join(scanner.name for scanner in self.scanners) or (
             "not given" if self.mounting is None else "given"
         )
@@ -141,10 +141,7 @@ class Survey(Summary):
             ("name", self.name),
             ("coordinates", self.crs or "not stated"),
             ("clouds", f"{counted(len(self.cloud_paths), 'file')}, {self.points} points"),
-            (
-                "trajectory",
-                f"{len(self.trajectory)} epochs, {start:.1f} to {end:.1f} s, gaps {passes - 1}",
-            ),
+            ("trajectory", driven),
             ("surveyed", f"{len(self.control)} control and {len(self.check)} check points"),
             ("mounting", mounted),
         ]
