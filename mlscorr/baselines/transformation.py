@@ -7,6 +7,7 @@ origin. Passes and times are not told apart, which is what these methods lack.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mlscorr.baselines.pairs import CentredPairs, Undetermined
 from mlscorr.survey import Matched, PointCloud
@@ -93,9 +94,7 @@ def fit_horizontal_and_height(matched: Matched) -> Transformation:
 
 
 def fit_rigid(matched: Matched) -> Transformation:
-    """Rigid motion: 6 parameters (Helmert without scale), by the singular value decomposition.
-
-    Source: Arun, Huang and Blostein 1987, IEEE Trans. PAMI 9, 698-700, with Kabsch's sign.
+    """Rigid motion: 6 parameters (Helmert without scale), its turn by Kabsch's algorithm.
 
     Parameters
     ----------
@@ -109,9 +108,8 @@ def fit_rigid(matched: Matched) -> Transformation:
     pairs = CentredPairs.of(matched)
     pairs.require(2, 3, "The 6 parameters of a rigid motion")
     surveyed = pairs.observed + pairs.misclosure - pairs.mean
-    left, _, right = np.linalg.svd((pairs.weight * pairs.observed).T @ surveyed)
-    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    return Transformation(pairs.origin, pairs.mean, right.T @ sign @ left.T - np.eye(3))
+    turn, _ = Rotation.align_vectors(surveyed, pairs.observed, pairs.weight[:, 0])
+    return Transformation(pairs.origin, pairs.mean, turn.as_matrix() - np.eye(3))
 
 
 def fit_affine(matched: Matched) -> Transformation:
