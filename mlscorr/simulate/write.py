@@ -145,7 +145,8 @@ def _control_csv(survey):
 def _survey_toml(survey):
     """survey.toml, with the recorded mountings and what is believed of scanners and POS."""
     scenario = survey.scenario
-    position, attitude = _pos_sigmas(survey.trajectory)
+    trajectory = survey.trajectory
+    attitude = np.degrees(np.median(trajectory.attitude_sigma, axis=0))
     sections = {
         "name": scenario.name,
         "crs": scenario.crs,
@@ -154,8 +155,8 @@ def _survey_toml(survey):
         **_scanner_sections(survey),
         "control": {"file": "control.csv"},
         "pos": {
-            "position_sigma": position,
-            "attitude_sigma": attitude,
+            "position_sigma": _short(np.median(trajectory.position_sigma)),
+            "attitude_sigma": [_short(sigma) for sigma in attitude],
             "correlation_time": Pos.correlation_time,
         },
     }
@@ -183,12 +184,6 @@ def _scanner_sections(survey):
             )
         ]
     }
-
-
-def _pos_sigmas(trajectory):
-    """Median sigma of position (m) and of roll, pitch, heading (deg) that the POS reports."""
-    attitude = np.degrees(np.median(trajectory.attitude_sigma, axis=0))
-    return _short(np.median(trajectory.position_sigma)), [_short(sigma) for sigma in attitude]
 
 
 def _short(number):
