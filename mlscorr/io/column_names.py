@@ -200,14 +200,11 @@ def find_meanings(
     meanings = {}
     for name, others in names.items():
         column = (chosen or {}).get(name)
+        among, wanted = known, others.split()
         if column is not None:
-            positions = [
-                i for i, cell in enumerate(exact) if cell == str(column).strip().casefold()
-            ]
+            among, wanted = exact, [str(column).strip().casefold()]
         elif plain(name) in known:
-            positions = [i for i, cell in enumerate(known) if cell == plain(name)]
-        else:
-            positions = [i for i, cell in enumerate(known) if cell and cell in others.split()]
-        if positions:
+            wanted = [plain(name)]
+        if positions := [i for i, cell in enumerate(among) if cell and cell in wanted]:
             meanings[name] = positions
     return meanings
