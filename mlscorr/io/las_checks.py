@@ -233,19 +233,10 @@ def _check_tail(layout, file, points_end):
         raise ValueError(
             _cut_off(path, f"data behind the points should be at byte {layout.tail} of {size}")
         )
-    if layout.version < (1, 4):
-        return
-    position, count = layout.field("QI", 235)
-    for number in range(count):
-        header = b""
-        if position + EVLR_HEADER.size <= size:
-            file.seek(position)
-            header = file.read(EVLR_HEADER.size)
-        position += EVLR_HEADER.size + int.from_bytes(header[20:28], "little")
-        if position > size:
-            raise ValueError(
-                _cut_off(path, f"{number} of its {count} EVLRs fit into its {size} bytes")
-            )
+    for number, (position, length) in enumerate(evlrs(layout, file)):
+        if position + length > size:
+            announced = f"{number} of its {layout.field('I', 243)[0]} EVLRs"
+            raise ValueError(_cut_off(path, f"{announced} fit into its {size} bytes"))
 
 
 def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
@@ -258,8 +249,9 @@ def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
     """
     position, count = layout.field("QI", 235) if layout.version >= (1, 4) else (0, 0)
     for _ in range(count):
-        file.seek(position)
-        size = EVLR_HEADER.size + EVLR_HEADER.unpack(file.read(EVLR_HEADER.size))[2]
+        file.seek(min(position, layout.size))  # of a damaged file it may lie anywhere
+        header = file.read(EVLR_HEADER.size)
+        size = EVLR_HEADER.size + int.from_bytes(header[20:28], "little")
         yield position, size
         position += size
 
