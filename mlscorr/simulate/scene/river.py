@@ -132,10 +132,8 @@ class River:
 
     def _kind_at(self, s, margin):
         """Kind of the reach that holds s with a margin (m) to both sides, or None."""
-        for stretch in self.stretches:
-            if stretch.start + margin < s < stretch.end - margin:
-                return stretch.kind
-        return None
+        holding = (r.kind for r in self.stretches if r.start + margin < s < r.end - margin)
+        return next(holding, None)
 
     def spot(
         self, s: float, side: int, support: str, half: float, rng: Generator
@@ -177,10 +175,8 @@ class River:
     def _on_house(self, s, half, rng):
         """On a house front, 2 cm before it."""
         margin = half + 0.4
-        for row in self.houses:
-            if row[0] + margin < s < row[1] - margin:
-                break
-        else:
+        row = next((row for row in self.houses if row[0] + margin < s < row[1] - margin), None)
+        if row is None:
             return None
         near, far = self._front(row)
         u = -unit(far - near)

@@ -173,10 +173,9 @@ class Street:
     def _on_wall(self, s, side, half, rng):
         """On a house front, 2 cm before it; None where no front reaches far enough."""
         margin = half + 0.4
-        for front in self.houses:
-            if front.side == side and front.start + margin < s < front.end - margin:
-                break
-        else:
+        fronts = (front for front in self.houses if front.side == side)
+        front = next((f for f in fronts if f.start + margin < s < f.end - margin), None)
+        if front is None:
             return None
         u = (front.far - front.near) * [1.0, 1.0, 0.0]
         u *= -side / np.linalg.norm(u)  # so that u x UP points to the street
