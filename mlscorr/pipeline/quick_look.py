@@ -114,9 +114,8 @@ def _spans(survey):
     for centre in survey.control.position[:, :2]:
         apart = np.hypot(*(trajectory.position[:, :2] - centre).T)
         inside |= apart <= np.hypot(apart.min(), SETTINGS.looked_length)
-    inside &= np.isin(trajectory.segment(trajectory.gps_time), -1, invert=True)
-    part = np.cumsum(np.diff(trajectory.segment(trajectory.gps_time), prepend=0) != 0)
-    edge = np.diff(np.where(inside, part + 1, 0), prepend=0, append=0) != 0
+    number = np.where(inside, trajectory.segment(trajectory.gps_time) + 1, 0)
+    edge = np.diff(number, prepend=0, append=0) != 0
     starts = np.flatnonzero(edge[:-1] & inside)
     ends = np.flatnonzero(edge[1:] & inside)
     return np.column_stack([trajectory.gps_time[starts], trajectory.gps_time[ends]])
