@@ -38,15 +38,12 @@ def write_comparison(path: str | Path, document: dict) -> None:
     """
     ranked, by = ranking(document), document["scored_by"]
     absent = undetermined(document)
-    few_checked = by == "cross_validated" and bool(document["check_points"])
     there = {
-        "scores": bool(ranked),
-        "check": bool(ranked) and few_checked,
+        "check": by == "cross_validated" and bool(document["check_points"]),
         "absent": bool(absent),
-        "figure": bool(ranked),
         "unseen": bool(document["unseen"]),
     }
-    figures = {"comparison": data_uri(style.svg(comparison_figure(document)))} if ranked else {}
+    figures = {"comparison": data_uri(style.svg(comparison_figure(document)))}
     content = {
         "document": document,
         "by": by,

@@ -42,8 +42,7 @@ def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[s
 def _best(document):
     """Which method corrects best; the whole of the verdict."""
     first, *more = verdict(document)
-    ranked = ranking(document)
-    is_tested = document["scored_by"] != "control" and ranked and ranked[0]["name"] != "raw"
+    is_tested = document["scored_by"] != "control" and ranking(document)[0]["name"] != "raw"
     items = tuple(("", sentence) for sentence in more)
     return headline.Statement("Result", "green" if is_tested else "amber", first, items)
 
@@ -125,8 +124,6 @@ def verdict(document: dict) -> list[str]:
         The content of compare.json.
     """
     ranked, by = ranking(document), document["scored_by"]
-    if not ranked:
-        return ["No point was found that could score the methods."]
     value = {row["name"]: row[by]["rmse_3d"] for row in ranked}
     best = ranked[0]["name"]
     tied = [name for name in value if value[name] - value[best] < SETTINGS.difference]
