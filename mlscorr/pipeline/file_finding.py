@@ -102,16 +102,11 @@ def join_findings(survey: Survey, files: Sequence[FileFinding]) -> tuple[Finding
         finding = match_targets(targets, candidates, survey)
     else:
         finding = unmatched(targets, candidates)
-    parts = [
-        replace(
-            file.features,
-            pass_number=np.array(
-                [passes[number, segment] for segment in file.features.pass_number.tolist()], int
-            ),
-            scanner=np.full(len(file.features), survey.scanner_numbers[number]),
-        )
-        for number, file in enumerate(files)
-    ]
+    parts = []
+    for number, file in enumerate(files):
+        own = [passes[number, segment] for segment in file.features.pass_number.tolist()]
+        scanner = np.full(len(own), survey.scanner_numbers[number])
+        parts.append(replace(file.features, pass_number=np.array(own, int), scanner=scanner))
     finding = replace(
         finding,
         scanned=frozenset().union(*(file.scanned for file in files)),
