@@ -45,7 +45,7 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
     }
 
 
-def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[str, float] | None:
+def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[str, float]:
     """3D sigma of a trajectory's position in m: ``median``, ``largest``, and the latter's ``time``.
 
     Of the epochs with points of the clouds.
@@ -57,8 +57,6 @@ def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[
     survey : Survey, optional
         As recorded: then ``stated``, the median by its POS, stands beside them.
     """
-    if trajectory.position_sigma is None:
-        return None
     scanned = trajectory.scanned_rows
     sigma = np.linalg.norm(trajectory.position_sigma[scanned], axis=1)
     time = float(trajectory.gps_time[scanned[sigma.argmax()]])

@@ -101,7 +101,6 @@ def _content(survey, correction, report, ties):
         "notes": list(dict.fromkeys([*survey.notes, *report.notes])),
         "files": files(report),
         "zero_time": f"{np.floor(correction.recorded.gps_time[0]):.0f}",
-        "has_sigma": correction.corrected.position_sigma is not None,
     }
 
 

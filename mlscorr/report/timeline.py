@@ -50,14 +50,13 @@ def attitude_figure(correction: Correction, report: CorrectionReport) -> Figure:
     correction : Correction
     report : CorrectionReport
     """
-    sigma = correction.corrected.attitude_sigma
-    sigma = None if sigma is None else np.degrees(sigma)
+    sigma = np.degrees(correction.corrected.attitude_sigma)
     words = "roll, pitch and heading", ("Roll (deg)", "Pitch (deg)", "Heading (deg)")
     return _figure(4.4, correction, report, attitude_change(correction), sigma, [], words)
 
 
 def _figure(height, correction, report, change, sigma, rows, words):
-    """Curves (n, 3) with sigma (n, 3) or None, over them the marks of rows of targets.
+    """Curves (n, 3) with sigma (n, 3), over them the marks of rows of targets.
 
     Words name what is corrected, and its three parts.
     """
@@ -66,16 +65,14 @@ def _figure(height, correction, report, change, sigma, rows, words):
     span = report.coverage.control_span
     for axis, panel in enumerate(panels):
         panel.set_ylabel(words[1][axis])
-        values = _curve(
-            panel, new, change[:, axis], None if sigma is None else sigma[:, axis], span
-        )
+        values = _curve(panel, new, change[:, axis], sigma[:, axis], span)
         for group in ("control", "check"):
             values += _marks(panel, new, [row for row in rows if row.group == group], axis, group)
         _set_range(panel, values, change[:, axis])
         _unused(panel, new, [row for row in rows if row.group == "unused"], axis)
     panels[0].set_title(f"Correction of {words[0]}: corrected − recorded")
     _shade(panels, new, span if report.control.n else (), report.support)
-    handles = _legend(new, {row.group for row in rows}, report.support, sigma is not None)
+    handles = _legend(new, {row.group for row in rows}, report.support)
     style.legend_above(figure, handles, columns=2)
     return figure
 
@@ -88,14 +85,12 @@ def _start(trajectory):
 def _curve(panel, trajectory, change, sigma, span):
     """Draw a curve with its 1-sigma band; returns the values that the axis must show."""
     time, gaps = trajectory.gps_time, trajectory.gaps
-    band = np.zeros_like(change) if sigma is None else sigma
-    curves = np.column_stack([change - band, change, change + band])
+    curves = np.column_stack([change - sigma, change, change + sigma])
     rows = style.thin(curves, time, gaps)
     at, broken = style.break_at_gaps(time[rows], gaps, curves[rows])
     at = at - _start(trajectory)
     panel.axhline(0.0, color=style.GREY, linewidth=0.8)
-    if sigma is not None:
-        panel.fill_between(at, broken[:, 0], broken[:, 2], **style.BAND)
+    panel.fill_between(at, broken[:, 0], broken[:, 2], **style.BAND)
     panel.plot(at, broken[:, 1], color=style.BLUE)
     inside = (time >= span[0]) & (time <= span[1])
     inside |= not inside.any()
@@ -149,11 +144,10 @@ def _shade(panels, trajectory, span, support):
     panels[-1].set_xlabel(f"Time since gps_time {start:.0f} s (s)")
 
 
-def _legend(trajectory, groups, support, has_sigma):
+def _legend(trajectory, groups, support):
     """Legend entries of what is really drawn."""
     handles = [Line2D([], [], color=style.BLUE, label="Correction")]
-    if has_sigma:
-        handles.append(Patch(**style.BAND, label="1 sigma of the corrected value"))
+    handles.append(Patch(**style.BAND, label="1 sigma of the corrected value"))
     handles += style.mark_handles(WORDS, groups)
     if support.weak:
         handles.append(Patch(**style.OUTSIDE, label="Extrapolated: no control point holds it"))

@@ -38,7 +38,7 @@ def drive(seconds=60.0, rate=50.0, gap=None):
     return Trajectory(START + since, position, attitude)
 
 
-def corrected(trajectory, sigma=True):
+def corrected(trajectory):
     "A drift of decimetres removed, with its sigma after the estimate"
     since = (trajectory.gps_time - START)[:, None]
     shift = [0.7, 0.2, 0.25] * np.sin(since / [25.0, 40.0, 60.0])
@@ -48,15 +48,15 @@ def corrected(trajectory, sigma=True):
         trajectory.gps_time,
         trajectory.position + shift,
         small * trajectory.attitude,
-        0.02 * ones * (1 + np.abs(np.sin(since / 10.0))) if sigma else None,
-        np.radians(0.004) * ones if sigma else None,
+        0.02 * ones * (1 + np.abs(np.sin(since / 10.0))),
+        np.radians(0.004) * ones,
     )
 
 
-def fabricate(trajectory, count=8, checks=True, sigma=True, rng=None, names=None):
+def fabricate(trajectory, count=8, checks=True, rng=None, names=None):
     "A survey, its correction and a report.json, with made-up residuals"
     rng = rng or np.random.default_rng(1)
-    new = corrected(trajectory, sigma)
+    new = corrected(trajectory)
     correction = Correction(trajectory, new)
     epochs = np.linspace(0.06, 0.94, count) * len(trajectory)
     rows = []

@@ -129,11 +129,13 @@ def test_a_target_that_was_not_seen_is_listed_with_its_reason(tmp_path):
 
 def test_a_correction_of_zero_still_has_a_page(tmp_path):
     "Limits of axes and scales hold when there is nothing to show"
-    survey, correction, report = fabricate(drive(), 2, checks=False, sigma=False)
+    survey, correction, report = fabricate(drive(), 2, checks=False)
     still, unknown = np.zeros(3), np.full(3, np.nan)
     changes = {"before": still, "after": still, "sigma": unknown}
     report = report_of(drive(), [replace(row, **changes) for row in report.targets])
-    page(tmp_path, survey, Correction(correction.recorded, correction.recorded), report)
+    nothing = replace(correction.corrected, position=correction.recorded.position)
+    nothing = replace(nothing, attitude=correction.recorded.attitude)
+    page(tmp_path, survey, Correction(correction.recorded, nothing), report)
 
 
 def test_a_long_drive_makes_a_small_page(tmp_path):

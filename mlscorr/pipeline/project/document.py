@@ -30,14 +30,14 @@ class DriveResult:
     Parameters
     ----------
     state : DriveState
-    position_sigma : dict or None
+    position_sigma : dict
         As largest_sigma has it.
     track : (k, 3) array
         Easting, northing (m) and 3D sigma (m) along the drive, NaN in its gaps.
     """
 
     state: DriveState
-    position_sigma: dict[str, float] | None
+    position_sigma: dict[str, float]
     track: np.ndarray
 
 
