@@ -143,8 +143,6 @@ def _page(document, name, headline, summary, sections, separability, content):
         "parameter_count": len(separability["correlation"]["names"]),
         "left_out": [(title(k), why) for k, why in (document.get("left_out") or {}).items()],
     }
-    if document.get("created"):
-        common["written"] = document["created"]
     return Page(headline, summary, sections, common | content, "gap-", ("gap.css",))
 
 
