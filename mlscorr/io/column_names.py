@@ -200,11 +200,11 @@ def find_meanings(
     meanings = {}
     for name, others in names.items():
         column = (chosen or {}).get(name)
-        among, wanted = known, others.split()
+        among, words = known, others.split()
         if column is not None:
-            among, wanted = exact, [str(column).strip().casefold()]
+            among, words = exact, [str(column).strip().casefold()]
         elif plain(name) in known:
-            wanted = [plain(name)]
-        if positions := [i for i, cell in enumerate(among) if cell and cell in wanted]:
+            words = [plain(name)]
+        if positions := [i for i, cell in enumerate(among) if cell and cell in words]:
             meanings[name] = positions
     return meanings
