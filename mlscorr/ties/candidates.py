@@ -153,9 +153,11 @@ def _distance(views, first, second, limits):
     along = abs(along)
     across = np.sqrt(max(square - along**2, 0.0))
     misfit, beside = (across, along) if kind == POLE else (along, across)
-    gate = min(radius, sigmas * np.sqrt(variances[first] + variances[second]))
-    # however well places are known, what poles leave open doesn't shrink
-    gate = np.hypot(gate, sigmas * np.sqrt(noise[first] + noise[second] + surface_variance))
+    known = variances[first] + variances[second]
+    own = noise[first] + noise[second] + surface_variance
+    gate = min(radius, sigmas * np.sqrt(known + own))
+    if kind == POLE:  # however well places are known, what poles leave open doesn't shrink
+        gate = np.hypot(min(radius, sigmas * np.sqrt(known)), sigmas * np.sqrt(own))
     # a dash as long as the other, to twice the sigma of its middle: else one was hidden in part
     longer = np.sqrt(12.0) * abs(extent[first] - extent[second])
     sigma = 2.0 * np.sqrt(noise[first] + noise[second])

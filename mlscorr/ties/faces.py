@@ -35,9 +35,10 @@ def join_across_faces(
     mean = moments[:, 2:5] / points[:, None]
     spread = moments[:, [5, 8, 10]] / points[:, None] - mean**2
     spread = np.sqrt(np.maximum(spread, SETTINGS.rounding**2))
-    # a pole's points are spread by its radius over sqrt(3), which along both axes no wall's are; of
-    # a square one a cell may hold a side alone, beyond which it is as wide
-    is_pole = (spread[:, :2] <= SETTINGS.thickest / np.sqrt(3)).all(axis=1, keepdims=True)
+    # a pole's points are spread by its radius over sqrt(3), which along both axes no wall's are,
+    # and more along it; of a square one a cell may hold one side, beyond which it is as wide
+    widest = np.minimum(SETTINGS.thickest / np.sqrt(3), spread[:, 2:])
+    is_pole = (spread[:, :2] <= widest).all(axis=1, keepdims=True)
     spread[:, :2] = np.where(is_pole, spread[:, :2].max(axis=1, keepdims=True), spread[:, :2])
     is_thin = (spread <= SETTINGS.roughest) | (is_pole & [True, True, False])
     # 99 % of a plane's noise lies within 2.5 sigmas

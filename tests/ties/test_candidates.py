@@ -43,8 +43,10 @@ def all_pairs(features, place, sigma, radius, shift):
     across = np.linalg.norm(apart - np.einsum("ni,ni->n", apart, axis)[:, None] * axis, axis=1)
     misfit, beside = np.where(kind[first] == "pole", [across, along], [along, across])
     noise = features.variance[first] + features.variance[second]
-    gate = np.minimum(radius, 3 * np.hypot(sigma[first], sigma[second]))
-    gate = np.hypot(gate, 3 * np.sqrt(noise + 2 * SETTINGS.surface_sigma**2))
+    known, own = np.hypot(sigma[first], sigma[second]), noise + 2 * SETTINGS.surface_sigma**2
+    gate = np.minimum(radius, 3 * np.sqrt(known**2 + own))
+    of_pole = np.hypot(np.minimum(radius, 3 * known), 3 * np.sqrt(own))
+    gate = np.where(kind[first] == "pole", of_pole, gate)
     longer = np.abs(features.extent[first] - features.extent[second]) * np.sqrt(12)
     good = (kind[first] == kind[second]) & (cosine * sign >= np.cos(SETTINGS.parallel))
     good &= (misfit <= gate) & (beside <= SETTINGS.cell)
