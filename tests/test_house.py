@@ -24,7 +24,7 @@ MODULE_LINES, FUNCTION_LINES = 300, 40
 CONSTANTS = 578  # at most in the package, on the way to 300
 DOCUMENTED = 0.65  # share of the public names with sections
 TESTS_PER_SOURCE = 0.7  # lines of code
-CODE_LINES = 41_324
+CODE_LINES = 41_326
 MIRRORED = (  # rooms whose every module has a test file of its own
     *("baselines", "collocation", "correction", "effects", "estimate", "evaluate"),
     *("gap", "matching", "pos", "survey", "targets"),

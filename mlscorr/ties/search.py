@@ -53,10 +53,12 @@ def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
     for pause in (SETTINGS.pause, least_pause(survey, features)):
         ties = pair_features(features, correction, sigma, radius, pause=pause)
         agree = consistent_ties(ties, correction)
-        kinds, left = ties.kind[agree], np.abs(residuals(ties[agree], correction))
-        for kind in np.unique(kinds):  # along the way poles may be farther apart than walls tell
-            near = 2 * NORMAL_SCATTER * np.median(left[kinds == kind])
-            sigma = np.where(features.kind == kind, np.minimum(sigma, near), sigma)
+        is_pole, left = ties.kind[agree] == "pole", np.abs(residuals(ties[agree], correction))
+        for kind in (True, False):  # along the way poles may be farther apart than walls tell
+            if np.any(is_pole == kind):
+                near = 2 * NORMAL_SCATTER * np.median(left[is_pole == kind])
+                narrowed = (features.kind == "pole") == kind
+                sigma = np.where(narrowed, np.minimum(sigma, near), sigma)
     return TieSearch(weigh_by_time(ties[agree]), ties[~agree], correction, radius)
 
 
