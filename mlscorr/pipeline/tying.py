@@ -144,7 +144,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
 
     Pairs are looked for as far apart as the sigmas of the estimate allow; with each correction that
     they make, within the geometric mean of that and of the scatter of what is left of them, half as
-    far at most, down to that scatter: at once, where a round left no less of them than that before.
+    far at most, down to that scatter: at once, where a round left hardly less than that before.
 
     Parameters
     ----------

@@ -53,11 +53,11 @@ def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
     for pause in (SETTINGS.pause, least_pause(survey, features)):
         ties = pair_features(features, correction, sigma, radius, pause=pause)
         agree = consistent_ties(ties, correction)
-        is_pole, left = ties.kind[agree] == "pole", np.abs(residuals(ties[agree], correction))
-        for kind in (True, False):  # along the way poles may be farther apart than walls tell
-            if np.any(is_pole == kind):
-                near = 2 * NORMAL_SCATTER * np.median(left[is_pole == kind])
-                narrowed = (features.kind == "pole") == kind
+        left, is_pole = np.abs(residuals(ties[agree], correction)), ties.kind[agree] == "pole"
+        of_pole = features.kind == "pole"  # farther apart along the way than walls tell
+        for rows, narrowed in ((is_pole, of_pole), (~is_pole, ~of_pole)):
+            if rows.any():
+                near = 2 * NORMAL_SCATTER * np.median(left[rows])
                 sigma = np.where(narrowed, np.minimum(sigma, near), sigma)
     return TieSearch(weigh_by_time(ties[agree]), ties[~agree], correction, radius)
 
