@@ -15,39 +15,34 @@ from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.tie_equations import mounting_columns
-from mlscorr.frames import mounting_partials
+from mlscorr.frames import mounting_partials, partials_by_scanner
 from mlscorr.survey import Matched, Mounting
 
 
-def mounting_warnings(check: AddedUnknowns | None) -> tuple[str, ...]:
+def mounting_warnings(check: AddedUnknowns | None, scanners: int = 1) -> tuple[str, ...]:
     """A sentence where a wrong mounting is significant, and large enough to matter.
 
     Parameters
     ----------
     check : AddedUnknowns, optional
         Of find_mounting_error.
+    scanners : int
+        Number of scanners.
     """
-    is_wrong = np.zeros(6, bool)
-    if check is not None:
-        is_wrong = check.is_wrong(np.repeat(SETTINGS.determined_sigma, 3))
-    if not is_wrong.any():
+    least = np.repeat(SETTINGS.determined_sigma, 3)
+    if check is None or not check.is_wrong(least).any():
         return ()
     scale = np.repeat([1.0, np.degrees(1.0)], 3)
-    values = [
-        f"{part} {a:.{decimals}f} ± {s:.{decimals}f} {unit}"
-        for part, a, s, decimals, unit in zip(
-            MOUNTING_COMPONENTS,
-            check.correction * scale,
-            check.sigma * scale,
-            [3] * 3 + [2] * 3,
-            ["m"] * 3 + ["deg"] * 3,
-            strict=True,
-        )
-    ]
-    lacks = ", ".join(value for value, wrong in zip(values, is_wrong, strict=True) if wrong)
+    sizes = np.column_stack([scale * check.correction, scale * check.sigma])
+    words = ["{} {:.3f} ± {:.3f} m"] * 3 + ["{} {:.2f} ± {:.2f} deg"] * 3
+    rows = zip(words, MOUNTING_COMPONENTS, sizes, check.is_wrong(least), strict=True)
+    lacks = ", ".join(text.format(part, *size) for text, part, size, wrong in rows if wrong)
+    which = "a wrong mounting makes them: it lacks"
+    if scanners > 1:
+        which = f"wrong mountings make them: each of the {scanners} scanners' lacks, alike,"
     return (
         "Passes disagree by their direction of travel (arrows of opposite passes are "
-        f"opposite), as a wrong mounting makes them: it lacks {lacks} "
+        f"opposite), as {which} {lacks} "
         f"(chi-squared {check.statistic:.0f}, critical {check.critical:.0f}). "
         "This correction takes that for drift. Run mlscorr calibrate --clouds first, and "
         "correct the survey that it writes.",
@@ -56,11 +51,12 @@ def mounting_warnings(check: AddedUnknowns | None) -> tuple[str, ...]:
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def find_mounting_error(
-    estimate: Estimate, matched: Matched, mounting: Mounting
+    estimate: Estimate, matched: Matched, mountings: Sequence[Mounting]
 ) -> AddedUnknowns | None:
-    """Test the recorded mounting by the ties of a correction; None without any.
+    """Test the recorded mountings by the ties of a correction; None without any.
 
-    Lever arm (m) and boresight (rad) about right, forward, up are the unknowns.
+    Lever arm (m) and boresight (rad) about right, forward, up are the unknowns, of all scanners
+    alike: what one lacks beside another is in the estimate.
 
     Parameters
     ----------
@@ -68,21 +64,23 @@ def find_mounting_error(
         With ties.
     matched : Matched
         Its control points.
-    mounting : Mounting
-        As recorded.
+    mountings : sequence of Mounting
+        Of all scanners, as recorded.
     """
     equations, residuals = estimate.equations, estimate.ties
     if equations.ties is None or residuals is None:
         return None
     used, targets = residuals.ties[residuals.used], matched[estimate.used]
-    trajectory = equations.trajectory
-    ties = mounting_columns(trajectory, {0: mounting}, used)
-    control = np.zeros((len(equations.gps_time), 3, 6))
-    control[: len(targets)] = mounting_partials(
-        trajectory, mounting, targets.observations.position, targets.gps_time
+    trajectory, numbered = equations.trajectory, dict(enumerate(mountings))
+    ties = mounting_columns(trajectory, numbered, used)
+    control = np.zeros((len(equations.gps_time), 3, ties.shape[1]))
+    sightings = targets.observations.position, targets.gps_time, targets.scanner
+    control[: len(targets)] = partials_by_scanner(
+        mounting_partials, trajectory, numbered, *sightings
     )
-    columns = np.vstack([control.reshape(-1, 6), ties])
-    return AddedUnknowns.of(equations, estimate.parameters, columns, prior_sigma(mounting))
+    columns = np.vstack([control.reshape(-1, ties.shape[1]), ties])
+    sums = columns.reshape(len(columns), len(mountings), 6).sum(axis=1)
+    return AddedUnknowns.of(equations, estimate.parameters, sums, prior_sigma(mountings[0]))
 
 
 def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:

@@ -130,13 +130,13 @@ def estimate_together(
 
 def _with_mounting_checked(survey, estimate, control):
     """The estimate with a note where its ties tell of a wrong mounting."""
+    mountings, warned = survey.mountings, ()
     if estimate.equations.mounting is not None:
-        warned = scanner_warnings(estimate, list(survey.by_scanner))
-        return replace(estimate, notes=(*estimate.notes, *warned))
-    if survey.mounting is None:
-        return estimate
-    check = find_mounting_error(estimate, control, survey.mounting)
-    return replace(estimate, notes=(*estimate.notes, *mounting_warnings(check)))
+        warned = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
+    if not warned and None not in mountings:  # all of them may be wrong alike
+        check = find_mounting_error(estimate, control, mountings)
+        warned = mounting_warnings(check, len(mountings))
+    return replace(estimate, notes=(*estimate.notes, *warned))
 
 
 def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Estimate:

@@ -19,8 +19,8 @@ from tests.beds.tied_passes import tied_passes
 RECORDED = Mounting(np.zeros(3), Rotation.identity())
 
 
-def checked(seed, degrees, number=120):
-    "MountingCheck of two opposite passes that drift, georeferenced without so much boresight"
+def checked(seed, degrees, number=120, scanners=1):
+    "The test of two opposite passes that drift, georeferenced without so much boresight"
     street = tied_passes(seed, number=number)
     lacking = Rotation.from_rotvec(np.radians(degrees)).inv()
 
@@ -35,8 +35,11 @@ def checked(seed, degrees, number=120):
     ties = replace(ties, place=place, misclosure=misclosure)
     position = turned(matched.observations.position, matched.gps_time)
     matched = replace(matched, observations=replace(matched.observations, position=position))
-    estimate = with_ties(estimate_correction(street.trajectory, matched), ties)
-    return find_mounting_error(estimate, matched, RECORDED)
+    mountings = [RECORDED] * scanners
+    views = np.random.default_rng(seed).integers(scanners, size=(len(ties), 2))
+    ties, of_other = replace(ties, scanner=views), mountings if scanners > 1 else ()
+    estimate = with_ties(estimate_correction(street.trajectory, matched), ties, of_other)
+    return find_mounting_error(estimate, matched, mountings)
 
 
 @pytest.mark.long
@@ -57,6 +60,18 @@ def test_a_boresight_of_a_degree_is_named():
     assert abs(error[1]) < 0.2  # deg
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("degrees", [0.0, 0.5])
+def test_scanners_that_are_wrong_alike_are_named(degrees):
+    "Both are off by as much, and agree with each other: only opposite passes tell, and do"
+    check = checked(1, [0.0, degrees, 0.0], 300, 2)
+    sentences = mounting_warnings(check, 2)
+    assert len(sentences) == bool(degrees)
+    assert all("each of the 2 scanners' lacks, alike, boresight" in text for text in sentences)
+    assert abs(np.degrees(check.correction[4]) - degrees) < 3 * np.degrees(check.sigma[4])
+    assert np.degrees(check.sigma[4]) < 0.05
+
+
 def test_a_lever_arm_is_named_where_it_exceeds_its_sigma_and_alone():
     "As two passes of a good POS tell of 9 cm; up, which they don't tell, is not named"
     lacks, sigma = [-0.087, 0.004, 0.094, 0.0, 0.0, 0.0], [0.011, 0.011, 0.129, 4e-4, 3e-4, 2e-4]
@@ -72,4 +87,4 @@ def test_without_ties_nothing_is_tested():
     "Control points alone: None"
     street = tied_passes(1)
     estimate = estimate_correction(street.trajectory, street.matched)
-    assert find_mounting_error(estimate, street.matched, RECORDED) is None
+    assert find_mounting_error(estimate, street.matched, [RECORDED]) is None
