@@ -87,22 +87,27 @@ def information(ties: Ties, group: np.ndarray) -> np.ndarray:
 def unheld_directions(ties: Ties) -> Iterator[tuple[Ties, np.ndarray]]:
     """The ties of each two passes that hold no shift between them along an axis, and it (3,).
 
-    In a tunnel normals stand across the way but for their noise, which seems to hold it: only
-    those count that lean by more than two parallel ones may differ.
+    Those of whole stretches, where these are more than half of all: drift changes from one to the
+    next, so that a single wall across the way holds the one where it stands, and a bend is no wall
+    across. In a tunnel normals stand across the way but for their noise, which seems to hold it:
+    only those count that lean by more than two parallel ones may differ.
 
     Parameters
     ----------
     ties : Ties
     """
     ties = ties[np.lexsort(ties.pass_number.T[::-1])]
+    stretch = group_by_time(ties, 0, SETTINGS.pause)
+    axis = np.linalg.eigh(information(ties, stretch))[1][stretch, :, 0]
+    along = np.einsum("ni,ni->n", ties.direction, axis)
+    along = np.where(np.abs(along) > np.sin(SETTINGS.parallel), along, 0.0)
+    held = np.bincount(stretch, along**2 / ties.variance) * SETTINGS.least_gate**2
     begins = np.flatnonzero(np.diff(ties.pass_number, axis=0, prepend=-1).any(axis=1))
     for begin, end in pairwise([*begins, len(ties)]):
-        part = ties[begin:end]
-        axis = np.linalg.eigh(information(part, np.zeros(len(part), int))[0])[1][:, 0]
-        along = part.direction @ axis
-        along = np.where(np.abs(along) > np.sin(SETTINGS.parallel), along, 0.0)
-        if np.sum(along**2 / part.variance) * SETTINGS.least_gate**2 < 1.0:
-            yield part, axis
+        is_unheld = held[stretch[begin:end]] < 1.0
+        if np.median(held[np.unique(stretch[begin:end])]) < 1.0:
+            part = ties[begin:end][is_unheld]
+            yield part, np.linalg.eigh(information(part, np.zeros(len(part), int))[0])[1][:, 0]
 
 
 def unheld_sentence(ties: Ties, axis: np.ndarray) -> str:
@@ -111,16 +116,16 @@ def unheld_sentence(ties: Ties, axis: np.ndarray) -> str:
     Parameters
     ----------
     ties : Ties
-        Of two passes.
+        Of two passes, those that leave it.
     axis : (3,) array
         Unit vector.
     """
     first, second = ties.pass_number[0]
     words = ", ".join(f"{value:.2f}" for value in axis + 0.0)
     return (
-        f"The {len(ties)} ties of passes {first} and {second} leave the direction E, N, H = "
-        f"{words} unheld: all walls are parallel there, as in a tunnel. Only control in both "
-        "passes, or poles and walls across the way, hold it."
+        f"Most of the way that passes {first} and {second} share, {len(ties)} ties leave the "
+        f"direction E, N, H = {words} unheld: all walls are parallel there, as in a tunnel. Only "
+        "control in both passes, or poles and walls across the way, hold it."
     )
 
 

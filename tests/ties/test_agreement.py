@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mlscorr.ties import (
     SETTINGS,
@@ -65,6 +66,35 @@ def test_noise_of_normals_holds_no_tunnel():
     assert len(part) == len(tunnel)
     assert abs(axis[0]) > np.cos(np.radians(3.0))
     assert "passes 1 and 2" in unheld_sentence(part, axis)
+
+
+def later(ties, stretches, azimuth=0.0):
+    "The same ties some stretches of time later, on a way turned by an azimuth (deg)"
+    turned = Rotation.from_euler("z", -azimuth, degrees=True).apply(ties.direction)
+    time = ties.gps_time + stretches * SETTINGS.pause
+    return replace(ties, gps_time=time, direction=turned)
+
+
+def test_a_wall_in_one_place_holds_no_tunnel():
+    "Walls across the way in one stretch of five hold the one where they stand"
+    ties, _ = ties_of(street.features())
+    tunnel = ties[(np.abs(ties.direction[:, 0]) < 0.1) & (ties.kind == "plane")]
+    parts = [later(tunnel, number) for number in range(1, 5)]
+    ((part, axis),) = unheld_directions(type(ties).concatenate([ties, *parts]))
+    assert len(part) == 4 * len(tunnel)
+    assert abs(axis[0]) > np.cos(np.radians(3.0))
+    parts = [later(ties, number) for number in range(1, 3)]
+    assert list(unheld_directions(type(ties).concatenate([ties, *parts, later(tunnel, 3)]))) == []
+
+
+def test_a_bend_holds_no_tunnel():
+    "Walls that turn with the way, by 15 deg from stretch to stretch, stand across it nowhere"
+    ties, _ = ties_of(street.features())
+    tunnel = ties[(np.abs(ties.direction[:, 0]) < 0.1) & (ties.kind == "plane")]
+    bent = type(ties).concatenate([later(tunnel, n, 15.0 * (n - 2)) for n in range(5)])
+    ((part, axis),) = unheld_directions(bent)
+    assert len(part) == len(bent)
+    assert abs(axis[0]) > np.cos(np.radians(3.0))
 
 
 def test_a_tunnel_leaves_its_length_unheld():
