@@ -146,7 +146,4 @@ def scanner_notes(scanners: tuple[MountedScanner, ...]) -> list[str]:
         f"{mounted.name} wrote {', '.join(cloud.name for cloud in mounted.clouds)}"
         for mounted in scanners
     )
-    return [
-        f"The survey has {len(scanners)} scanners: {wrote}. Whether ties tell of a wrong mounting "
-        "is tested for one scanner only: mlscorr calibrate estimates those of all."
-    ]
+    return [f"The survey has {len(scanners)} scanners: {wrote}."]
