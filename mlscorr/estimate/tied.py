@@ -87,7 +87,8 @@ class TieResiduals:
         return (
             f"None of the {len(self.ties)} ties between passes was used: more than half of them "
             "contradict the others, or all of them several control points. Did the street change "
-            "between the passes, or is the mounting wrong (mlscorr calibrate)?",
+            "between the passes, is the mounting wrong (mlscorr calibrate), or does the scanner's "
+            "own encoder turn by another scale (milliradians per radian)?",
         )
 
 
