@@ -13,7 +13,7 @@ from pathlib import Path
 
 from mlscorr.io.folders import exchange, move_into, remove, take_along
 from mlscorr.io.inputs import check_unchanged
-from mlscorr.io.publishing import check_contents, publish, scratch_folder, write_text
+from mlscorr.io.publishing import check_contents, publish, scratch_folder
 from mlscorr.io.storage import as_path, is_remote
 from mlscorr.survey import InputFile
 
@@ -269,7 +269,7 @@ def _finite(value):
 
 
 def write_json(path: str | Path, content: dict) -> None:
-    """Write a document as JSON.
+    """Write a document as JSON, whole or not at all.
 
     Parameters
     ----------
@@ -278,4 +278,5 @@ def write_json(path: str | Path, content: dict) -> None:
         Without numbers that are not finite.
     """
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
-    write_text(as_path(path), text + "\n")
+    with output_file(path) as part:
+        part.write_text(text + "\n", encoding="utf-8")

@@ -96,21 +96,6 @@ def publish(source: Path, target: Any) -> None:
         target.fs.invalidate_cache()
 
 
-def write_text(path: Any, text: str) -> None:
-    """Write a text file; in a store it appears whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-    text : str
-    """
-    if not is_remote(path):
-        path.write_text(text, encoding="utf-8")
-        return
-    with asking(path):
-        path.fs.pipe_file(path.path, text.encode())
-
-
 def check_store_output(
     out: Path, inputs: Iterable[Path], overwrite: bool, folders: Iterable[str] = ()
 ) -> None:
@@ -179,8 +164,8 @@ class _StoredText(io.StringIO):
     def flush(self):
         if monotonic() >= self.due:
             self.due = monotonic() + SETTINGS.beat
-            with suppress(OSError):  # what it tells of matters more than the log
-                write_text(self.path, self.getvalue())
+            with suppress(OSError), asking(self.path):  # what it tells of matters more than the log
+                self.path.fs.pipe_file(self.path.path, self.getvalue().encode())
 
     def close(self):
         self.due = 0.0

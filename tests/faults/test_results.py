@@ -1,5 +1,6 @@
 """Results appear whole or not at all, whatever stands where they belong and whoever else writes."""
 
+import json
 import os
 import shutil
 import signal
@@ -213,3 +214,18 @@ def test_an_interruption_says_whether_results_stand(has_results, capsys):
         raise KeyboardInterrupt
     assert ended.value.exit_code == 130
     assert ("all results were written" in capsys.readouterr().err) == has_results
+
+
+def test_a_document_that_finds_no_room_leaves_the_one_before(tmp_path):
+    "As project.json on a full disk: it is the old one, and nothing lies beside it"
+    resource = pytest.importorskip("resource", reason="Windows limits no sizes of files")
+    path, limits = tmp_path / "project.json", resource.getrlimit(resource.RLIMIT_FSIZE)
+    output.write_json(path, {"name": "old"})
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            output.write_json(path, {"name": "new" * 10_000})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert json.loads(path.read_text()) == {"name": "old"}
+    assert list(tmp_path.iterdir()) == [path]

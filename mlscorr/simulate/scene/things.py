@@ -88,10 +88,8 @@ def _windows(cell, u, v, depth, reflectance, glass=0.1):
         quads(cell + 0.75 * v, u, 0.25 * v, reflectance),
         quads(cell + 0.25 * v, 0.25 * u, wv, reflectance),
         quads(cell + 0.25 * v + 0.75 * u, 0.25 * u, wv, reflectance),
-        quads(window, wu, depth, reflectance),
-        quads(window + wv, wu, depth, reflectance),
-        quads(window, wv, depth, reflectance),
-        quads(window + wu, wv, depth, reflectance),
+        *(quads(edge, wu, depth, reflectance) for edge in (window, window + wv)),
+        *(quads(edge, wv, depth, reflectance) for edge in (window, window + wu)),
     ]
     return Mesh.concatenate([*frame_and_reveal, quads(window + depth, wu, wv, glass)])
 
