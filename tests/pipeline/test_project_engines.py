@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -22,11 +23,12 @@ from tests.beds.places import ROOT
 
 CLUSTER = """
 from distributed import LocalCluster
-from tests.pipeline.test_project_engines import lose_a_call, lose_a_worker, squares
+from tests.pipeline.test_project_engines import grow, lose_a_call, lose_a_worker, squares
 if __name__ == "__main__":
     with LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
         squares({folder!r}, scheduler=cluster.scheduler_address)
         lose_a_worker({folder!r}, cluster.scheduler_address)
+        grow(cluster)
         lose_a_call(cluster.scheduler_address)
 """
 
@@ -44,6 +46,13 @@ def end_at_first(path, number):
         open(path, "w").close()
         os.kill(os.getpid(), signal.SIGKILL)
     return square(number)
+
+
+def span(number):
+    "When a call of half a second begins and ends. Units: s"
+    start = time.time()
+    time.sleep(0.5)
+    return start, time.time()
 
 
 def end(number):
@@ -80,6 +89,21 @@ def squares(folder, workers=1, scheduler=None):
     return run
 
 
+def start_cluster(address):
+    "Processes of a scheduler at an address and of its worker, which has two threads"
+    paths = {"PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+    return [
+        subprocess.Popen(
+            [sys.executable, "-m", "dask", *arguments, "--no-dashboard"],
+            stderr=subprocess.DEVNULL, env=os.environ | paths,
+        )
+        for arguments in (
+            ("scheduler", "--port", address.rpartition(":")[2]),
+            ("worker", address, "--nthreads", "2", "--no-nanny"),
+        )
+    ]  # fmt: skip
+
+
 def lose_a_worker(folder, scheduler):
     "A cluster does again what a worker was at that ended, and none was lost before"
     with engine(scheduler=scheduler) as chosen:
@@ -90,8 +114,20 @@ def lose_a_worker(folder, scheduler):
         assert chosen.lost == 1
 
 
+def grow(cluster):
+    "Workers that come later are counted on; where all left, a task waits for the next to come"
+    with engine(scheduler=cluster.scheduler_address) as chosen:
+        for workers, width in ((3, 3), (0, 1), (2, 2)):
+            cluster.scale(workers)
+            for _ in range(100):
+                time.sleep(0.1)
+                if len(cluster.scheduler_info["workers"]) == workers and chosen.width == width:
+                    break
+            assert chosen.width == width
+
+
 def lose_a_call(scheduler):
-    "A call that the scheduler knows no more, as when it ended, is said in a sentence"
+    "A call that nobody will carry out any more is said in a sentence"
     with (
         pytest.raises(ConnectionError, match="--resume goes on"),
         engine(scheduler=scheduler) as chosen,
@@ -152,6 +188,41 @@ def test_a_lost_worker_is_counted_and_its_task_done_again(tmp_path):
     (fault,) = run.faults
     assert fault.task.name == "end-8" and "its worker was lost 2 times" in fault.fault
     assert len(ends) == len(tasks)
+
+
+@pytest.mark.long
+def test_what_was_lost_with_others_is_done_again_beside_others(tmp_path):
+    "A worker that ends but once costs what was at work; not that the rest is done in turn"
+    told = []
+    with engine(2) as chosen:
+        run = Run(TaskStore(tmp_path), chosen, lambda outcome: None, told.append)
+        lost = task(7, end_at_first, tmp_path / "mark")
+        results = run.results([lost, *(task(n, span) for n in range(3))])
+    assert results.pop(lost.name) == 49 and len(told) == 4
+    (_, first), (second, _), _ = sorted(results.values())
+    assert second < first
+
+
+@pytest.mark.long
+def test_a_scheduler_that_ends_ends_the_run(tmp_path):
+    "Killed with its worker after the first of some tasks: a sentence, and nothing is waited for"
+    distributed = pytest.importorskip("distributed", reason="mlscorr[cluster] is not installed")
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    processes = start_cluster(address)
+    try:
+        with distributed.Client(address) as client:
+            client.wait_for_workers(1)
+        with (
+            pytest.raises(ConnectionError, match="--resume goes on"),
+            engine(scheduler=address) as chosen,
+        ):
+            kill = lambda _: [process.kill() for process in processes]  # noqa: E731
+            Run(TaskStore(tmp_path), chosen, kill).results([task(n, span) for n in range(8)])
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
 
 
 @pytest.mark.long

@@ -82,9 +82,7 @@ def corrected_drives(
         own = drive_estimate(joint, estimate, number, tied_sentence(states[number]))
         first, last = drive.survey.trajectory.gps_time[[0, -1]]
         near = [replace(place, gps_time=place.gps_time - shift) for place in places]
-        shared = {
-            name: section[name] for name in ("share", "sufficient_control") if name in section
-        }
+        shared = {key: section[key] for key in ("share", "sufficient_control") if key in section}
         misfits = misfit_section(own.ties) or {"n": 0, "used": 0, "reason": own.untied}
         ties = misfits | (shared if own.ties else {})
         survey = replace(drive.survey, notes=(*drive.survey.notes, *joint.survey.notes))

@@ -1,6 +1,7 @@
 """``correct`` of a project: from several drives to the corrected clouds and reports of all."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -106,8 +107,8 @@ def correct_project(
         if options.overwrite and not options.resume:
             store.clear()
         with engine(options.workers, options.scheduler) as chosen:
-            work = _Work(project, out, options, Run(store, chosen, progress.ended), progress)
-            result = work.result()
+            run = Run(store, chosen, progress.ended, progress.say)
+            result = _Work(project, out, options, run, progress).result()
         progress.note(result.document["statements"][0]["sentence"])
     return result
 
@@ -203,8 +204,7 @@ class _Work:
         findings = self.run.results(every)
         lost = {_path(task) for task in every if task.name not in findings}
         every = [task for task in every if _path(task) not in lost]
-        planned[:] = [drive.without(lost) for drive in planned]
-        planned[:] = [drive for drive in planned if drive.survey.clouds]
+        planned[:] = [d for drive in planned if (d := drive.without(lost)).survey.clouds]
         files = [task.key for task in every]
         surveys = [d.survey for d in planned]  # what results keep of them, paths and notes too
         kept = [(s.control, s.check, s.crs, s.notes, _contents(s), s.clouds) for s in surveys]
@@ -282,9 +282,6 @@ def _contents(survey):
 
 def _is_there(store, key):
     """Whether all of a drive's results are in the store, undamaged."""
-    try:
-        for kind in ("states", "motions", "corrected"):
-            store.get(kind, key)
-    except KeyError:
-        return False
-    return True
+    with suppress(KeyError):
+        return all(store.get(kind, key) for kind in ("states", "motions", "corrected"))
+    return False

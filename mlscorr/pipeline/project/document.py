@@ -254,7 +254,7 @@ def _reason(row, report):
 def _lost(number):
     """A statement on lost workers, where there were any."""
     if number:
-        sentence = f"{number} times a worker was lost; what it worked on was done again."
+        sentence = f"{counted(number, 'time')} a worker was lost; what it worked on was done again."
         yield headline.Statement("Workers", "amber", sentence)
 
 

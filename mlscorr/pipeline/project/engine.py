@@ -131,8 +131,7 @@ class Cluster:
                 f"No scheduler answers at {scheduler} ({error}). Start one with dask scheduler, "
                 "and give the address that it prints."
             ) from None
-        self.width = sum(self._client.nthreads().values())
-        if self.width == 0:
+        if not self._client.nthreads():
             self.close()
             raise ValueError(
                 f"The scheduler at {scheduler} has no worker. Start some, as dask worker "
@@ -140,6 +139,20 @@ class Cluster:
             )
         self._gone, self.losses = self._removed(), (KilledWorker,)  # tried in vain again and again
         self._executor = self._client.get_executor(pure=False)
+
+    @property
+    def width(self) -> int:
+        """Threads that its workers have now: a cluster grows and shrinks while it works.
+
+        Raises
+        ------
+        CancelledError
+            Where the scheduler ended: of a result that it was just sending nobody else says so.
+        """
+        with suppress(OSError):
+            if self._client.status == "running":
+                return max(1, sum(self._client.nthreads().values()))
+        raise CancelledError
 
     def submit(self, function: Callable, *arguments: object) -> Future:
         """The Future of a call."""

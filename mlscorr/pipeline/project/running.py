@@ -1,6 +1,6 @@
 """Tasks to their ends: those whose results are there are left, lost workers' are tried again."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, field
@@ -46,6 +46,8 @@ class Run:
     engine : Engine
     watch : function of an Outcome
         Is told of each task that ended.
+    tell : function of a sentence
+        Is told of tasks that lost their worker.
     faults : list of Outcome
         Of tasks without a result.
     """
@@ -53,6 +55,7 @@ class Run:
     store: TaskStore
     engine: Engine
     watch: Callable[[Outcome], object]
+    tell: Callable[[str], object] = str
     faults: list[Outcome] = field(default_factory=list)
 
     def results(self, tasks: Sequence[Task]) -> dict[str, Any]:
@@ -66,12 +69,11 @@ class Run:
         results: dict[str, Any] = {}
         rest = []
         for task in tasks:
-            result = present(self.store, task.kind, task.key)
-            if result is None:
+            if (result := present(self.store, task.kind, task.key)) is None:
                 rest.append(task)
-                continue
-            results[task.name], texts = result
-            self.watch(Outcome(task, warnings=texts))
+            else:
+                results[task.name], texts = result
+                self.watch(Outcome(task, warnings=texts))
         for outcome in self._outcomes(rest):
             task = outcome.task
             self.watch(outcome)
@@ -105,22 +107,24 @@ class Run:
         """
         waiting = deque(sorted(tasks, key=lambda task: -task.points - task.near_points))
         suspects, running = deque(), {}
-        losses: dict[str, int] = {}
+        losses: Counter[tuple[str, bool]] = Counter()
         while waiting or suspects or running:
-            is_single = bool(suspects)  # what lost a worker is tried by itself: it may be to blame
+            is_single = bool(suspects)  # what loses workers is tried by itself: it may be to blame
             source = suspects if is_single else waiting
             limit = 1 if is_single else SETTINGS.waiting * self.engine.width
             while source and len(running) < limit:
                 task = source.popleft()
                 future = self.engine.submit(carry_out, task, self.store.folder)
                 running[future] = task, is_single
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            for future in wait(running, SETTINGS.interval, FIRST_COMPLETED).done:
                 task, was_single = running.pop(future)
                 try:
                     yield Outcome(task, *future.result())
                 except self.engine.losses:
-                    losses[task.name] = losses.get(task.name, 0) + was_single
-                    if losses[task.name] >= SETTINGS.losses:
+                    self.tell(f"{task.name} lost its worker, and is done again.")
+                    losses[task.name, was_single] += 1
+                    is_first = losses[task.name, False] == 1 and not was_single
+                    if losses[task.name, True] >= SETTINGS.losses:
                         yield Outcome(task, LOSS.format(SETTINGS.losses))
-                    else:
-                        suspects.append(task)
+                    else:  # all that were at work lose theirs with the one that is to blame
+                        (waiting if is_first else suspects).append(task)
