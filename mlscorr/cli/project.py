@@ -93,6 +93,8 @@ def status(
     terminal.say(f"All: {', '.join(shares)}")
     for line in content["failures"]:
         terminal.warn(line)
+    if content["is_running"] is not False:
+        terminal.say(f"At work: {content['progress']}")
     terminal.say(f"Last: {content['log']}")
     if content["is_running"] is False:
         is_done = {stage["stage"]: stage["share"] == 1 for stage in content["all"]}

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -42,6 +43,45 @@ def test_a_failure_that_was_repaired_is_none(tmp_path):
     (tmp_path / "a  tile.laz").write_bytes(b"whole")
     (failure,) = run(tmp_path, tasks)["failures"]
     assert " Failed: b.laz: " in failure
+
+
+def test_time_left_is_told_by_what_is_worked_on(tmp_path):
+    "Of 100 files 90 were there: a second for each of the next five leaves five, not half of one"
+    (tmp_path / "tasks").mkdir()
+    tasks = tiles(tmp_path, *(f"{number}.laz" for number in range(100)))
+    told = []
+    with logged(tmp_path / "log.txt", TaskStore(tmp_path / "tasks").plan, told.append) as progress:
+        progress.begin("tiles", tasks)
+        for task in tasks[:90]:
+            progress.ended(Outcome(task))
+        progress.counts["start"] -= 5.0
+        for task in tasks[90:94]:
+            progress.ended(Outcome(task, seconds=1.0))
+        progress.due = 0.0
+        progress.ended(Outcome(tasks[94], seconds=1.0))
+    rate, left = "95 %, 1e-06 M points/s", "5 s left, 0 failures so far"
+    assert told == [f"Reading headers: 95 of 100 files of 1 drives, {rate}, {left}"]
+
+
+def test_progress_is_told_beside_the_last_line(tmp_path):
+    "Rate, time left and the failures of all stages, while tasks follow them in the log"
+    tasks = tiles(tmp_path, *(f"{number}.laz" for number in range(4)))
+    store = TaskStore(tmp_path / "tasks")
+    with store.locked(), logged(tmp_path / "log.txt", store.plan, str) as progress:
+        progress.begin("tiles", tasks)
+        progress.ended(Outcome(tasks[0], "no such file"))
+        progress.begin("findings", tasks)
+        assert project_status(tmp_path)["progress"].endswith(
+            "Reading the clouds: 4 tasks, 4 points."
+        )
+        for progress.due, task in zip((0.0, np.inf, np.inf), tasks, strict=False):
+            progress.ended(Outcome(task, seconds=1.0))
+        content = project_status(tmp_path)
+        assert " left, 1 failure so far" in content["progress"]
+        assert content["log"].endswith("tiles: 2.laz in 1.0 s")
+        said = CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
+        assert "At work: " in said
+    assert "At work" not in CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
 
 
 def test_a_run_that_is_no_more_is_said(tmp_path):

@@ -14,6 +14,7 @@ from mlscorr.io.publishing import appended
 from mlscorr.io.spool import telling_space
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task
+from mlscorr.survey.summary import counted
 
 TITLES = {
     "tiles": "Reading headers",
@@ -40,7 +41,7 @@ class Progress:
     plan: Path
     tell: Callable[[str], object]
     stages: dict[str, list[dict]] = field(default_factory=dict)
-    counts: dict[str, float] = field(default_factory=dict)
+    counts: dict[str, float] = field(default_factory=lambda: {"faults": 0})  # of all stages
     due: float = 0.0
 
     def note(self, text: str) -> None:
@@ -78,7 +79,7 @@ class Progress:
         with output_file(self.plan) as part:
             part.write_text(json.dumps(self.stages), encoding="utf-8")
         self.note(f"{TITLES[kind]}: {len(tasks)} tasks, {sum(t.points for t in tasks)} points.")
-        self.counts = {"done": 0, "points": 0, "worked": 0, "faults": 0, "start": monotonic()}
+        self.counts |= {"done": 0, "points": 0, "worked": 0, "start": monotonic()}
         self.due = monotonic() + SETTINGS.interval
 
     def ended(self, outcome: Outcome) -> None:
@@ -90,8 +91,8 @@ class Progress:
         """
         counts, task, is_new = self.counts, outcome.task, outcome.seconds > 0
         counts["done"] += 1
-        counts["points"] += task.points
-        counts["worked"] += is_new
+        counts["points"] += max(task.points, 1)
+        counts["worked"] += max(task.points, 1) * is_new
         counts["faults"] += bool(outcome.fault)
         for text in outcome.warnings:
             self.say(f"Warning: {task.name}: {text}")
@@ -106,16 +107,15 @@ class Progress:
     def _sentence(self, kind):
         """How far a stage has come, its rate, and the time that is left."""
         counts, tasks = self.counts, self.stages[kind]
-        total = sum(task["points"] for task in tasks)
-        elapsed = monotonic() - counts["start"]
-        share = counts["points"] / total if total else counts["done"] / len(tasks)
-        left = elapsed / share - elapsed if share else 0.0
+        total = sum(max(task["points"], 1) for task in tasks)
+        rate = counts["worked"] / (monotonic() - counts["start"])  # what was there took no time
+        left = f"{duration((total - counts['points']) / rate)} left, " if rate else ""
         drives = {task["drive"] for task in tasks} - {""}
         files = f" files of {len(drives)} drives" if drives else ""
         return (
             f"{TITLES[kind]}: {counts['done']} of {len(tasks)}{files}, "
-            f"{100 * share:.0f} %, {counts['points'] / elapsed / 1e6:.1f} M points/s, "
-            f"{duration(left)} left, {counts['faults']} failures"
+            f"{100 * counts['points'] / total:.0f} %, {rate / 1e6:.3g} M points/s, {left}"
+            f"{counted(counts['faults'], 'failure')} so far"
         )
 
 

@@ -24,8 +24,8 @@ def project_status(out: str | Path) -> dict:
     -------
     dict
         ``all`` and ``drives[]``: tasks and points done and planned, stage by stage; ``failures``
-        of what isn't done yet, the last line of the ``log``, which says rate and time left, and
-        whether a run ``is_running``: None where that can't be told.
+        of what isn't done yet, the last line of the ``log``, that on ``progress``, which says rate
+        and time left, and whether a run ``is_running``: None where that can't be told.
 
     Raises
     ------
@@ -55,12 +55,15 @@ def project_status(out: str | Path) -> dict:
         drives.setdefault(task["drive"], []).append(task)
     is_running = store.is_locked()
     lines = read_bytes(out / "log.txt").decode().splitlines()
+    titles = ("Estimating", *TITLES.values())
+    progress = [line for line in lines if line.split(" ", 2)[-1].startswith(titles)]
     return document(
         "status",
         {
             "all": _stages(tasks),
             "drives": [{"name": name, "stages": _stages(own)} for name, own in drives.items()],
             "failures": _failures(tasks, lines),
+            "progress": progress[-1] if progress else "",
             "log": lines[-1] if lines else "",
             "is_running": is_running,
         },
