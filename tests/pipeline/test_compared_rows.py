@@ -101,6 +101,21 @@ def test_a_survey_is_no_simulation_of_itself(folders):
         mlscorr.diagnose(real, simulated=[folders[1] / "pass-1.laz"])
 
 
+@pytest.mark.parametrize("seed", [3, 5])
+def test_half_of_their_points_is_no_noise(tmp_path, seed):
+    "Every second point left out: the clock alone is named, and roughness tells of no belief"
+    real = made(tmp_path / "real", OFFSET, seed, points_per_line=400)
+    half = made(tmp_path / "half", seed=seed, points_per_line=400)
+    cloud = laspy.read(half / "pass-1.laz")
+    cloud.points = cloud.points[np.arange(0, len(cloud), 2)]
+    cloud.write(half / "pass-1.laz")
+    diagnosed = mlscorr.diagnose(mlscorr.read_survey(real), simulated=[half])
+    assert diagnosed.inference.verdict.label == "time_offset"
+    rows = diagnosed.rows.select(diagnosed.rows.channel == "roughness")
+    assert len(rows) > 500
+    assert abs(np.corrcoef(rows.residual, np.log(rows.believed))[0, 1]) < 0.1
+
+
 def test_clouds_of_another_drive_are_refused(folders, tmp_path):
     "Other times, another place, or nothing at all: with what differs, in s and m"
     real = mlscorr.read_survey(folders[0])

@@ -266,8 +266,9 @@ def _against_channels(rows, survey, simulated, other):
         has = (pair >= 0) & known[pair]
         residual[on] = np.where(has, residual[on] - value[pair], np.nan)
         noise[on] += np.where(has, variance[pair], 0.0)
-        if channel == "roughness":
-            believed[on] *= np.where(has, np.exp(value[pair]), 1.0)
+        if channel == "roughness" and has.any():
+            # a patch's own would share its chance with the residual, which then tells of noise
+            believed[on] *= np.exp(np.median(value[pair[has]]))
     return replace(rows, residual=residual, noise=noise, believed=believed)
 
 
