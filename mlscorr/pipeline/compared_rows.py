@@ -135,16 +135,16 @@ def compare_with_clouds(
     matched = _with_moved(finding, believed).matches.matched
     patches = None if patches is None else observe.spread_patches(patches)
     compared = []
-    for simulated in opened:
+    for folder, simulated in zip(folders, opened, strict=True):
         clouds, sample = _simulated_clouds(simulated, patches, correction, progress)
         samples.append(sample)
         observed = matched, finding.candidates, patches
         rows, sentence = observe.rows_against(believed, *observed, clouds, correction)
+        _check_simulated(rows, folder)
         compared.append(rows)
         notes = (*notes, sentence)
     first, *following = observe.without_unpaired(compared)
     check_enough(survey, first, library, notes)
-    _check_simulated(first, folders[0])
     is_check = np.isin(first.targets.name, survey.check.name)
     used = (first.survey_item < 0) | ~is_check[first.survey_item]
     real, simulated_first = samples[:2]
@@ -167,7 +167,7 @@ def compare_with_clouds(
 
 def _check_simulated(rows, folder):
     """Refuse clouds that no simulator made."""
-    if not rows.residual.any():
+    if not np.nan_to_num(rows.residual).any():
         raise ValueError(
             f"The clouds of {folder} are the survey's own: none of {len(rows)} differences is "
             "other than zero. Give those that your simulator made."

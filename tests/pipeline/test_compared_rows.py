@@ -95,10 +95,13 @@ def test_clouds_of_another_place_are_doubted(folders, tmp_path):
 
 
 def test_a_survey_is_no_simulation_of_itself(folders):
-    "Against its own clouds each patch is paired by its pulses and nothing differs: it is refused"
+    "Against its own clouds, first or second, nothing differs of what is paired: it is refused"
     real = mlscorr.read_survey(folders[1])
     with pytest.raises(ValueError, match="are the survey's own"):
         mlscorr.diagnose(real, simulated=[folders[1] / "pass-1.laz"])
+    with pytest.raises(ValueError, match=r"real/pass-1\.laz are the survey's own"):
+        other = mlscorr.read_survey(folders[0])
+        mlscorr.diagnose(other, simulated=[folders[1], folders[0] / "pass-1.laz"])
 
 
 @pytest.mark.parametrize("seed", [3, 5])
