@@ -35,7 +35,7 @@ def case(bed, rng, kind, name, m):
     shift, _, _ = sized(g, bed.signs, name, m, rng, bed.size)
     rows = replace(g.rows, residual=errors(g, rng, kind) + shift)
     used = ~np.isin(rows.survey_item, np.arange(CHECKED))
-    part, signs = rows.select(used), select(bed.signs, used)
+    part, signs = rows.select(used), select(bed.signs, rows, used)
     inference = infer_causes(part, background(part, g.survey), g.survey, signs, rng, 0)
     label = inference.verdict.label
     cause = cause_for_simulator(part, signs, inference)

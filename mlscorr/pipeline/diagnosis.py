@@ -100,7 +100,7 @@ def diagnose(
     observed, used, absence = compared.rows, compared.used, compared.absence
     step = progress("Weighing the causes", STEPS)
     signs, left_out = signatures(observed, believed, library, rng)
-    part, signs_of_part = observed.select(used), select(signs, used)
+    part, signs_of_part = observed.select(used), select(signs, observed, used)
     errors = background(part, believed)
     infer = partial(infer_causes, survey=believed, signatures=signs_of_part, absence=absence)
     inference = infer(part, errors, rng=rng, costs=costs)
@@ -174,7 +174,7 @@ class DiagnosedSurvey(Summary):
             warnings=self.warnings, absence=self.absence,
         )  # fmt: skip
         if self.inference.verdict.label not in ("none", "unknown"):
-            content["advice"].append(self.next_run)
+            content["advice"].append(self._improvement[1] or self.next_run)
         if any(contrast.sentences for contrast in self.contrasts):
             content["advice"] = [s for s in content["advice"] if s != NOTHING_TO_DO]
             content["advice"].append("See by what the clouds differ beside geometry: Channels.")
@@ -186,9 +186,18 @@ class DiagnosedSurvey(Summary):
     @property
     def improved(self) -> Simulator:
         """The Simulator with the cause in it; the same where there is none that it could take."""
+        return self._improvement[0]
+
+    @property
+    def _improvement(self):
+        """The Simulator with the cause in it, or the same and a sentence why it can't take that."""
         if self.inference.verdict.label in ("none", "unknown"):
-            return self.simulator
-        return with_cause(self.simulator, self.survey, self.inference.cause)
+            return self.simulator, ""
+        try:
+            return with_cause(self.simulator, self.survey, self.inference.cause), ""
+        except ValueError as error:  # larger than any survey can have
+            why = f"simulator.toml is as it was, since no simulator can take that: {error}"
+            return self.simulator, why
 
     def to_frame(self) -> pandas.DataFrame:
         """A row each parameter of the causes, the best first; pandas is needed for it."""

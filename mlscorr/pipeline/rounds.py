@@ -113,12 +113,8 @@ def diagnose_until_none(
     """
     rounds = [diagnose(survey, simulator, progress=progress, costs=costs)]
     while len(rounds) < SETTINGS.rounds:
-        last = rounds[-1]
-        if last.inference.verdict.label in ("none", "unknown"):
-            break
-        try:
-            improved = last.improved
-        except ValueError:  # larger than any survey can have
+        last, improved = rounds[-1], rounds[-1].improved
+        if improved is last.simulator:  # nothing is left, or nothing that a simulator can take
             break
         rounds.append(diagnose(survey, improved, progress=progress, costs=costs))
     first = rounds[0]

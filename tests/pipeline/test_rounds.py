@@ -59,6 +59,20 @@ def test_what_has_no_bound_is_null(survey, tmp_path):
     assert told["ablation"]["rounds"][0]["parameters"][0]["detectable"] is None
 
 
+def test_what_no_simulator_can_take_is_told_and_the_results_are_written(survey, tmp_path):
+    "A clock 500 s off, beyond its limit: simulator.toml as it was, why, and no second round"
+    first = diagnose(read_survey(survey))
+    (sign, _), *_ = first.inference.cause.parts
+    cause = replace(first.inference.cause, parts=((sign, np.array([500.0])),))
+    inference = replace(first.inference, causes=(cause, *first.inference.causes[1:]))
+    beyond = replace(first, inference=inference)
+    told = beyond.write(tmp_path / "out")
+    assert beyond.improved is first.simulator
+    assert read_simulator(tmp_path / "out" / "simulator.toml").effects == ()
+    assert "time_offset of 500 s exceeds" in told["advice"][-1]
+    assert not any("it has the cause in it" in sentence for sentence in told["advice"])
+
+
 def test_what_no_known_effect_explains_closes_nothing(survey):
     "The gap that the nearest effect leaves is that of no round: it was not put in"
     first = diagnose(read_survey(survey))

@@ -193,7 +193,7 @@ def _trained(case, observations, model, used, rng):
         windows = _with_factor(part, model, part.columns(case.rows.residual[:, None]))
         return replace(cause, model=replace(cause.model, windows=windows))
     names, part = cause.effect.split("+"), case.rows.select(used)
-    of_part = select([sign for sign in case.signatures if sign.name in names], used)
+    of_part = select([s for s in case.signatures if s.name in names], case.rows, used)
     anew = weigh_labels(part, background(part, survey), survey, of_part, rng, 0)
     best = {name: _likeliest(evidence, name) for name in names}
     noise = [each for each in anew.noise if _is_alike(each, best.get(each.label))]

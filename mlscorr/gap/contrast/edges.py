@@ -129,12 +129,8 @@ def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
         is_inside = offset < end - begin - 1
         is_edge &= ~is_inside | ((near[k] > low + rough) & (near[k] < high - rough))
     here = np.where(is_near, begin, end)[is_edge]
-    return Edges(
-        gps_time=time[here],
-        place=cloud.xyz[first[here]],
-        range=near[here],
-        width=(mixed + np.minimum(both, SETTINGS.widest))[is_edge] * step[begin[is_edge]],
-    )
+    width = (mixed + np.minimum(both, SETTINGS.widest))[is_edge] * step[begin[is_edge]]
+    return Edges(time[here], cloud.xyz[first[here]], near[here], width)
 
 
 def _run(is_double):

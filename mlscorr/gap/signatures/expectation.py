@@ -24,13 +24,11 @@ def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
     survey : Survey
     effects : iterable of Effect
     """
-    bench, m = Bench(rows, survey), len(rows)
-    shift, variance, growth = np.zeros(m), np.zeros(m), np.zeros(m)
+    bench, total = Bench(rows, survey), np.zeros((3, len(rows)))
     for effect in effects:
         change = bench.change(effect)
-        shift, variance = shift + _shift(bench, effect, change), variance + change.variance
-        growth = growth + change.growth
-    return Change(shift, variance, growth)
+        total += _shift(bench, effect, change), change.variance, change.growth
+    return Change(*total)
 
 
 def _shift(bench, effect, change):

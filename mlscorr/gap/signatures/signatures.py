@@ -173,9 +173,9 @@ def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Gene
         )  # fmt: skip
     tries = _tries(kind, size, fixed)
     jacobian, step = np.zeros((m, len(tries))), SETTINGS.step * typical
-    for column, (_, unit, more) in enumerate(tries):
+    for column, (_, unit, more) in enumerate(tries if _is_seen(rows, fixed) else ()):
         ends = [
-            bench.change(kind(magnitude=_scaled(unit, sign * step), **more)).shift
+            bench.change(kind(magnitude=np.multiply(unit, sign * step).tolist(), **more)).shift
             for sign in ((-1, 1) if size.least is None else (0, 1))
         ]
         jacobian[:, column] = (ends[1] - ends[0]) / (step * (2 if size.least is None else 1))
@@ -184,6 +184,16 @@ def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Gene
         kind, fixed, names, (size.unit,) * len(tries), np.full(len(tries), typical),
         jacobian, none, none,
     )  # fmt: skip
+
+
+def _is_seen(rows, fixed):
+    """Whether a row lies where an event that passes is half as large as at its largest, or more:
+    of what shows by its tail alone nobody knows how large it was.
+    """
+    times = np.concatenate([rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]])
+    apart = np.abs(times - rows.reference.start - fixed.get("time", 0.0))
+    half = np.sqrt(2 * np.log(2)) * fixed.get("width", np.inf)
+    return bool(apart.min(initial=np.inf) <= half)
 
 
 def _tries(kind, size, fixed):
@@ -196,10 +206,6 @@ def _tries(kind, size, fixed):
         phases = (0.0, np.pi / 2)
         return [(n, 1.0, {**fixed, "phase": p}) for n, p in zip(kind.parts, phases, strict=True)]
     return [("magnitude", 1.0, fixed)]
-
-
-def _scaled(unit, step):
-    return float(unit * step) if np.ndim(unit) == 0 else (unit * step).tolist()
 
 
 def _bank(kind, rows, survey):
@@ -237,15 +243,19 @@ def _times(rows, survey, spacing):
     return [float(round(time - rows.reference.start, 3)) for time in times]
 
 
-def select(signs: Iterable[Signature], rows: np.ndarray) -> tuple[Signature, ...]:
-    """Signatures in some rows alone.
+def select(signs: Iterable[Signature], rows: Rows, used: np.ndarray) -> tuple[Signature, ...]:
+    """Signatures in some rows alone; of events those that these rows see.
 
     Parameters
     ----------
     signs : iterable of Signature
-    rows : (m,) bool array
+    rows : Rows
+        Of which the signatures are.
+    used : (m,) bool array
     """
-    names = ("jacobian", "variance", "growth")
+    names, part = ("jacobian", "variance", "growth"), rows.select(used)
     return tuple(
-        replace(sign, **{name: getattr(sign, name)[rows] for name in names}) for sign in signs
+        replace(sign, **{name: getattr(sign, name)[used] for name in names})
+        for sign in signs
+        if _is_seen(part, sign.fixed)
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -75,13 +76,10 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     ValueError
         For a size that no survey can have.
     """
-    effects = list(simulator.effects)
-    for new in cause.effects:
-        effects = joined(effects, new)
+    added = cause.effects
     if simulator.mounting is not None:  # differences of the mounting have become effects
-        _, effects_now = as_believed(survey, replace(simulator, effects=()))
-        for effect in effects_now:
-            effects = joined(effects, effect)
+        added += as_believed(survey, replace(simulator, effects=()))[1]
+    effects = reduce(joined, added, list(simulator.effects))
     scale, pos = cause.model.scale, simulator.pos
     if not cause.parts or scale != 1.0:
         attitude = np.asarray(pos.attitude_sigma) * scale

@@ -6,12 +6,12 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from mlscorr.effects import EFFECTS, Effect, make_effect, quantity
+from mlscorr.effects import EFFECTS, Effect, effect_class, make_effect, quantity
 from mlscorr.gap.observe.pairing import patch_rows
 from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import signature, signatures
+from mlscorr.gap.signatures.signatures import select, signature, signatures
 from tests.beds.short_drive import EXACT, NOISE, in_simulation, run
 
 
@@ -30,6 +30,18 @@ def test_effects_do_to_targets_what_the_full_simulator_does(clean, name):
     np.testing.assert_allclose(found.jacobian @ size, truth, atol=0.03 * np.abs(truth).max())
     again = found.effect(size)
     np.testing.assert_allclose(np.atleast_1d(again.magnitude), np.atleast_1d(effect.magnitude))
+
+
+def test_an_event_of_which_no_row_sees_half_has_no_signature(clean):
+    "Seen 1.1 of its widths from its middle it has one, in those rows alone; 1.3 of them away none"
+    survey, rows, _, _ = clean
+    kind, rng, bench = effect_class("position_bump"), np.random.default_rng(0), Bench(rows, survey)
+    last = rows.gps_time.max() - rows.reference.start
+    near, far = (signature(bench, kind, {"time": last + x, "width": 1.0}, rng) for x in (1.1, 1.3))
+    assert near.jacobian.max() == pytest.approx(np.exp(-0.5 * 1.1**2), rel=0.05)
+    assert not far.jacobian.any()
+    others = rows.gps_time < rows.gps_time.max() - 0.5
+    assert select([near], rows, ~others) and not select([near], rows, others)
 
 
 @pytest.mark.long
