@@ -28,9 +28,7 @@ def diagnose(
             "tells how far the gap shrinks."
         ),
     ] = (),
-    effects: Annotated[
-        Path | None, typer.Option(help="Python file that registers effects of your own; it is run.")
-    ] = None,
+    effects: terminal.Effects = None,
     until_none: Annotated[
         bool,
         typer.Option(
@@ -51,11 +49,8 @@ def diagnose(
 ) -> None:
     """Find where reality and simulation differ, why, and how far the gap can be closed."""
     with terminal.exit_code(terminal.Exit.USAGE):
-        from mlscorr.effects import register_file
         from mlscorr.simulate.simulator_file import read_simulator
 
-        if effects:
-            register_file(effects)
         believed = read_simulator(simulator) if simulator else None
         chosen = _costs(costs)
         if len(simulated) > 2:

@@ -1,13 +1,13 @@
 """The command that says what a survey will show before it is driven."""
 
 import mlscorr
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.terminal import Effects, Json, Out, Overwrite, Quiet, SurveyArgument, say
 from mlscorr.cli.work import print_json, work
 
 
 def plan(
-    survey: SurveyArgument, out: Out, overwrite: Overwrite = False, as_json: Json = False,
-    quiet: Quiet = False,
+    survey: SurveyArgument, out: Out, effects: Effects = None, overwrite: Overwrite = False,
+    as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
     with work(out, overwrite, survey, planned=True):

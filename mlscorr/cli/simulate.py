@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, exit_code, say
+from mlscorr.cli.terminal import Effects, Exit, Json, Out, Overwrite, Quiet, exit_code, say
 from mlscorr.cli.work import print_json, work
 
 
@@ -13,6 +13,7 @@ def simulate(
     scenario: Annotated[Path, typer.Argument(help="TOML file, as those in examples/scenarios.")],
     out: Out,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 1,
+    effects: Effects = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -44,6 +44,29 @@ def is_quiet() -> bool:
     return _voice["quiet"]
 
 
+def know_effects(path: Path | None) -> Path | None:
+    """Register the effects of a user's file, as soon as the option is read.
+
+    Parameters
+    ----------
+    path : Path or None
+
+    Returns
+    -------
+    Path or None
+        The same.
+    """
+    if path is not None:
+        with exit_code(Exit.USAGE):
+            from mlscorr.effects import register_file
+
+            register_file(path)
+    return path
+
+
+Effects = Annotated[
+    Path | None, typer.Option(callback=know_effects, help="Python file of your effects; it is run.")
+]
 Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in the folder.")]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Print errors and warnings only.")

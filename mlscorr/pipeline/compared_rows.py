@@ -93,11 +93,10 @@ def compare_with_belief(
     simulator = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
     used = np.arange(len(rows)) < len(pairing.rows)
     observed = without_effects(rows, believed, effects)
-    apart = rng.spawn(1)[0]  # how much is contrasted leaves the draws of the verdict alone
-    contrasts = contrast.contrast_returns(believed, patches, _loss(effects), apart)
+    # how much is contrasted leaves the draws of the verdict alone
+    contrasts = contrast.contrast_returns(believed, patches, _loss(effects), rng.spawn(1)[0])
     notes = (*pairing.notes, *noisy)
-    compared = observed, used, simulator.added, absence, notes, contrasts
-    return ComparedRows(*compared, next_run=NEXT_RUN)
+    return ComparedRows(observed, used, simulator.added, absence, notes, contrasts, (), NEXT_RUN)
 
 
 def _loss(effects):

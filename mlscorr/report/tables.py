@@ -182,8 +182,9 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
         none = "No target was found" if report.targets else "There is no surveyed point"
         return [f"{none} that could tell how good the correction is."], True
     sigma = (report.check if kind == "check" else report.control).sigma
-    # as large as this it is by chance, as it is known no better there than by its own sigma
-    limit = np.inf if sigma is None else sigma * _largest_ratio(after.n)
+    # as large as this the RMS of n is by chance, as it is known no better there than by its sigma
+    ratio = np.sqrt(chdtri(after.n, ESTIMATE.significance) / after.n)
+    limit = np.inf if sigma is None else sigma * ratio
     rise = np.where(after.rmse[:3] > limit, (after.rmse - before.rmse)[:3], 0.0)
     axes = dict(zip(AXES, rise, strict=True))
     worse = [f"{a} by {number(by)} m" for a, by in axes.items() if by > SETTINGS.difference]
@@ -196,11 +197,6 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
         axes = ", ".join(worse)
         sentences.append(f"After the correction it is worse than before: {axes} (RMS of {points}).")
     return sentences, bool(worse or report.points("check").missing)
-
-
-def _largest_ratio(n):
-    """How many times its sigma the RMS of n residuals may be by chance."""
-    return np.sqrt(chdtri(n, ESTIMATE.significance) / n)
 
 
 def _plainly(before, after, kind, holds_everywhere, is_worse):

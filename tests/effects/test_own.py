@@ -1,8 +1,12 @@
 """Effects of one's own from a file."""
 
+import json
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from mlscorr.cli import app
 from mlscorr.effects import catalogue, effect_class, register_file
 from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.gap.train.features import geometry
@@ -43,8 +47,37 @@ def written(path, name, body):
 
 def test_a_file_registers_its_effects(tmp_path):
     "The class is known by its name from then on"
-    (kind,) = register_file(written(tmp_path, "lift", "[0.0, 0.0, 1.0]"))
+    (kind,) = register_file(written(tmp_path, "lift", "np.array([0, 0, 1])"))
     assert effect_class("lift") is kind
+
+
+@pytest.mark.long
+def test_simulate_and_plan_take_the_file_of_an_effect(tmp_path):
+    "Recorded heights are 0.1 m off, the plan says what size shows; without the file all is unknown"
+    file, scenario, out = (
+        written(tmp_path, "lift", "np.array([0, 0, 1])"),
+        tmp_path / "s.toml",
+        tmp_path,
+    )
+    short = (
+        "[drive]\nduration = 6.0\n[targets]\ncontrol = 4\ncheck = 1\n"
+        "[[scanner]]\nlines_per_second = 40\npoints_per_line = 200\n"
+    )
+    scenario.write_text(short + '[[effects]]\nname = "lift"\nmagnitude = 0.1\n')
+    command = ["simulate", str(scenario), "-o", str(out / "survey")]
+    unknown = CliRunner().invoke(app, command)
+    assert unknown.exit_code == 2 and "--effects FILE" in unknown.output
+    made = CliRunner().invoke(app, [*command, "--effects", str(file)])
+    assert made.exit_code == 0, made.output
+    recorded = np.loadtxt(out / "survey" / "trajectory.csv", delimiter=",", skiprows=1)[:, 3]
+    scenario.write_text(short)
+    CliRunner().invoke(app, ["simulate", str(scenario), "-o", str(out / "clean")])
+    clean = np.loadtxt(out / "clean" / "trajectory.csv", delimiter=",", skiprows=1)[:, 3]
+    np.testing.assert_allclose(recorded - clean, 0.1, atol=2e-5)
+    plan = ["plan", str(out / "survey"), "--effects", str(file), "-o", str(out / "plan")]
+    assert CliRunner().invoke(app, plan).exit_code == 0
+    (size,) = json.loads((out / "plan" / "plan.json").read_text())["detectable"]["lift"]
+    assert 0.0 < size["detectable"] < 1.0
 
 
 @pytest.mark.parametrize(("text", "said"), [

@@ -105,10 +105,6 @@ def _explained(table, sums):
     return float((weight * squares).sum() / max(weight.sum(), 1e-300))
 
 
-def _weights(block, rng):
-    return weights_of(int(block.max()) + 1, rng)
-
-
 def _by_sight(away, incidence):
     """Splits by range (n,) in m and angle of incidence (n,) in deg."""
     return (
@@ -130,7 +126,7 @@ def _intensity(
     ratio = np.log(10.0) * (known.brightness[:, 0] - known.brightness[:, 1])
     classes = Binning("reflectance", _classes(known), bins=CLASSES)
     splits = (*_by_sight(known.range, known.incidence), classes)
-    return _of_ratio(known, ratio, _weights(known.block, rng), splits)
+    return _of_ratio(known, ratio, weights_of(known.block.max() + 1, rng), splits)
 
 
 def _of_ratio(pairs, ratio, weights, splits):
@@ -179,7 +175,7 @@ def _density(pairs: PairedCells, rng: np.random.Generator) -> Contrast | Measure
     if len(pairs) == 0 or not pairs.points.any(axis=0).all():
         return Contrast("density", SILENT["apart"])
     splits = _by_sight(pairs.range, pairs.incidence)
-    return _of_points(pairs.block, *pairs.points.T, _weights(pairs.block, rng), splits)
+    return _of_points(pairs.block, *pairs.points.T, weights_of(pairs.block.max() + 1, rng), splits)
 
 
 def _of_points(block, real, simulated, weights, splits):
@@ -227,7 +223,7 @@ def _dropout(
         other = loss * fired, fired
     splits = _by_sight(away, np.degrees(np.arccos(np.clip(slant, 0.0, 1.0))))
     block = block_of(joined.centre)
-    return _of_means("dropout", block, real, other, splits, _weights(block, rng))
+    return _of_means("dropout", block, real, other, splits, weights_of(block.max() + 1, rng))
 
 
 def _edge_width(
@@ -243,4 +239,4 @@ def _edge_width(
     sums = [(width * which, which.astype(float)) for which in (is_real, ~is_real)]
     splits = (Binning("range", joined.range, SETTINGS.ranges),)
     block = block_of(joined.place)
-    return _of_means("edge_width", block, *sums, splits, _weights(block, rng))
+    return _of_means("edge_width", block, *sums, splits, weights_of(block.max() + 1, rng))
