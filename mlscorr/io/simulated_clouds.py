@@ -37,7 +37,7 @@ def simulated_survey(path: Path | str, survey: Survey) -> Survey:
     if survey.crs is not None:
         for cloud in clouds:
             if conflict := crs_conflict(read_layout(cloud), survey.crs):
-                raise ValueError(f"The simulated clouds can't be compared. {conflict}")
+                raise ValueError(f"Bring the simulated clouds into the survey's CRS. {conflict}")
     with warnings.catch_warnings(action="ignore"):  # of the CRS, which agrees
         try:
             given = survey.trajectory, "auto", survey.crs

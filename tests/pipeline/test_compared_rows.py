@@ -134,6 +134,8 @@ def test_clouds_of_another_drive_are_refused(folders, tmp_path):
         simulated_survey(tmp_path, real)
     with pytest.raises(ValueError, match="EPSG:32651"):
         simulated_survey(folders[1], replace(real, crs="EPSG:32651"))
+    with pytest.raises(ValueError, match=r"into the survey's CRS.*EPSG:32651"):
+        simulated_survey(folders[1] / "pass-1.laz", replace(real, crs="EPSG:32651"))
 
 
 def test_clouds_elsewhere_are_refused(folders, tmp_path):
