@@ -92,7 +92,7 @@ def figures(results):
     def rate(good, some):
         hits = [[good(truth, label) for label in labels] for truth, mdb, labels in results
                 if some(truth, mdb)]  # fmt: skip
-        return (*np.mean(hits, axis=0), len(hits))
+        return (*(np.mean(hits, axis=0) if hits else (np.nan, np.nan)), len(hits))
 
     def right(truth, label):
         return truth == label
