@@ -1,7 +1,6 @@
 """``correct`` of a project: from several drives to the corrected clouds and reports of all."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -282,6 +281,9 @@ def _contents(survey):
 
 def _is_there(store, key):
     """Whether all of a drive's results are in the store, undamaged."""
-    with suppress(KeyError):
-        return all(store.get(kind, key) for kind in ("states", "motions", "corrected"))
-    return False
+    try:
+        for kind in ("states", "motions", "corrected"):
+            store.get(kind, key)
+    except KeyError:
+        return False
+    return True
