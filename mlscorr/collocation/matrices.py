@@ -48,16 +48,16 @@ def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @njit(cache=True, nogil=True)
 def subtract_product(x: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
-    """X <- x - a b^T, in place.
+    """X <- x - a b, in place.
 
     Parameters
     ----------
-    x, a, b : (i, j), (i, k), (j, k) array
+    x, a, b : (i, j), (i, k), (k, j) array
     """
     for i in range(x.shape[0]):
-        for j in range(x.shape[1]):
-            for k in range(a.shape[1]):
-                x[i, j] -= a[i, k] * b[j, k]
+        for k in range(a.shape[1]):
+            for j in range(x.shape[1]):
+                x[i, j] -= a[i, k] * b[k, j]
 
 
 @njit(cache=True, nogil=True)

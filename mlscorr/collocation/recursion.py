@@ -102,7 +102,7 @@ def filter_covariance(
             p = carry_square(layout, transitions[i], p, False)
         add_blocks(layout, spread, p)
         observed = observe(layout.first, mixing[i], p)  # H P-
-        innovation = observe(layout.first, mixing[i], observed.T.copy())
+        innovation = observe(layout.first, mixing[i], observed.T)
         prior = np.zeros(r)
         for m in range(r):
             prior[m] = noise[i, m, m]
@@ -124,11 +124,10 @@ def filter_covariance(
 @njit(cache=True, nogil=True)
 def _joseph(first, mixing, noise, p, gain, observed):
     """(I - K H) P- (I - K H)^T + K R K^T from K^T and H P-."""
-    columns, wide = gain.T.copy(), observed.T.copy()
-    subtract_product(p, columns, wide)
-    left = observe(first, mixing, p.T.copy())  # H [(I - K H) P-]^T, which R K^T balances
-    subtract_product(left, noise, columns)
-    subtract_product(p, left.T.copy(), columns)
+    subtract_product(p, gain.T, observed)
+    left = observe(first, mixing, p.T)  # H [(I - K H) P-]^T, which R K^T balances
+    subtract_product(left, noise, gain)
+    subtract_product(p, left.T, gain)
     make_symmetric(p)
     return p
 
@@ -192,7 +191,7 @@ def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarr
     for i in range(n - 1, -1, -1):
         assign(adjoints[i], a)
         u = multiply_transposed(whiteners[i], whitened[i])
-        subtract_product(u, gains[i], a.T.copy())
+        subtract_product(u, gains[i], a)
         assign(weights[i], u)
         send_back(layout.first, mixing[i], u, a)
         if i > 0:
@@ -234,7 +233,7 @@ def smooth_covariance(
         assign(future[i], multiply(gains[i], information))
         weight = multiply_transposed(whiteners[i], whiteners[i])  # S^-1
         assign(blocks[i], weight)
-        subtract_product(blocks[i], -future[i], gains[i])
+        subtract_product(blocks[i], -future[i], gains[i].T)
         assign(same[i], covariances[i])
         subtract_product(same[i], multiply(covariances[i], information), covariances[i])
         if i == 0:
@@ -243,7 +242,7 @@ def smooth_covariance(
         information = information.T.copy()
         back = observe(layout.first, mixing[i], np.eye(size))
         back = multiply(weight, back)
-        subtract_product(back, gains[i], information.T.copy())
+        subtract_product(back, gains[i], information)
         send_back(layout.first, mixing[i], back, information)  # N-
         make_symmetric(information)
         fill_noise(layout, steps[i], spread)
@@ -275,7 +274,7 @@ def precision_between(
     layout, transitions, mixing, gains, whiteners = recursion
     y = np.zeros((gains.shape[2], gains.shape[1]))
     weight = multiply_transposed(whiteners[late], whiteners[late])  # S^-1 + K^T N K
-    subtract_product(weight, -future[late], gains[late])
+    subtract_product(weight, -future[late], gains[late].T)
     send_back(layout.first, mixing[late], weight, y)
     for a in range(y.shape[0]):
         for m in range(y.shape[1]):
