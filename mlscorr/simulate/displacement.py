@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mlscorr.simulate.survey import PulseBlock, SimulatedSurvey
-from mlscorr.survey import Mounting, PointCloud, Trajectory
+from mlscorr.survey import Mounting, Trajectory
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,6 @@ class DisplacedSurvey(SimulatedSurvey):
     def blocks(self, **size: int) -> Iterator[PulseBlock]:
         """Blocks as of the survey, their points moved."""
         for block in super().blocks(**size):
-            points = RecordedPoints(
-                block.cloud.gps_time,
-                block.cloud.xyz,
-                block.pulses.scanner_xyz,
-                self.trajectory,
-                self.mounting,
-            )
-            xyz = block.cloud.xyz + self.move(points)
-            yield replace(block, cloud=PointCloud(xyz, block.cloud.gps_time, block.cloud.intensity))
+            cloud, poses = block.cloud, (self.trajectory, self.mounting)
+            points = RecordedPoints(cloud.gps_time, cloud.xyz, block.pulses.scanner_xyz, *poses)
+            yield replace(block, cloud=replace(cloud, xyz=cloud.xyz + self.move(points)))

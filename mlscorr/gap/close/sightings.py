@@ -78,15 +78,13 @@ def sightings_of(rows: Rows, finding: Any) -> list[Sighting]:
     """
     on, sightings = rows.channel == "target", []
     matched = finding.matches.matched
-    fitted = {
-        (matched.name[i], matched.gps_time[i]): (matched.pass_number[i], matched.gps_time[i])
-        for i in range(len(matched))
-    }
+    sights = zip(matched.name, matched.gps_time, strict=True)
+    passes = dict(zip(sights, matched.pass_number, strict=True))
     items, first = np.unique(rows.item[on], return_index=True)
     for item, row in zip(items, np.flatnonzero(on)[first], strict=True):
         name = rows.targets.name[rows.survey_item[row]]
-        number, time = fitted.get((name, rows.gps_time[row]), (0, 0.0))
-        target = finding.fitted.get((number, time))
+        time = rows.gps_time[row]
+        target = finding.fitted.get((passes.get((name, time)), time))
         if target is not None:
             surveyed = rows.targets.position[rows.survey_item[row]]
             sightings.append(Sighting(int(item), target, surveyed))

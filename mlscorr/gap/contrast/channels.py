@@ -206,13 +206,12 @@ def _dropout(
     rng: np.random.Generator,
 ) -> Contrast | Measure:  # fmt: skip
     """Beams without a return, between those of a scan line that have one."""
-    if patches is None or not patches.fired.any():
+    known = [part for part in (patches, simulated) if part is not None]
+    if patches is None or not all(part.fired.any() for part in known):
         return Contrast("dropout", SILENT["pulses"])
     if simulated is None and loss is None:
         return Contrast("dropout", SILENT["dropout"])
-    if simulated is not None and not simulated.fired.any():
-        return Contrast("dropout", SILENT["pulses"])
-    joined = Patches.concatenate([part for part in (patches, simulated) if part is not None])
+    joined = Patches.concatenate(known)
     sight = joined.centre - scanner_origin(survey, joined.gps_time)
     away = np.linalg.norm(sight, axis=1)
     slant = np.abs(np.einsum("pi,pi->p", sight, joined.normal)) / away

@@ -18,20 +18,6 @@ SILENT = {  # why a channel is not compared
     "edges": "Too few depth edges lie along scan lines for a width.",
     "apart": "The two clouds have hardly a place in common.",
 }
-HINTS = {  # what the simulator lacks, where the real figure falls along the bins, or rises
-    ("intensity", "range"): (
-        "the simulator lacks falloff with range", "the simulator's intensity falls off too fast "
-        "with range",
-    ),
-    ("intensity", "incidence"): (
-        "the simulator lacks falloff with the angle of incidence",
-        "the simulator's intensity falls off too fast with the angle of incidence",
-    ),
-    ("intensity", "reflectance"): (
-        "the simulator's materials differ too much in brightness",
-        "the simulator's materials differ too little in brightness",
-    ),
-}  # fmt: skip
 PLACES = {"range": ("range", " m"), "incidence": ("angle of incidence", "°")}
 
 
@@ -83,14 +69,21 @@ def _density(value, sigma, where):
 
 def _intensity(table, value, sigma, where):
     factor = np.exp(abs(value))
-    falls, rises = HINTS["intensity", table.by]
     known = np.flatnonzero(np.isfinite(table.value))
     slope = np.polyfit(known, table.value[known], 1)[0] if len(known) > 1 else value
     return (
         f"Real returns are {_pair(factor, factor * sigma)} times "
         f"{'weaker' if value < 0 else 'stronger'} than simulated ones {where}, beside the usual "
-        f"ratio of the two: {falls if slope < 0 else rises}."
+        f"ratio of the two: the simulator{_lacks(table.by, slope < 0)}."
     )
+
+
+def _lacks(by, falls):
+    """What simulated intensities lack, where the real ones fall along the bins, or rise."""
+    if by == "reflectance":
+        return f"'s materials differ too {'much' if falls else 'little'} in brightness"
+    along = "with range" if by == "range" else f"with the {PLACES[by][0]}"
+    return f" lacks falloff {along}" if falls else f"'s intensity falls off too fast {along}"
 
 
 def _pair(value, sigma):

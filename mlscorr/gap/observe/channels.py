@@ -38,12 +38,10 @@ def _sweep(survey, sight, time):
     """How a point moves (n, 3) as its scan angle grows, m per rad; as if the scanner turned about
     the driving direction where the mounting is not known.
     """
-    if survey.mounting is None:
-        return np.cross(survey.trajectory.at(time).attitude.apply([0.0, 1.0, 0.0]), sight)
-    axis = survey.trajectory.at(time).attitude.apply(
-        survey.mounting.boresight.apply([0.0, 0.0, 1.0])
-    )
-    return np.cross(axis, sight)
+    mounting, axis = survey.mounting, np.array([0.0, 1.0, 0.0])
+    if mounting is not None:
+        axis = mounting.boresight.apply([0.0, 0.0, 1.0])
+    return np.cross(survey.trajectory.at(time).attitude.apply(axis), sight)
 
 
 def log_roughness(

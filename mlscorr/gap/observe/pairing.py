@@ -233,18 +233,18 @@ def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = N
     rough, rough_noise, believed, flat = roughness(survey, patches)
     lost, lost_noise, counted = return_rate(patches)
     flat, counted, p = np.flatnonzero(flat), np.flatnonzero(counted), len(patches)
-    on = np.arange(0 if surface is None else p)
+    if surface is None:
+        surface = OnReference(np.empty(0, int), np.empty((0, 3)), *np.empty((2, 0)))
+    on = np.arange(len(surface))
     item = np.concatenate([on, flat, counted])
     direction = np.zeros((len(item), 3))
-    direction[: len(on)] = 0.0 if surface is None else surface.direction
+    direction[: len(on)] = surface.direction
     channel = ["surface"] * len(on) + ["roughness"] * len(flat) + ["return_rate"] * len(counted)
-    first = [] if surface is None else surface.residual
-    first_noise = [] if surface is None else surface.noise
     points = [patches.points[on], patches.points[flat], patches.fired[counted]]
     return assemble(
         survey, channel, item, patches.gps_time[item], patches.centre[item], direction,
-        np.concatenate([first, rough[flat], lost[counted]]),
-        np.concatenate([first_noise, rough_noise[flat], lost_noise[counted]]),
+        np.concatenate([surface.residual, rough[flat], lost[counted]]),
+        np.concatenate([surface.noise, rough_noise[flat], lost_noise[counted]]),
         np.concatenate(points), patch_pulses(survey, patches, np.arange(p)),
         patches.pass_number[item],
         believed=np.concatenate([np.full(len(on), np.nan), believed[flat], np.ones(len(counted))]),

@@ -144,12 +144,7 @@ class Rows:
         ----------
         rows : (m,) bool array, or (k,) int array
         """
-        names = [f.name for f in fields(self)]
-        arrays = {
-            name: getattr(self, name)[rows]
-            for name in names
-            if isinstance(getattr(self, name), np.ndarray)
-        }
+        arrays = {name: getattr(self, name)[rows] for name in _arrays(self)}
         return replace(
             self,
             **arrays,
@@ -168,9 +163,9 @@ class Rows:
                 replace(rows, item=first + np.searchsorted(known, rows.item), pulses=pulses)
             )
             first += len(known)
-        names = [f.name for f in fields(cls) if isinstance(getattr(parts[0], f.name), np.ndarray)]
         columns: dict[str, Any] = {
-            name: np.concatenate([getattr(rows, name) for rows in parts]) for name in names
+            name: np.concatenate([getattr(rows, name) for rows in parts])
+            for name in _arrays(parts[0])
         }
         return replace(
             parts[0],
@@ -188,6 +183,11 @@ class Rows:
         column = 3 * self.survey_item[rows, None] + np.arange(3)
         entries = self.survey_factor[rows].ravel(), (np.repeat(rows, 3), column.ravel())
         return csr_array(entries, shape=(len(self), 3 * len(self.targets)))
+
+
+def _arrays(rows):
+    """Names of the fields that are arrays, of m rows each."""
+    return [f.name for f in fields(rows) if isinstance(getattr(rows, f.name), np.ndarray)]
 
 
 @dataclass(frozen=True)

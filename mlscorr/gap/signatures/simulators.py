@@ -1,7 +1,7 @@
 """The survey as a simulator believes in it, and the simulator with a cause added."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from functools import reduce
 from typing import Any
 
@@ -51,11 +51,8 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
         "position_sigma": new.position_sigma / old.position_sigma,
         "attitude_sigma": np.asarray(new.attitude_sigma) / np.asarray(old.attitude_sigma),
     }
-    scaled = {
-        name: getattr(trajectory, name) * scale
-        for name, scale in scales.items()
-        if getattr(trajectory, name) is not None
-    }
+    stated = {name: getattr(trajectory, name) for name in scales}
+    scaled = {n: sigma * scales[n] for n, sigma in stated.items() if sigma is not None}
     trajectory = replace(trajectory, **scaled)
     believed = replace(survey, trajectory=trajectory, scanner=simulator.scanner, pos=new)
     return believed, in_order(effects)
@@ -110,5 +107,4 @@ def joined(effects: Sequence[Effect], new: Effect) -> list[Effect]:
 
 
 def _fixed(effect):
-    known = {f.name for f in fields(effect)} - {"magnitude"}
-    return {name: value for name, value in asdict(effect).items() if name in known}
+    return {name: value for name, value in asdict(effect).items() if name != "magnitude"}
