@@ -10,10 +10,10 @@ field). A field's unit is the first word of the comment on its line. Values that
 when it is imported aren't reached: it reads ``SETTINGS.field`` where it uses it.
 """
 
+import argparse
 import inspect
 import math
 import re
-import sys
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from time import perf_counter
@@ -166,7 +166,7 @@ def _numbers(figures):
 
 
 def main(words):
-    """Report on the rooms or fields named, or on all."""
+    """Report on the rooms or fields named, or on all; a number at the end is the tolerance."""
     tolerance = float(words.pop()) if words and words[-1][0].isdigit() else TOLERANCE
     unknown = {word.split(".")[0] for word in words} - {room for room, *_ in ROOMS}
     if unknown:
@@ -179,4 +179,6 @@ def main(words):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("words", nargs="*", metavar="room, room.field or tolerance")
+    main(parser.parse_args().words)

@@ -5,6 +5,7 @@
 Times alone mean nothing on a busy machine: what is compared runs in turn, and medians count.
 """
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -179,4 +180,5 @@ if __name__ == "__main__":
         corrected_copy(Path(sys.argv[1]), count, sys.argv[2], drift(count / PULSES))
         print(peak_memory() - before)
     else:
+        argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
         main()

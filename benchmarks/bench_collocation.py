@@ -6,6 +6,7 @@ One thread, and its processor time: what is compared runs in turn on a busy mach
 of three counts. celerite2 (pip install celerite2) is no dependency; without it its column says so.
 """
 
+import argparse
 from time import thread_time
 
 import numpy as np
@@ -234,6 +235,7 @@ def six_components():
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     with threadpool_limits(1):
         Component(10, 10).both()  # compiled, or loaded
         growth()

@@ -6,6 +6,7 @@ By default 5 million points on two passes, with a reference surface. Times alone
 busy machine: laspy decodes the same clouds before and after, each in a process of its own.
 """
 
+import argparse
 import resource
 import subprocess
 import sys
@@ -74,7 +75,9 @@ def main():
     if sys.argv[1:2] == ["--task"]:
         child(*sys.argv[2:])
         return
-    millions = float(sys.argv[1]) if len(sys.argv) > 1 else 5.0
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("millions", nargs="?", type=float, default=5.0, help="of points")
+    millions = parser.parse_args().millions
     table = Table("task", "wall (s)", "processor (s)", "peak memory (MB)", "result")
     with tempfile.TemporaryDirectory() as folder:
         make(Path(folder) / "survey", millions)

@@ -8,7 +8,7 @@ assignment with the smallest sum of squared distances among all pairs within the
 before, to be compiled.
 """
 
-import sys
+import argparse
 from time import thread_time
 
 import numpy as np
@@ -57,7 +57,10 @@ METHODS = {
 }
 
 
-def main(count=100_000):
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("observations", nargs="?", type=int, default=100_000)
+    count = parser.parse_args().observations
     small, drive = long_drive(SMALL), long_drive(count)
     table = Table(f"{count} observations and points", "s", "observations/s", "right", "wrong", "MB")
     for title, name in METHODS.items():
@@ -73,4 +76,4 @@ def main(count=100_000):
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main()

@@ -5,6 +5,7 @@
 Times alone mean little on a busy machine; the goals are those of two idle cores.
 """
 
+import argparse
 import subprocess
 import sys
 from pathlib import Path
@@ -91,7 +92,7 @@ def pictures(points):
 
 def memory(millions):
     """Seconds, and peak memory in MB over that after the imports, of a child that draws."""
-    command = [sys.executable, __file__, str(millions)]
+    command = [sys.executable, __file__, "--task", str(millions)]
     start = perf_counter()
     peak = int(subprocess.run(command, check=True, capture_output=True).stdout)
     return perf_counter() - start, peak
@@ -114,9 +115,10 @@ def main():
 
 
 if __name__ == "__main__":
-    if len(sys.argv) == 2:  # the child whose memory is measured
+    if sys.argv[1:2] == ["--task"]:  # the child whose memory is measured
         before = peak_memory()
-        pictures(int(sys.argv[1]) * 1_000_000)
+        pictures(int(sys.argv[2]) * 1_000_000)
         print(peak_memory() - before)
     else:
+        argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
         main()

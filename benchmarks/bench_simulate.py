@@ -7,6 +7,7 @@ cast the same rays, by blocks of the same size; the simulator also makes them, m
 hit, georeferences it with what was recorded, and applies the effects.
 """
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -130,4 +131,5 @@ if __name__ == "__main__":
         made.write(Path(sys.argv[2]) / "survey")
         print(made.fired, peak_memory() - before)
     else:
+        argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
         main()

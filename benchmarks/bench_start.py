@@ -6,6 +6,7 @@ Commands run in turn, and medians count. The disk is warm; the first start after
 also compiles bytecode.
 """
 
+import argparse
 import subprocess
 import sys
 from statistics import median
@@ -41,4 +42,5 @@ def main():
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

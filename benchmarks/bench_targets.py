@@ -7,6 +7,7 @@ Times alone mean nothing on a busy machine: each extraction runs between two bar
 laspy in processes of their own, and the ratio counts; that of processor time is steadier.
 """
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -172,4 +173,6 @@ if __name__ == "__main__":
         *numbers, result = measure(task, survey)
         print(*numbers, *np.atleast_1d(result))
     else:
-        main([float(word) for word in sys.argv[1:]] or [2.0, 20.0])
+        parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+        parser.add_argument("millions", nargs="*", type=float, default=[2.0, 20.0], help="points")
+        main(parser.parse_args().millions)

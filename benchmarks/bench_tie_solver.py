@@ -7,6 +7,7 @@ ties a knot, and a control point every 100 s that both passes see. Each size run
 its own, which tells its memory; seconds are of the processor.
 """
 
+import argparse
 import resource
 import subprocess
 import sys
@@ -233,7 +234,10 @@ if __name__ == "__main__":
         if sys.argv[1:2] == ["run"]:
             run(int(sys.argv[2]))
         else:
-            numbers = [int(word) for word in sys.argv[1:]] or [1_000, 10_000, 100_000]
+            parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+            sizes = [1_000, 10_000, 100_000]
+            parser.add_argument("knots", nargs="*", type=int, default=sizes)
+            numbers = parser.parse_args().knots
             growth(numbers)
             beside_superlu([n for n in numbers if n <= 10_000])
             beside_the_dense_formula([30, 100, 300])

@@ -5,9 +5,11 @@
 By default 2, 10 and 20 million points on two passes of a simulated street, repeated file after
 file for more than 2. Times alone mean nothing on a busy machine: processor time counts, and each
 search runs between two decodings by laspy of the same files in processes of their own. ICP starts
+import argparse
 from the two passes as recorded, on points of voxels of 0.2 m.
 """
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -102,7 +104,10 @@ def measure(task, folder):
 
 def main():
     """Print a row for each size."""
-    sizes = [float(word) for word in sys.argv[1:]] or [2.0, 10.0, 20.0]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    usual = [2.0, 10.0, 20.0]
+    parser.add_argument("millions", nargs="*", type=float, default=usual, help="of points")
+    sizes = parser.parse_args().millions
     table = Table("points", "task", "CPU s", "of decoding", "counts", "MB")
     for size in sizes:
         with tempfile.TemporaryDirectory() as folder:

@@ -9,6 +9,7 @@ as by Ctrl-C. What stands in the folder then must be whole, and ``--resume`` mus
 bytes, without doing again what had ended. Times don't count: it may run beside other work.
 """
 
+import argparse
 import json
 import os
 import re
@@ -232,4 +233,6 @@ def main(kills=60):
 
 
 if __name__ == "__main__":
-    sys.exit(main(*map(int, sys.argv[1:])))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("kills", nargs="?", type=int, default=60)
+    sys.exit(main(parser.parse_args().kills))

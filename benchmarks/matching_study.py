@@ -18,6 +18,7 @@ targets, surveyed or not, and all control is right. The last study is of speed: 
 points as observations.
 """
 
+import argparse
 import os
 import sys
 import time
@@ -65,7 +66,10 @@ class Made:
 
 
 def main():
-    arguments = [int(argument) for argument in sys.argv[1:] if argument.isdigit()]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("words", nargs="*", help="canyons or many, and the number of surveys")
+    parser.add_argument("-v", action="store_true", help="print each survey")
+    arguments = [int(word) for word in parser.parse_args().words if word.isdigit()]
     if "canyons" in sys.argv:
         print_canyons(*arguments)
     elif "many" in sys.argv:

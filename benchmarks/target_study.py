@@ -3,7 +3,7 @@
 python benchmarks/target_study.py [views per row [looks, with commas [first seed]]]
 """
 
-import sys
+import argparse
 import tempfile
 import time
 from dataclasses import replace
@@ -138,6 +138,9 @@ def study(number, looks=TARGETS, first=0, sizes=(0.6, 0.3)):
 
 
 if __name__ == "__main__":
-    looks = sys.argv[2].split(",") if len(sys.argv) > 2 else TARGETS
-    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
-    study(int(sys.argv[1]) if len(sys.argv) > 1 else 200, looks, first)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("views", nargs="?", type=int, default=200, help="per row")
+    parser.add_argument("looks", nargs="?", default=",".join(TARGETS), help="with commas")
+    parser.add_argument("seed", nargs="?", type=int, default=0, help="the first")
+    given = parser.parse_args()
+    study(given.views, given.looks.split(","), given.seed)

@@ -59,3 +59,15 @@ def test_an_example_says_what_it_takes_before_it_works(name, tmp_path):
     printed = subprocess.check_output(script, text=True, cwd=tmp_path, timeout=60)
     assert "--picture" in printed
     assert not list(tmp_path.iterdir())
+
+
+SCRIPTS = sorted(p.stem for p in BENCHMARKS.glob("*.py") if "__main__" in p.read_text())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_benchmark_says_what_it_takes_before_it_works(name, tmp_path):
+    "Within the time of its imports; nothing is measured meanwhile"
+    script = [sys.executable, BENCHMARKS / f"{name}.py", "--help"]
+    printed = subprocess.check_output(script, text=True, cwd=tmp_path, timeout=60)
+    assert "usage:" in printed
