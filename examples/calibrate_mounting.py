@@ -8,6 +8,7 @@ mounting that Mao et al. (2015) found in their Table 6.
 """
 
 import argparse
+import sys
 import tempfile
 import warnings
 from pathlib import Path
@@ -139,5 +140,8 @@ def draw_misclosures(axes, survey, result):
 
 
 if __name__ == "__main__":
-    with warnings.catch_warnings(action="ignore"):  # the picture says what isn't determined
-        main()
+    try:
+        with warnings.catch_warnings(action="ignore"):  # the picture says what isn't determined
+            main()
+    except (ValueError, OSError) as error:  # of the input: a sentence says it
+        sys.exit(f"Error: {error}")

@@ -8,6 +8,7 @@ the shared surveys lie (MLSCORR_SHARED, or ../shared), else a small survey is si
 
 import argparse
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -62,4 +63,7 @@ def simulated(folder):
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (ValueError, OSError) as error:  # of the input: a sentence says it
+        sys.exit(f"Error: {error}")

@@ -7,6 +7,7 @@ with a GNSS outage of 25 s, and 24 targets, of which 8 are check points.
 """
 
 import argparse
+import sys
 import tempfile
 from pathlib import Path
 
@@ -142,4 +143,7 @@ def draw_correction(axes, result):
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (ValueError, OSError) as error:  # of the input: a sentence says it
+        sys.exit(f"Error: {error}")

@@ -11,6 +11,7 @@ smoothing, as surveys are processed, stands beside.
 
 import argparse
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -144,4 +145,7 @@ def draw(runs, picture):
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (ValueError, OSError) as error:  # of the input: a sentence says it
+        sys.exit(f"Error: {error}")

@@ -8,6 +8,7 @@ hand (in ../shared/surveys or $MLSCORR_SHARED/surveys), else a small one is simu
 
 import argparse
 import os
+import sys
 import tempfile
 from io import BytesIO
 from pathlib import Path
@@ -86,4 +87,7 @@ def together(pictures, path):
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (ValueError, OSError) as error:  # of the input: a sentence says it
+        sys.exit(f"Error: {error}")

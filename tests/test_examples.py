@@ -61,6 +61,15 @@ def test_an_example_says_what_it_takes_before_it_works(name, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.py")))
+def test_an_example_without_its_input_ends_in_a_sentence(name, tmp_path):
+    "It names the file; a word that an example has no use for is refused as well"
+    script = [sys.executable, EXAMPLES / f"{name}.py", tmp_path / "none"]
+    done = subprocess.run(script, text=True, capture_output=True, cwd=tmp_path, check=False)
+    assert done.returncode and str(tmp_path / "none") in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 SCRIPTS = sorted(p.stem for p in BENCHMARKS.glob("*.py") if "__main__" in p.read_text())
 
 
