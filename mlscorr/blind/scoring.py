@@ -40,45 +40,47 @@ def _rates(answered):
     )
     yield from _alarms(clean)
     yield _share("noise: a cause claimed", [not case.is_noise for case in noise])
-    yield _share("noise: named", [case.names(case.named) for case in noise])
+    yield _share("noise: named", [case.names(case.named) for case in noise], 0.85)
     at_2 = [case for case in single if case.goal_size == 2]
     at_3 = [case for case in single if case.is_clear]
-    for where, some, minimum in (("2 MDB", at_2, 0.92), ("3 MDB and more", at_3, 0.97)):
+    for where, some, goal, wider in (
+        ("2 MDB", at_2, 0.85, 0.88), ("3 MDB and more", at_3, 0.95, 0.97),
+    ):  # fmt: skip
         strict, by_class = ([case.names(case.named, c) for case in some] for c in (False, True))
-        yield _share(f"right at {where}", strict, minimum)
-        yield _share(f"right at {where}, by class", by_class, minimum)
+        yield _share(f"right at {where}", strict, goal)
+        yield _share(f"right at {where}, by class", by_class, wider)
     held = [
         any(case.names(label, by_class=True) for label in case.verdict["set"])
         for case in at_2 + at_3
     ]
     yield _share("the 95 % set holds the truth", held, 0.95)
     noisy = [case.named == "unknown" or case.is_only_noise for case in withheld]
-    yield _share("withheld: unknown or noise", noisy, 0.95)
+    yield _share("withheld: unknown or noise", noisy, 0.85)
     right = [case.is_right for case in withheld]
-    yield _share("withheld: unknown, noise or of its class", right, 0.95)
+    yield _share("withheld: unknown, noise or of its class", right, 0.92)
     far = [
         not case.is_noise
         and case.named not in ("unknown", "failed")
         and case.resemblance < SETTINGS.unlikeness
         for case in withheld
     ]
-    yield _share("withheld: wrongly named", far, maximum=0.05)
+    yield _share("withheld: wrongly named", far, maximum=0.04)
     flagged = [case for case in outside if case.named == "unknown"]
-    yield _share("outside: unknown", [case.named == "unknown" for case in outside], 0.95)
-    yield _share("outside: lead right where unknown", [case.leads for case in flagged], 0.90)
-    yield _share("both of a pair", [case.names(case.named) for case in pair], 0.93)
+    yield _share("outside: unknown", [case.named == "unknown" for case in outside], 0.80)
+    yield _share("outside: lead right where unknown", [case.leads for case in flagged], 0.75)
+    yield _share("both of a pair", [case.names(case.named) for case in pair], 0.90)
     by_class = [case.names(case.named, by_class=True) for case in pair]
-    yield _share("both of a pair, by class", by_class, 0.93)
+    yield _share("both of a pair, by class", by_class, 0.90)
     inside = [hit for case in single if case.goal_size >= 2 for hit in _inside(case)]
     yield _share("95 % intervals hold the parameter", inside, 0.93, 0.97)
 
 
 def _alarms(clean):
     """Rows of surveys in which nothing acts."""
-    yield _share("clean: a cause claimed", [not case.is_noise for case in clean], maximum=0.01)
+    yield _share("clean: a cause claimed", [not case.is_noise for case in clean], maximum=0.02)
     for sky in ("open", "bad"):
         alarms = [not case.is_noise for case in clean if case.label.get("sky") == sky]
-        yield _share(f"clean, {sky} sky: a cause claimed", alarms, maximum=0.01)
+        yield _share(f"clean, {sky} sky: a cause claimed", alarms, maximum=0.02)
     yield _share("clean: noise claimed", [case.is_only_noise for case in clean])
 
 
@@ -89,9 +91,9 @@ def _figures(answered):
     sizes = [len(case.verdict["set"]) for case in single if case.goal_size >= 2]
     yield _figure("size of the 95 % set", sizes, np.mean, maximum=1.5)
     closed = [_closed(case) for case in clear]
-    yield _figure("gap closed at 3 MDB and more, median", closed, np.median, 0.99)
+    yield _figure("gap closed at 3 MDB and more, median", closed, np.median, 0.98)
     yield _figure(
-        "gap closed at 3 MDB and more, p10", closed, lambda values: np.quantile(values, 0.1), 0.95
+        "gap closed at 3 MDB and more, p10", closed, lambda values: np.quantile(values, 0.1), 0.85
     )
     at_3 = [case for case in clear if case.goal_size == 3 and case.names(case.named)]
     error = [e for e in map(_error, at_3) if e is not None]

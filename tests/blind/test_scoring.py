@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.blind.scoring import score
+from tests.beds.places import BENCHMARKS
 
 
 def label(kind, *names, mdb=3.0, likeness=None, without="range_bias", mechanism=None, sky="open"):
@@ -63,7 +64,9 @@ def test_recovers_the_rates_of_hand_made_answers():
     rows, told = scored(*clean, *[found] * 48, *[missed] * 2)
     alarm, right = rows["clean: a cause claimed"], rows["right at 3 MDB and more"]
     assert (alarm["cases"], alarm["value"], alarm["reached"]) == (100, 0.01, True)
-    assert (right["cases"], right["value"], right["reached"]) == (50, 0.96, False)
+    assert (right["cases"], right["value"], right["reached"]) == (50, 0.96, True)
+    by_class = rows["right at 3 MDB and more, by class"]
+    assert (by_class["value"], by_class["reached"]) == (0.96, False)
     assert right["interval"] == pytest.approx([0.865, 0.989], abs=1e-3)
     assert rows["clean: noise claimed"]["value"] == 0.01
     assert rows["gap closed at 3 MDB and more, median"]["value"] == 0.98
@@ -149,3 +152,16 @@ def test_a_diagnosis_that_gave_up_is_never_right():
     rows, told = scored((label("single", "range_bias"), {"error": "Nothing to compare."}))
     assert rows["right at 3 MDB and more"]["value"] == 0.0
     assert told["failed"] == {"0000": "Nothing to compare."}
+
+
+def test_the_goals_are_those_of_the_manual():
+    "What the table of the manual calls goals is what a score is held to"
+    cases = [(label("clean"), answer("none")), (label("noise", "range_noise"), answer("none"))]
+    cases += [(label("single", "range_bias"), answer("range_bias"))] * 2
+    rows, _ = scored(*cases)
+    lines = (BENCHMARKS.parent / "docs" / "diagnosis.md").read_text().splitlines()
+    cells = [[cell.strip() for cell in line.split("|")] for line in lines if line.count("|") == 5]
+    told = {row[1]: row[4] for row in cells}
+    for name in ("clean: a cause claimed", "noise: named", "right at 3 MDB and more"):
+        (number,) = [value for value in rows[name]["goal"] if value is not None]
+        assert told[name].endswith(f"= {100 * number:.0f} %")
