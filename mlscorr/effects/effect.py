@@ -2,10 +2,12 @@
 
 import re
 from dataclasses import MISSING, asdict, dataclass, fields, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
+from mlscorr.effects.guard import checked_change
 from mlscorr.effects.quantity import Quantity
 from mlscorr.effects.stages import STAGES, Reference
 from mlscorr.effects.wording import SizeEstimate, amplitude, known, size, vector
@@ -89,13 +91,21 @@ class Effect:
         reference : Reference
         rng : numpy.random.Generator, optional
             Of a random effect.
+
+        Raises
+        ------
+        ValueError
+            Where the code of a user's own effect raises, or makes what can't be used.
         """
-        return self._change(value, reference, rng) if np.any(self.magnitude) else value
+        is_own = not type(self).__module__.startswith(f"{__package__}.")
+        change = partial(checked_change, self, self._change) if is_own else self._change
+        return change(value, reference, rng) if np.any(self.magnitude) else value
 
     def _change(self, value, reference, rng):
         """As apply, of a magnitude that is not zero."""
         name = STAGES[self.stage]
-        return replace(value, **{name: getattr(value, name) + self._error(value, reference, rng)})
+        column, error = getattr(value, name), self._error(value, reference, rng)
+        return replace(value, **{name: column + np.broadcast_to(error, column.shape)})
 
     def _error(self, value, reference, rng):
         """What is added to the field of the stage's value that STAGES names."""

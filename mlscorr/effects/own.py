@@ -1,5 +1,6 @@
 """Effects of one's own, from a Python file that registers them."""
 
+import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -20,10 +21,10 @@ def run_file(path: Path) -> ModuleType:
     ValueError
         Names the file, and what it raised.
     """
-    spec = spec_from_file_location(path.stem, path)
+    spec = spec_from_file_location(f"user.{path.stem}", path)
     if spec is None or spec.loader is None:
         raise ValueError(f"{path} is no Python file: its name must end in .py.")
-    module = module_from_spec(spec)
+    module = sys.modules[spec.name] = module_from_spec(spec)  # where dataclasses look for it
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # a user's code may raise anything

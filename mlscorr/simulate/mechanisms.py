@@ -229,12 +229,11 @@ def _spread(values, whole):
 def _motion(points):
     """How the vehicle moves when points (n,) are seen."""
     table = _motion_table(points.trajectory)
-    return {
-        name: np.column_stack([np.interp(points.gps_time, table["time"], v) for v in values.T])
-        if values.ndim > 1
-        else np.interp(points.gps_time, table["time"], values)
-        for name, values in table.items()
-    }
+
+    def when_seen(values):
+        return np.interp(points.gps_time, table["time"], values)
+
+    return {name: np.apply_along_axis(when_seen, 0, values) for name, values in table.items()}
 
 
 def _motion_table(trajectory):

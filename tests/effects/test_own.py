@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from mlscorr.cli import app
 from mlscorr.effects import catalogue, effect_class, register_file
+from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.gap.train.features import geometry
 
@@ -98,6 +99,23 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
     "The path stands in the sentence"
     with pytest.raises(FileNotFoundError, match=r"none\.py does not exist"):
         register_file(tmp_path / "none.py")
+
+
+def test_a_file_may_postpone_its_annotations(tmp_path):
+    "Dataclasses look for the module of a ClassVar that is written as a string"
+    file = written(tmp_path, "late", "np.array([0, 0, 1])")
+    file.write_text("from __future__ import annotations\n" + file.read_text())
+    (kind,) = register_file(file)
+    assert [*kind.quantities()] == ["magnitude"]
+
+
+def test_a_simulator_whose_effect_moves_everything_is_refused(tmp_path):
+    "By 10 km up, whatever eastings, northings and walls don't see of it"
+    (kind,) = register_file(written(tmp_path, "everything", "np.array([0.0, 0.0, 1e5])"))
+    g = geometry(3, targets=6, patches=60)
+    with pytest.raises(ValueError, match=r"everything of 0\.1 moves points by 1e\+04 m"):
+        expected(g.rows, g.survey, [kind(0.1)])
+    assert "Is its unit right" in signatures(g.rows, g.survey, [kind])[1]["everything"]
 
 
 @pytest.mark.parametrize(("name", "body", "said"), [

@@ -104,9 +104,7 @@ def collect_beams(
     origin = np.round(rows.position.mean(axis=0))
     platform = scan.recorded_platform(survey, origin)
     about = [(s, surroundings.about(platform, s, origin)) for s in sightings_of(rows, finding)]
-    targets = [
-        (sighting, SightedTarget.join(sighting, parts)) for sighting, parts in about if parts
-    ]
+    targets = [(s, SightedTarget.join(s, parts)) for s, parts in about if parts]
     return _beams(survey, rows, platform, origin, _patches_behind(rows, patches), targets)
 
 

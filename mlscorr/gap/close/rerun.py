@@ -173,16 +173,11 @@ def _meet(rows, beams, views, shot, boards, speckle):
     on_target = beams.target[beams.view] >= 0
     flat, (start, direction) = ~on_target, shot
     view = beams.view[flat]
-    parts = [
-        Planes(normal[view], offset[view], beams.pulses.intensity[flat]).meet(
-            start[flat], direction[flat]
-        )
-    ]
+    planes = Planes(normal[view], offset[view], beams.pulses.intensity[flat])
     number = beams.target[beams.view[on_target]]
     world = TargetWorld(boards, number, beams.beyond[on_target], beams.behind[on_target], speckle)
-    parts.append(world.meet(start[on_target], direction[on_target]))
-    # patches stand before targets
-    return Met.concatenate(parts)
+    met = ((planes, flat), (world, on_target))  # patches stand before targets
+    return Met.concatenate([what.meet(start[on], direction[on]) for what, on in met])
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ estimators of energy distance and MMD have no bias, so that they may be negative
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -203,16 +204,16 @@ def _of_samples(channel, samples, rng, figures=None):
         for name in figures
     }
 
-    def draws(x, y):
-        def draw(salt, rng):
-            return x.half(salt, True, rng), y.half(salt, False, rng)
-
-        return draw
-
-    pairs = {"before": draws(real, simulated), "floor": draws(simulated, simulated)}
+    sides = {"before": (real, simulated), "floor": (simulated, simulated)}
     if following:
-        pairs["after"] = draws(real, following[0])
+        sides["after"] = real, following[0]
+    pairs = {when: partial(_halves, *both) for when, both in sides.items()}
     return _of_draws(channel, figures, pairs, number, rng)
+
+
+def _halves(x, y, salt, rng):
+    """Values of the one half of a sample, and of the other half of another."""
+    return x.half(salt, True, rng), y.half(salt, False, rng)
 
 
 def _of_draws(channel, figures, pairs, number, rng):

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from mlscorr.frames import angles_from_attitude, scanner_position, to_scanner
 from mlscorr.gap.observe.rows import SamplePulses
 from mlscorr.gap.observe.settings import SETTINGS
-from mlscorr.survey import Survey
+from mlscorr.survey import Survey, Trajectory
 
 
 def scanner_origin(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
@@ -94,12 +94,27 @@ def _mean_of(pulse_item, item):
     return mean
 
 
+def poses_about(
+    trajectory: Trajectory, gps_time: np.ndarray, lag: float
+) -> tuple[Trajectory, Trajectory]:
+    """Poses shortly before and after times (k,), within their passes.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    gps_time : (k,) array
+        Units: s.
+    lag : float
+        Units: s.
+    """
+    start, end = trajectory.passes[trajectory.segment(gps_time)].T
+    before, after = np.maximum(gps_time - lag, start), np.minimum(gps_time + lag, end)
+    return trajectory.at(before), trajectory.at(after)
+
+
 def _motion(trajectory, gps_time):
     """Speed (m/s), rate of heading to the right (rad/s) and heading (rad) at times (m,)."""
-    starts, ends = trajectory.passes.T
-    segment = trajectory.segment(gps_time)
-    before = trajectory.at(np.maximum(gps_time - SETTINGS.step, starts[segment]))
-    after = trajectory.at(np.minimum(gps_time + SETTINGS.step, ends[segment]))
+    before, after = poses_about(trajectory, gps_time, SETTINGS.step)
     duration = after.gps_time - before.gps_time
     way = np.linalg.norm(after.position - before.position, axis=1)
     turn = (after.attitude * before.attitude.inv()).as_rotvec()[:, 2]

@@ -162,9 +162,8 @@ def _near(matched, candidates):
         rows = np.array(on_target, dtype=int)
         on = candidates.pass_number[rows] == matched.pass_number[i]
         on &= np.abs(cloud.gps_time[rows] - matched.gps_time[i]) <= MATCHING.pause
-        on &= (
-            np.abs((cloud.xyz[rows] - matched.position[i]) @ matched.normal[i]) <= TARGETS.thickness
-        )
+        off = np.abs((cloud.xyz[rows] - matched.position[i]) @ matched.normal[i])
+        on &= off <= TARGETS.thickness
         targets.append(rows[on][np.argsort(cloud.gps_time[rows[on]])])
     return targets
 

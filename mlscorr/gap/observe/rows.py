@@ -159,9 +159,8 @@ class Rows:
         for rows in subsets:
             known = np.unique(np.append(rows.item, rows.pulses.item))
             pulses = replace(rows.pulses, item=first + np.searchsorted(known, rows.pulses.item))
-            parts.append(
-                replace(rows, item=first + np.searchsorted(known, rows.item), pulses=pulses)
-            )
+            item = first + np.searchsorted(known, rows.item)
+            parts.append(replace(rows, item=item, pulses=pulses))
             first += len(known)
         columns: dict[str, Any] = {
             name: np.concatenate([getattr(rows, name) for rows in parts])

@@ -74,9 +74,8 @@ def _pairs(patches):
     """Rows (n,), (n,) of two looks at one plane, the earlier one first, and compare_planes of
     them; each is in one pair at most with any other pass.
     """
-    pairs = cKDTree(patches.centre).query_pairs(
-        SETTINGS.pair_distance * SETTINGS.cell, output_type="ndarray"
-    )
+    radius = SETTINGS.pair_distance * SETTINGS.cell
+    pairs = cKDTree(patches.centre).query_pairs(radius, output_type="ndarray")
     time = patches.gps_time[pairs]
     pairs = np.where((time[:, 0] <= time[:, 1])[:, None], pairs, pairs[:, ::-1])
     early, late = pairs.T

@@ -58,14 +58,12 @@ def additions(rows: Rows, survey: Survey) -> dict[str, tuple[Rows, Survey]]:
         items = np.unique(rows.item[targets])
         count = min(SETTINGS.stop_targets, len(items))
         near = items[np.linspace(0, len(items) - 1, count).astype(int)]
+        stop = f"a stop of {SETTINGS.pause:.0f} s beside {len(near)} targets"
+        far_targets = _more_targets(rows, survey, items, SETTINGS.factor)
         made |= {
             "as many targets again, between the others": _more_targets(rows, survey, items),
-            "as many targets again, at twice the distance": _more_targets(
-                rows, survey, items, SETTINGS.factor
-            ),
-            f"a stop of {SETTINGS.pause:.0f} s beside {len(near)} targets": _stop(
-                rows, survey, near
-            ),
+            "as many targets again, at twice the distance": far_targets,
+            stop: _stop(rows, survey, near),
         }
     return made
 

@@ -68,9 +68,8 @@ def _targets(survey, targets):
     sight = scanner_origin(survey, time) - place
     facing = sight / np.linalg.norm(sight, axis=1, keepdims=True)
     normal = np.where(np.isfinite(targets.normal[which]), targets.normal[which], facing)
-    pulses = sample_pulses(
-        survey, item, np.ones(n), place, time, np.full(n, SETTINGS.brightness), normal
-    )
+    brightness = np.full(n, SETTINGS.brightness)
+    pulses = sample_pulses(survey, item, np.ones(n), place, time, brightness, normal)
     return assemble(
         survey, "target", np.repeat(item, 3), np.repeat(time, 3), np.repeat(place, 3, axis=0),
         np.tile(np.eye(3), (n, 1)), np.zeros(3 * n), np.full(3 * n, SETTINGS.centre_sigma**2),
@@ -96,17 +95,15 @@ def _facets(survey, rng):
     away = np.linalg.norm(sight, axis=1)
     slant = np.einsum("ni,ni->n", normal, sight) / away
     start = place + sight / away[:, None] * OBSERVE.roughest
-    visible = (np.abs(slant) >= TARGETS.grazing) & sees(
-        mesh.caster, start - origin, start + sight * 0.99 - origin
-    )
+    visible = sees(mesh.caster, start - origin, start + sight * 0.99 - origin)
+    visible &= np.abs(slant) >= TARGETS.grazing
     rows = np.flatnonzero(visible)[: SETTINGS.facets]
     n, item, normal = len(rows), np.arange(len(rows)), normal[rows] * np.sign(slant[rows])[:, None]
     noise = OBSERVE.surface_sigma**2 + survey.scanner.range_noise**2 / SETTINGS.facet_points
-    pulses = sample_pulses(
-        survey, item, np.ones(n), place[rows], time[rows], np.full(n, SETTINGS.brightness), normal
-    )
+    place, time, brightness = place[rows], time[rows], np.full(n, SETTINGS.brightness)
+    pulses = sample_pulses(survey, item, np.ones(n), place, time, brightness, normal)
     return assemble(
-        survey, "surface", item, time[rows], place[rows], normal, np.zeros(n), np.full(n, noise),
+        survey, "surface", item, time, place, normal, np.zeros(n), np.full(n, noise),
         np.full(n, SETTINGS.facet_points), pulses, number[rows],
     )  # fmt: skip
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlscorr.gap.observe.covariates import covariates, scanner_origin
+from mlscorr.gap.observe.covariates import covariates, poses_about, scanner_origin
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.observe.settings import SETTINGS
 from mlscorr.survey import Survey
@@ -53,13 +53,9 @@ def displacements(rows: Rows, survey: Survey) -> Displacements:
         survey, time, xyz, replace(pulses, item=number), np.arange(len(known)),
         survey.trajectory.segment(time) + 1, np.zeros((len(known), 3)),
     )  # fmt: skip
-    return Displacements(
-        known // 2,
-        np.where(known % 2, -1.0, 1.0),
-        _directions(survey, time, xyz),
-        common | _motion(survey.trajectory, time),
-        xyz,
-    )
+    sign, directions = np.where(known % 2, -1.0, 1.0), _directions(survey, time, xyz)
+    more = common | _motion(survey.trajectory, time)
+    return Displacements(known // 2, sign, directions, more, xyz)
 
 
 def _directions(survey, time, xyz):
@@ -71,9 +67,7 @@ def _directions(survey, time, xyz):
     beam = sight / np.linalg.norm(sight, axis=1, keepdims=True)
     unit = np.broadcast_to(np.eye(3)[:, None], (3, len(time), 3))
     moved = {
-        "east": unit[0],
-        "north": unit[1],
-        "height": unit[2],
+        **dict(zip(("east", "north", "height"), unit, strict=True)),
         "right": right,
         "forward": forward,
         "beam": beam,
@@ -89,10 +83,8 @@ def _directions(survey, time, xyz):
 
 
 def _about(trajectory, time):
-    """Poses shortly before and after times (k,), within their passes."""
-    start, end = trajectory.passes[trajectory.segment(time)].T
-    lag = 2 * SETTINGS.step  # a second difference needs more time than a first one
-    return trajectory.at(np.maximum(time - lag, start)), trajectory.at(np.minimum(time + lag, end))
+    """Poses before and after times (k,): a second difference needs more time than a first one."""
+    return poses_about(trajectory, time, 2 * SETTINGS.step)
 
 
 def _turning(before, after):

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.effects import Effect
+from mlscorr.effects import EFFECTS, Effect
 from mlscorr.gap.observe.rows import Rows
 from mlscorr.gap.signatures.changes import Bench, Change
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.signatures.signatures import Signature, too_far
 from mlscorr.survey import Survey
 
 
@@ -23,10 +23,18 @@ def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
     rows : Rows
     survey : Survey
     effects : iterable of Effect
+
+    Raises
+    ------
+    ValueError
+        For a user's own that moves everything by more than any survey is off.
     """
     bench, total = Bench(rows, survey), np.zeros((3, len(rows)))
     for effect in effects:
         change = bench.change(effect)
+        what = f"The simulator's {effect.name} of {effect.magnitude}"
+        if type(effect) not in EFFECTS and (why := too_far(rows, change.shift, what)):
+            raise ValueError(why)
         total += _shift(bench, effect, change), change.variance, change.growth
     return Change(*total)
 

@@ -132,21 +132,45 @@ def _tried(bench, kind, bank, rng):
     try:
         signs = [signature(bench, kind, fixed, rng) for fixed in bank]
     except (Exception, SystemExit) as error:  # of a user's code: it is left out, not the diagnosis
-        return f"It can't be applied to this survey: {type(error).__name__}: {error}"
-    metric, largest = bench.rows.metric, SETTINGS.largest_shift
-    single = metric & ~bench.rows.two_times  # what moves all alike leaves two looks where they are
+        return str(error) or type(error).__name__
+    metric = bench.rows.metric
     for sign in signs:
-        moved = np.abs(sign.jacobian * sign.typical)
+        moved = np.abs(sign.jacobian * sign.typical).max(axis=1, initial=0.0)
         if not all(np.isfinite(v).all() for v in (moved[metric], sign.variance, sign.growth)):
             return "It makes values that are no numbers."
-        usual = np.median(moved[single if single.any() else metric].max(axis=1, initial=0.0))
-        if usual > largest:
-            return (
-                f"At its usual size, {sign.typical[0]:g} {sign.units[0]}, it moves points by "
-                f"{usual:.3g} m in the median: more than {largest:g} m no survey is off "
-                "everywhere. Is its unit right?"
-            )
+        size = f"At its usual size, {sign.typical[0]:g} {sign.units[0]}, it"
+        if why := too_far(bench.rows, moved, size):
+            return why
     return signs
+
+
+def too_far(rows: Rows, moved: np.ndarray, what: str) -> str:
+    """Why nobody can mean an effect: it moves the things of rows farther than any survey is off.
+
+    Parameters
+    ----------
+    rows : Rows
+    moved : (m,) array
+        By how much each row is; of each thing, the worst counts. Units: m.
+    what : str
+        Moves them.
+
+    Returns
+    -------
+    str
+        A sentence; nothing where it may be meant.
+    """
+    # walls don't see a height, nor planes of two passes what moves all alike
+    parts = rows.channel == "target", rows.metric & ~rows.two_times
+    part = next((part for part in parts if part.any()), rows.metric)
+    number = np.unique(rows.item[part], return_inverse=True)[1]
+    worst = np.zeros(number.max(initial=0) + 1)
+    np.maximum.at(worst, number, np.abs(moved[part]))
+    usual, largest = np.median(worst), SETTINGS.largest_shift
+    return "" if usual <= largest else (
+        f"{what} moves points by {usual:.3g} m in the median: more than {largest:g} m no survey is "
+        "off everywhere. Is its unit right?"
+    )  # fmt: skip
 
 
 def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Generator) -> Signature:
