@@ -66,8 +66,8 @@ def diagnose(
     Raises
     ------
     ValueError
-        When there is too little to say anything, or when a reference surface or the simulator
-        can't be used.
+        When there is too little to say anything, or when a reference surface, the simulator or
+        the costs can't be used.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -87,6 +87,8 @@ def diagnose(
     rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
     check_rng(rng)
     costs = Costs() if costs is None else costs
+    if not all(0 <= cost < np.inf for cost in vars(costs).values()):
+        raise ValueError(f"{costs} can't be used: each cost is a finite number from 0 on.")
     survey.check_one_scanner("a diagnosis")
     library = known_effects() if library is None else library
     progress = progress or silent

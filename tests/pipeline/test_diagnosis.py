@@ -12,7 +12,7 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.gap.infer.causes import Cause
-from mlscorr.gap.infer.decision import kind_of
+from mlscorr.gap.infer.decision import Costs, kind_of
 from mlscorr.gap.infer.error_models import STATED
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.gap.signatures.simulators import as_believed, with_cause
@@ -297,3 +297,10 @@ def test_costs_choose_the_label(late, tmp_path):
     told = json.loads((tmp_path / "out" / "gap.json").read_text())
     assert told["costs"] == {"false_alarm": 1e30, "miss": 1.0, "unknown": 0.9}
     assert kind_of(told["verdict"]["label"], RANDOM) in ("none", "noise")
+
+
+@pytest.mark.parametrize("cost", [-1.0, np.nan, np.inf])
+def test_costs_below_zero_are_refused(street, cost):
+    "Of a false alarm that pays, or has no size, no label is the cheapest one"
+    with pytest.raises(ValueError, match="each cost is a finite number from 0 on"):
+        mlscorr.diagnose(mlscorr.read_survey(street), costs=Costs(false_alarm=cost))

@@ -161,23 +161,19 @@ def innovation_distances(
         others = replicas[here] / np.maximum(replicas[here].std(axis=0), 1e-300)
         number = min(int(here.sum()), SETTINGS.drawn)
         pairs = {
-            "before": _against_replicas(values[:, :1], others),
-            "after": _against_replicas(values[:, 1:], others),
-            "floor": _against_replicas(others, others[:, ::-1]),
+            "before": partial(_columns_of, values[:, :1], others),
+            "after": partial(_columns_of, values[:, 1:], others),
+            "floor": partial(_columns_of, others, others[:, ::-1]),
         }
         figures = _pairwise(others[:, :1])
         distances += _of_draws(name, figures, pairs, dict.fromkeys(figures, number), rng)
     return tuple(distances)
 
 
-def _against_replicas(values, replicas):
-    """A function that draws a column of values (n, k), and another replica, in random order."""
-
-    def draw(number, rng):
-        columns = values[:, number % values.shape[1]], replicas[:, number % replicas.shape[1]]
-        return tuple(rng.permutation(column)[:, None] for column in columns)
-
-    return draw
+def _columns_of(values, replicas, number, rng):
+    """A column of values (n, k), and another one of replicas, in random order."""
+    columns = values[:, number % values.shape[1]], replicas[:, number % replicas.shape[1]]
+    return tuple(rng.permutation(column)[:, None] for column in columns)
 
 
 @dataclass(frozen=True)
