@@ -4,29 +4,35 @@ python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--scanne
     [--spinning] [--passes 1] [--road [--without-paint]]
 
 RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
-far apart the trajectories of both passes are left in a place. Without control only the latter is
-claimed. Drives are the simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each
-pass of 150 s alone: its smoothed drift is 0.6 to 1 m. With --elsewhere each pass loses it once, for
-70 to 120 s from a random moment. A second scanner is turned to the other side. With --spinning
-it has 16 rings and an axis that leans back by 30 deg, so that a pass sees a thing for seconds. With
---road it sees the road alone, which has a dashed middle line and lines along the kerbs.
+far apart the trajectories of both passes are left in a place, with the share of that within 2 sigma
+of their difference. Without control the latter two are claimed, and of what both passes share that
+it is as large as the POS's sigmas and the ties make it: a survey shows few independent values of
+it, so that its share within 2 sigma tells something over many surveys alone. Drives are the
+simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each pass of 150 s alone:
+its smoothed drift is 0.6 to 1 m. With --elsewhere each pass loses it once, for 70 to 120 s from a
+random moment. A second scanner is turned to the other side. With --spinning it has 16 rings and an
+axis that leans back by 30 deg, so that a pass sees a thing for seconds. With --road it sees the
+road alone, which has a dashed middle line and lines along the kerbs.
 """
 
 import argparse
 import tempfile
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from feature_surveys import FOLDER
+from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.estimate import believed_correction, estimate_correction
+from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import find_control
 from mlscorr.pipeline.tying import tie_passes
 from mlscorr.simulate import read_scenario, simulate
-from mlscorr.survey import PAINTED, Trajectory
+from mlscorr.survey import PAINTED, Ties, Trajectory
 from mlscorr.ties import TieCollector
 
 POINTS_PER_LINE = 400  # of 700: a survey takes two minutes
@@ -42,6 +48,8 @@ SPINNING = {
     "boresight": (-30.0, 0.0, 0.0),
 }
 NEAREST = 5.0  # m between two passes that are compared in a place
+PLACES = 50  # of each survey: the difference of both passes' errors and its sigma change slowly
+PROBE = 1.0  # m, one sigma of the rows that ask for that sigma: they hold nothing
 
 
 def scenario(scanners=1, duration=DURATION, rng=None, road=False, spinning=False, passes=2):
@@ -103,17 +111,23 @@ def some_control(matched, number):
 
 
 def measure(true, estimate):
-    """RMS (m) of what is left, the share within 2 sigma, RMS (m) of a pass from the other."""
+    """RMS (m) of what is left and its share within 2 sigma, and both of a pass from the other."""
     corrected = estimate.correction.corrected
     left = true.at(corrected.gps_time).position - corrected.position
     within = np.mean(np.abs(left) < 2 * corrected.position_sigma)
-    return rms(left), float(within), _apart(true, corrected.gps_time, left)
-
-
-def _apart(true, gps_time, left):
-    """RMS (m) of the difference between what is left in two passes of one place; NaN of one."""
     if len(true.passes) < 2:
-        return np.nan
+        return rms(left), float(within), np.nan, np.nan
+    there, back = _meetings(true, corrected.gps_time)
+    apart = left[there] - left[back]
+    if estimate.equations.ties is None:
+        return rms(left), float(within), rms(apart), np.nan
+    rows = np.unique(np.linspace(0, len(there) - 1, PLACES).round().astype(int))
+    sigma = _sigma_apart(estimate, there[rows], back[rows])
+    return rms(left), float(within), rms(apart), float(np.mean(np.abs(apart[rows]) < 2 * sigma))
+
+
+def _meetings(true, gps_time):
+    """Epochs of the first pass, and those of the second in the same places."""
     (first, last), (begin, end) = true.passes[:2]
     place = true.at(gps_time).position
     there, back = (
@@ -122,7 +136,47 @@ def _apart(true, gps_time, left):
     )
     away = np.linalg.norm(place[there][:, None] - place[back], axis=2)
     near = away.min(axis=1) < NEAREST
-    return rms((left[there] - left[back][away.argmin(axis=1)])[near])
+    return there[near], back[away.argmin(axis=1)][near]
+
+
+def _sigma_apart(estimate, there, back):
+    """Sigma (k, 3) of the difference of the errors at two epochs of the trajectory. Units: m.
+
+    By the most probable parameters, as that of ties which nobody saw.
+    """
+    equations = estimate.equations
+    trajectory, ties, number = equations.trajectory, equations.ties, 3 * len(there)
+    rows = np.repeat(np.column_stack([there, back]), 3, axis=0)
+    probes = Ties(
+        gps_time=trajectory.gps_time[rows],
+        place=trajectory.position[rows],
+        direction=np.tile(np.eye(3), (len(there), 1)),
+        misclosure=np.zeros(number),
+        variance=np.full(number, PROBE**2),
+        kind=np.full(number, "plane"),
+        pass_number=np.tile([1, 2], (number, 1)),
+        scanner=np.zeros((number, 2), int),
+        feature=np.arange(2 * number).reshape(-1, 2),
+    )
+    probes = TieEquations.of(trajectory, equations.pos, probes, ties.stated)
+    if ties.mounting is not None:  # which moves no pose
+        probes = replace(probes, mounting=np.zeros((number, ties.mounting.shape[1])))
+
+    def joined(of, probe, *names):
+        columns = (np.concatenate([getattr(of, n), getattr(probe, n)]) for n in names)
+        return dict(zip(names, columns, strict=True))
+
+    stated = replace(
+        ties.stated,
+        rotation=Rotation.concatenate([ties.stated.rotation, probes.stated.rotation]),
+        **joined(ties.stated, probes.stated, "gps_time", "position", "angles"),
+    )
+    names = ["gps_time", "misclosure", "variance", "partials", "weight"]
+    names += [] if ties.mounting is None else ["mounting"]
+    asked = replace(equations, ties=replace(ties, stated=stated, **joined(ties, probes, *names)))
+    solved = asked.solve(estimate.parameters)
+    _, covariance = solved.leave_out(len(solved.misclosure) - number + np.arange(number))
+    return np.sqrt(np.maximum(np.diag(covariance) - PROBE**2, 0.0)).reshape(-1, 3)
 
 
 def rms(left):
@@ -142,7 +196,7 @@ def main():
     parser.add_argument("--without-paint", action="store_true", help="ties of planes and poles")
     parser.add_argument("--control", type=int, nargs="+", default=[0, 3, 6, 12])
     arguments = parser.parse_args()
-    print("control  seed     raw   alone  within    ties  within   apart   ratio")
+    print("control  seed     raw   alone  within    ties  within   apart  within   ratio")
     ratios = {number: [] for number in arguments.control}
     for seed in range(arguments.first, arguments.first + arguments.seeds):
         rng = np.random.default_rng([seed, 1]) if arguments.elsewhere else None
@@ -175,7 +229,8 @@ def main():
             ratios[number].append(tied[0] / alone[0])
             print(
                 f"{number:7d}{seed:6d}{raw:8.3f}{alone[0]:8.3f}{alone[1]:8.0%}"
-                f"{tied[0]:8.3f}{tied[1]:8.0%}{tied[2]:8.4f}{ratios[number][-1]:8.2f}",
+                f"{tied[0]:8.3f}{tied[1]:8.0%}{tied[2]:8.4f}{tied[3]:8.0%}"
+                f"{ratios[number][-1]:8.2f}",
                 flush=True,
             )
     for number, values in ratios.items():
