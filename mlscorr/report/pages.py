@@ -3,7 +3,7 @@
 import base64
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -56,10 +56,8 @@ class Page:
         """
         frame = {"versions": versions(), "written": now(), "window_title": self.title}
         frame |= {name: getattr(self, name) for name in ("summary", "sections", "prefix")}
-        frame |= {
-            "styles": ("style.css", *self.styles),
-            "scripts": ("fit.js", "sort.js", *self.scripts),
-        }
+        frame["styles"] = "style.css", *self.styles
+        frame["scripts"] = "fit.js", "sort.js", *self.scripts
         return environment().get_template("skeleton.html").render(frame | self.content)
 
     def write(self, path: str | Path) -> None:
@@ -124,13 +122,7 @@ def drawn(figures: Figures) -> dict[str, str]:
 
 def versions() -> list[tuple[str, str]]:
     """Names and versions of mlscorr and the libraries that made the numbers."""
-    pairs = []
-    for name in ("mlscorr", *LIBRARIES):
-        try:
-            pairs.append((name, version(name)))
-        except PackageNotFoundError:
-            continue
-    return pairs
+    return [(name, version(name)) for name in ("mlscorr", *LIBRARIES)]
 
 
 def now() -> str:

@@ -1,7 +1,6 @@
 """The page of a project: its drives on a map, and a table that leads to each."""
 
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -37,9 +36,6 @@ def write_project(path: str | Path, document: dict, tracks: dict[str, np.ndarray
         content={
             "document": document,
             "figures": figures,
-            "links": {
-                row["name"]: f"{quote(row['name'])}/report.html" for row in document["drives"]
-            },
         },
         prefix="project-",
     ).write(path)

@@ -48,8 +48,7 @@ class AreaInput:
             for part in estimate_group(group, min(self.order, 0), self.origin, True):
                 for corrected, state in corrected_drives(part, self.area):
                     assert isinstance(corrected, CorrectedDrive)
-                    piece = pieces[state.name]
-                    results.append(AreaResult.of(self.area, piece, corrected, state))
+                    results.append(AreaResult.of(self.area, pieces[state.name], corrected, state))
         return results
 
 

@@ -97,7 +97,5 @@ def near_drives(drives: Sequence[FoundDrive]) -> list[list[FoundDrive]]:
 
 def _grouped(drives, labels):
     """Lists of drives of one label each, in the order of their first."""
-    groups: dict[int, list[FoundDrive]] = {}
-    for drive, label in zip(drives, labels.tolist(), strict=True):
-        groups.setdefault(label, []).append(drive)
-    return list(groups.values())
+    groups = [np.flatnonzero(labels == label) for label in dict.fromkeys(labels.tolist())]
+    return [[drives[number] for number in group] for group in groups]

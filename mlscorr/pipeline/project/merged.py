@@ -130,12 +130,10 @@ def _averaged(trajectory: Trajectory, parts: Sequence[AreaResult]) -> Correction
         mean[part.rows] += weight[:, None] * np.hstack(columns)
         total[part.rows] += weight
     change, turn, *sigmas = np.split(mean / total[:, None], 4, axis=1)
-    position, attitude = trajectory.position + change, Rotation.from_rotvec(turn)
-    attitude = attitude * trajectory.attitude
     corrected = replace(
         trajectory,
-        position=position,
-        attitude=attitude,
+        position=trajectory.position + change,
+        attitude=Rotation.from_rotvec(turn) * trajectory.attitude,
         position_sigma=sigmas[0],
         attitude_sigma=sigmas[1],
     )
@@ -208,11 +206,9 @@ def _state(parts, home, used):
         if is_home.any()
     )
     state = order[0] if used.any() else order[max(least, 1)]
-    rows: dict[str, list[dict]] = {}
-    for part in parts:
-        for name, row in part.state.tied_with.items():
-            rows.setdefault(name, []).append(row)
-    tied_with = {name: _joined(own) for name, own in rows.items()}
+    ties = [part.state.tied_with for part in parts]
+    names = dict.fromkeys(name for own in ties for name in own)
+    tied_with = {name: _joined([own[name] for own in ties if name in own]) for name in names}
     return DriveState(parts[0].state.name, state, tied_with)
 
 

@@ -13,7 +13,6 @@ from mlscorr.io.project_file import DriveParts, ProjectParts
 from mlscorr.io.project_sections import SHARED_TILES
 from mlscorr.io.storage import resolved
 from mlscorr.io.task_store import TaskStore, digest
-from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.near_points import check_control
 from mlscorr.pipeline.project import file_tasks
 from mlscorr.pipeline.project.city import AreaInput, stored_results
@@ -290,7 +289,6 @@ def report_task(inputs: file_tasks.ReportInput, drive: PlannedDrive) -> Task:
     inputs : ReportInput
     drive : PlannedDrive
     """
-    written: WrittenClouds = inputs.written
-    key = digest(VERSION, inputs.corrected, written, inputs.page, inputs.trajectories)
+    key = digest(VERSION, inputs.corrected, inputs.written, inputs.page, inputs.trajectories)
     points, name = drive.survey.points if inputs.page else 0, drive.survey.name
     return Task("reports", key, name, name, points, file_tasks.report, (inputs,))

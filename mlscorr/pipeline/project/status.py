@@ -41,15 +41,9 @@ def project_status(out: str | Path) -> dict:
         )
     stages = _planned(store)
     done = {kind: store.keys(kind) for kind in stages}
-    tasks = [
-        {
-            **task,
-            "kind": kind,
-            "is_done": task["key"] in done[kind] and _is_left(store, kind, task["key"]),
-        }
-        for kind in TITLES
-        for task in stages.get(kind, ())
-    ]
+    tasks = [task | {"kind": kind} for kind in TITLES for task in stages.get(kind, ())]
+    for task in tasks:
+        task["is_done"] = task["key"] in done[task["kind"]] and _is_left(store, task)
     drives: dict[str, list[dict]] = {}
     for task in (task for task in tasks if task["drive"]):  # an area is of many
         drives.setdefault(task["drive"], []).append(task)
@@ -81,10 +75,10 @@ def _planned(store):
         ) from error
 
 
-def _is_left(store, kind, key):
+def _is_left(store, task):
     """Whether what a task wrote is there as it was written; nothing of this is asked of a store."""
-    is_asked = kind in ("clouds", "reports") and not is_remote(store.folder)
-    return not is_asked or present(store, kind, key) is not None
+    is_asked = task["kind"] in ("clouds", "reports") and not is_remote(store.folder)
+    return not is_asked or present(store, task["kind"], task["key"]) is not None
 
 
 def _failures(tasks, lines):
