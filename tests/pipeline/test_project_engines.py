@@ -89,19 +89,22 @@ def squares(folder, workers=1, scheduler=None):
     return run
 
 
-def start_cluster(address):
-    "Processes of a scheduler at an address and of its worker, which has two threads"
+def start(part, address):
+    "Process of a scheduler at an address, or of its worker, which has two threads"
     paths = {"PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
-    return [
-        subprocess.Popen(
-            [sys.executable, "-m", "dask", *arguments, "--no-dashboard"],
-            stderr=subprocess.DEVNULL, env=os.environ | paths,
-        )
-        for arguments in (
-            ("scheduler", "--port", address.rpartition(":")[2]),
-            ("worker", address, "--nthreads", "2", "--no-nanny"),
-        )
-    ]  # fmt: skip
+    options = {
+        "scheduler": ("--port", address.rpartition(":")[2]),
+        "worker": (address, "--nthreads", "2", "--no-nanny"),
+    }
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", part, *options[part], "--no-dashboard"],
+        stderr=subprocess.DEVNULL, env=os.environ | paths,
+    )  # fmt: skip
+
+
+def start_cluster(address):
+    "Processes of a scheduler and of its worker"
+    return [start(part, address) for part in ("scheduler", "worker")]
 
 
 def lose_a_worker(folder, scheduler):
@@ -203,9 +206,9 @@ def test_what_was_lost_with_others_is_done_again_beside_others(tmp_path):
     assert second < first
 
 
-@pytest.mark.long
-def test_a_scheduler_that_ends_ends_the_run(tmp_path):
-    "Killed with its worker after the first of some tasks: a sentence, and nothing is waited for"
+@pytest.fixture
+def cluster():
+    "An address, and processes of a scheduler there and of a worker; ended with those added to them"
     distributed = pytest.importorskip("distributed", reason="mlscorr[cluster] is not installed")
     with socket.create_server(("127.0.0.1", 0)) as free:
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
@@ -213,16 +216,67 @@ def test_a_scheduler_that_ends_ends_the_run(tmp_path):
     try:
         with distributed.Client(address) as client:
             client.wait_for_workers(1)
-        with (
-            pytest.raises(ConnectionError, match="--resume goes on"),
-            engine(scheduler=address) as chosen,
-        ):
-            kill = lambda _: [process.kill() for process in processes]  # noqa: E731
-            Run(TaskStore(tmp_path), chosen, kill).results([task(n, span) for n in range(8)])
+        yield address, processes
     finally:
         for process in processes:
             process.kill()
             process.wait()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("with_worker", [True, False])
+def test_a_scheduler_that_is_started_again_is_given_the_rest(tmp_path, cluster, with_worker):
+    "Killed after a task, alone or with its worker, and started again: all is done, it is counted"
+    address, processes = cluster
+    lines = []
+
+    def kill_once(outcome):
+        if len(processes) == 2:
+            for process in processes[: 1 + with_worker]:
+                process.kill()
+            processes.extend(start_cluster(address))
+
+    with engine(scheduler=address, tell=lines.append) as chosen:
+        run = Run(TaskStore(tmp_path), chosen, kill_once, lines.append)
+        assert len(run.results([task(n, span) for n in range(8)])) == 8
+        assert chosen.lost == 1 and not run.faults
+    assert any("A scheduler answers again" in line for line in lines)
+    assert any("was lost with the scheduler, and is done again" in line for line in lines)
+
+
+@pytest.mark.long
+def test_a_scheduler_that_ends_for_good_ends_the_run(tmp_path, cluster):
+    "Killed with its worker after the first of some tasks: a sentence after dask's time to connect"
+    from dask import config
+
+    address, processes = cluster
+    kill = lambda _: [process.kill() for process in processes]  # noqa: E731
+    with (
+        config.set({"distributed.comm.timeouts.connect": "2s"}),
+        pytest.raises(ConnectionError, match="--resume goes on"),
+        engine(scheduler=address) as chosen,
+    ):
+        Run(TaskStore(tmp_path), chosen, kill).results([task(n, span) for n in range(8)])
+
+
+@pytest.mark.long
+def test_the_first_worker_is_waited_for(cluster):
+    "A scheduler without a worker is refused after dask's time to connect, not before, and says so"
+    from dask import config
+
+    address, processes = cluster
+    processes[1].kill()
+    processes[1].wait()
+    lines = []
+    with config.set({"distributed.comm.timeouts.connect": "2s"}):
+        begun = time.monotonic()
+        with pytest.raises(ValueError, match="no worker after 2s"), engine(1, address):
+            pass
+        assert time.monotonic() - begun > 2.0
+    processes.append(start("worker", address))
+    with engine(1, address, lines.append) as chosen:
+        assert chosen.submit(square, 3).result() == 9
+    assert f"no worker yet: waiting at {address}, 30s at most" in lines[0]
 
 
 @pytest.mark.long

@@ -105,7 +105,7 @@ def correct_project(
     with store.locked(), logged(out / "log.txt", store.plan, tell) as progress:
         if options.overwrite and not options.resume:
             store.clear()
-        with engine(options.workers, options.scheduler) as chosen:
+        with engine(options.workers, options.scheduler, progress.say) as chosen:
             run = Run(store, chosen, progress.ended, progress.say)
             result = _Work(project, out, options, run, progress).result()
         progress.note(result.document["statements"][0]["sentence"])

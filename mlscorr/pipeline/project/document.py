@@ -20,6 +20,7 @@ from mlscorr.pipeline.project.tasks import Written
 from mlscorr.report import headline
 from mlscorr.survey.summary import counted
 
+COUNTS = "n_surveyed", "n_seen", "n_scored"
 RATINGS = {"controlled": "green", "tied": "green", "relative": "red", "uncorrected": "red"}
 
 
@@ -171,8 +172,7 @@ def _row(result, report):
         "rating": max(report["rating"], RATINGS[state.state], key=headline.RATINGS.index),
         "files": len(report["files"]),
         "points": sum(file["points"] for file in report["files"]),
-        "control": {key: control[key] for key in ("n_surveyed", "n_seen", "n_scored")},
-        "check": {key: check[key] for key in ("n_surveyed", "n_seen", "n_scored")},
+        **{role: {key: report[role][key] for key in COUNTS} for role in ("control", "check")},
         "tested_by": by,
         "before": _rmse(points, "before"),
         "after": _rmse(points, after),
@@ -252,9 +252,9 @@ def _reason(row, report):
 
 
 def _lost(number):
-    """A statement on lost workers, where there were any."""
+    """A statement on lost workers and schedulers, where there were any."""
     if number:
-        sentence = f"{counted(number, 'time')} a worker was lost; what it worked on was done again."
+        sentence = f"Lost workers or schedulers: {number}; what they were at was done again."
         yield headline.Statement("Workers", "amber", sentence)
 
 

@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
+from weakref import WeakSet
 
 from mlscorr.io.preparation import temporary_folder
 
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
+LONGER = "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=10min"
 LARGE_ARRAY = 1 << 20  # B; glibc keeps freed ones of up to 32 MB: 0.15 GB after some tasks
 
 
@@ -107,23 +109,25 @@ class Cluster:
     ----------
     scheduler : str
         Its address.
+    tell : function of a sentence
+        Is told when there is something to wait for.
 
     Raises
     ------
     ValueError
-        Where no scheduler answers there, or it has no worker.
+        Where no scheduler answers there, or no worker comes: both in dask's time to connect.
     ImportError
         Without the extra ``cluster``.
     """
 
-    def __init__(self, scheduler: str) -> None:
+    def __init__(self, scheduler: str, tell: Callable[[str], object]) -> None:
         try:
+            from dask import config
             from distributed import Client, KilledWorker
         except ImportError:
-            raise ImportError(
-                "A cluster needs dask.distributed, which is not installed: pip install "
-                "'mlscorr[cluster]'"
-            ) from None
+            raise ImportError("A cluster needs dask: pip install 'mlscorr[cluster]'") from None
+        patience = config.get("distributed.comm.timeouts.connect")  # with its unit, as "30s"
+        self._tell, self._waiting = tell, f"waiting at {scheduler}, {patience} at most."
         try:
             self._client = Client(scheduler)
         except (OSError, ValueError) as error:
@@ -131,14 +135,22 @@ class Cluster:
                 f"No scheduler answers at {scheduler} ({error}). Start one with dask scheduler, "
                 "and give the address that it prints."
             ) from None
-        if not self._client.nthreads():
+        try:  # a batch system may start the first worker later than the scheduler
+            if not self._client.nthreads():
+                tell(f"The cluster has no worker yet: {self._waiting}")
+            self._client.wait_for_workers(1, patience)
+        except OSError as error:
             self.close()
             raise ValueError(
-                f"The scheduler at {scheduler} has no worker. Start some, as dask worker "
-                f"{scheduler} --nworkers 8 --nthreads 1, or let its cluster scale."
-            )
-        self._gone, self.losses = self._removed(), (KilledWorker,)  # tried in vain again and again
+                f"The scheduler at {scheduler} has no worker after {patience} ({error}). Start "
+                f"some, as dask worker {scheduler} --nworkers 8 --nthreads 1, let its cluster "
+                f"scale, or wait for longer: {LONGER} in the environment."
+            ) from None
+        self.lost, self.losses = 0, (KilledWorker,)  # tried in vain again and again
+        self._calls: WeakSet[Future] = WeakSet()
         self._executor = self._client.get_executor(pure=False)
+        self._connection = self._client.scheduler_comm
+        self._client.subscribe_topic("all", self._count)
 
     @property
     def width(self) -> int:
@@ -147,26 +159,42 @@ class Cluster:
         Raises
         ------
         CancelledError
-            Where the scheduler ended: of a result that it was just sending nobody else says so.
+            Where the scheduler ended, and none answered at its address in dask's time to connect.
         """
-        with suppress(OSError):
-            if self._client.status == "running":
-                return max(1, sum(self._client.nthreads().values()))
+        is_lost = False
+        while self._client.status in ("running", "connecting"):
+            if not is_lost and self._client.status == "connecting":
+                is_lost = True
+                self._tell(f"The scheduler is lost, and may start again: {self._waiting}")
+            # That it ended may not be known yet, else this waits for it; or dask just gives up
+            with suppress(OSError, AttributeError, RuntimeError):
+                threads = sum(self._client.nthreads().values())
+                if self._client.status == "running":
+                    self._renew()
+                    return max(1, threads)
         raise CancelledError
 
+    def _renew(self):
+        """After another connection cancel calls of the one before: some may never end else."""
+        if self._client.scheduler_comm is not self._connection:
+            for call in [call for call in self._calls if not call.done()]:
+                call.cancel()
+                call.set_running_or_notify_cancel()  # wakes who waits; else RuntimeError: it ended
+            self._connection = self._client.scheduler_comm
+            self._client.subscribe_topic("all", self._count)
+            self.lost += 1
+            self._tell("A scheduler answers again, and is given what the lost one was given.")
+
     def submit(self, function: Callable, *arguments: object) -> Future:
-        """The Future of a call."""
-        return self._executor.submit(_in_single_threads, function, *arguments)
+        """The Future of a call; cancelled where the connection to the scheduler ends before it."""
+        call = self._executor.submit(_in_single_threads, function, *arguments)
+        self._calls.add(call)
+        return call
 
-    @property
-    def lost(self) -> int:
-        """Workers that nobody sent away since this began."""
-        return self._removed() - self._gone
-
-    def _removed(self):
-        events = [event for _, event in self._client.get_events("all")]
-        removed = [event for event in events if event.get("action") == "remove-worker"]
-        return sum(not event.get("expected", False) for event in removed)
+    def _count(self, event):
+        """Count a worker that nobody sent away; the scheduler tells what happens."""
+        fact = event[1]
+        self.lost += fact.get("action") == "remove-worker" and not fact.get("expected", False)
 
     def close(self) -> None:
         """Leave the cluster as it is."""
@@ -178,7 +206,9 @@ Engine = Loop | Processes | Cluster
 
 
 @contextmanager
-def engine(workers: int = 1, scheduler: str | None = None) -> Iterator[Engine]:
+def engine(
+    workers: int = 1, scheduler: str | None = None, tell: Callable[[str], object] = str
+) -> Iterator[Engine]:
     """The engine that is asked for.
 
     Parameters
@@ -187,33 +217,35 @@ def engine(workers: int = 1, scheduler: str | None = None) -> Iterator[Engine]:
         Processes of this machine; one is this process itself.
     scheduler : str, optional
         Address of a cluster's.
+    tell : function of a sentence
+        As of Cluster.
 
     Raises
     ------
     ValueError
         Where both are given, and as of Cluster.
     ConnectionError
-        When the scheduler ends before its calls.
+        When the scheduler ends before its calls, and isn't started again.
     """
     check_engine(workers, scheduler)
     if scheduler is None and workers == 1:
         yield Loop()
         return
-    chosen = Processes(workers) if scheduler is None else Cluster(scheduler)
-    before = {name: os.environ.get(name) for name in THREADS}
+    chosen = Processes(workers) if scheduler is None else Cluster(scheduler, tell)
+    before = {name: value for name, value in os.environ.items() if name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))  # of the processes that are started from here
     try:
         yield chosen
     except CancelledError:  # of calls that no scheduler knows any more
         raise ConnectionError(
-            f"The scheduler at {scheduler} ended, and with it what its workers were at. Start it "
-            "again; --resume goes on where it ended."
+            f"The scheduler at {scheduler} ended, and none answered there while dask waits "
+            f"({LONGER}). Start it and its workers again; --resume goes on where this ended."
         ) from None
     finally:
         chosen.close()
-        for name, value in before.items():
-            os.environ.pop(name)
-            os.environ.update({name: value} if value is not None else {})
+        for name in THREADS:
+            del os.environ[name]
+        os.environ.update(before)
 
 
 def check_engine(workers: int, scheduler: str | None) -> None:

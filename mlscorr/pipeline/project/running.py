@@ -2,7 +2,7 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, wait
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -111,7 +111,8 @@ class Run:
         while waiting or suspects or running:
             is_single = bool(suspects)  # what loses workers is tried by itself: it may be to blame
             source = suspects if is_single else waiting
-            limit = 1 if is_single else SETTINGS.waiting * self.engine.width
+            width = self.engine.width  # a cluster that restarts is waited for here, in any case
+            limit = 1 if is_single else SETTINGS.waiting * width
             while source and len(running) < limit:
                 task = source.popleft()
                 future = self.engine.submit(carry_out, task, self.store.folder)
@@ -120,6 +121,9 @@ class Run:
                 task, was_single = running.pop(future)
                 try:
                     yield Outcome(task, *future.result())
+                except CancelledError:  # with the connection to a scheduler: no task is to blame
+                    self.tell(f"{task.name} was lost with the scheduler, and is done again.")
+                    (suspects if was_single else waiting).appendleft(task)
                 except self.engine.losses:
                     self.tell(f"{task.name} lost its worker, and is done again.")
                     losses[task.name, was_single] += 1
