@@ -59,7 +59,7 @@ def test_time_left_is_told_by_what_is_worked_on(tmp_path):
             progress.ended(Outcome(task, seconds=1.0))
         progress.due = 0.0
         progress.ended(Outcome(tasks[94], seconds=1.0))
-    rate, left = "95 %, 1e-06 M points/s", "5 s left, 0 failures so far"
+    rate, left = "95 %, 1e-06 M points/s", "5 s left of this stage, 0 failures so far"
     assert told == [f"Reading headers: 95 of 100 files of 1 drives, {rate}, {left}"]
 
 
@@ -77,7 +77,7 @@ def test_progress_is_told_beside_the_last_line(tmp_path):
         for progress.due, task in zip((0.0, np.inf, np.inf), tasks, strict=False):
             progress.ended(Outcome(task, seconds=1.0))
         content = project_status(tmp_path)
-        assert " left, 1 failure so far" in content["progress"]
+        assert " left of this stage, 1 failure so far" in content["progress"]
         assert content["log"].endswith("tiles: 2.laz in 1.0 s")
         said = CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
         assert "At work: " in said

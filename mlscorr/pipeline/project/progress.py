@@ -109,7 +109,7 @@ class Progress:
         counts, tasks = self.counts, self.stages[kind]
         total = sum(max(task["points"], 1) for task in tasks)
         rate = counts["worked"] / (monotonic() - counts["start"])  # what was there took no time
-        left = f"{duration((total - counts['points']) / rate)} left, " if rate else ""
+        left = f"{duration((total - counts['points']) / rate)} left of this stage, " if rate else ""
         drives = {task["drive"] for task in tasks} - {""}
         files = f" files of {len(drives)} drives" if drives else ""
         return (
