@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from mlscorr.simulate.drive.pace import smooth_step
 from mlscorr.simulate.scenario import PassScenario
-from mlscorr.simulate.scene import CentreLine
+from mlscorr.simulate.scene import CentreLine, plan_lengths
 from mlscorr.simulate.vehicle import Vehicle
 
 
@@ -67,9 +67,8 @@ def draw(
     _, forward, _ = line.frame(s)
     ahead = np.gradient(place[:, :2], axis=0)
     along = np.einsum("ij,ij->i", ahead, forward[:, :2]) / np.hypot(*ahead.T)
-    steps = np.hypot(*np.diff(place[:, :2], axis=0).T)
     table = np.column_stack([place, fall * along])
-    return Path(CubicSpline(np.append(0.0, np.cumsum(steps)), table))
+    return Path(CubicSpline(plan_lengths(place), table))
 
 
 def u_turn_path(

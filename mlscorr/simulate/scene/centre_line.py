@@ -168,7 +168,7 @@ def line_along(position: np.ndarray, smoothing: float = 3.0) -> tuple[CentreLine
         if abs(place[0] - last[0]) + abs(place[1] - last[1]) >= 1.0:
             kept.append(i)
     path = position[kept]
-    s = _lengths(path)
+    s = plan_lengths(path)
     if s[-1] < 2 * smoothing:
         raise ValueError(
             f"The path is {s[-1]:.1f} m long: a scene needs a drive of {2 * smoothing:.0f} m at "
@@ -179,12 +179,18 @@ def line_along(position: np.ndarray, smoothing: float = 3.0) -> tuple[CentreLine
     path = _extend(gaussian_filter1d(_extend(path), smoothing, axis=0, mode="nearest"))
     # of two extensions; the outer keeps the filter's own ends away
     ends = 2 * round(SETTINGS.margin)
-    s = _lengths(path)
+    s = plan_lengths(path)
     return CentreLine(CubicSpline(s - s[ends], path)), s[-1 - ends] - s[ends]
 
 
-def _lengths(path):
-    """Length (n,) along a polyline in plan."""
+def plan_lengths(path: np.ndarray) -> np.ndarray:
+    """Length (n,) along a polyline in plan, from its first point. Units: m.
+
+    Parameters
+    ----------
+    path : (n, 2+) array
+        Units: m.
+    """
     return np.append(0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T)))
 
 
