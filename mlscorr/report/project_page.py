@@ -33,10 +33,7 @@ def write_project(path: str | Path, document: dict, tracks: dict[str, np.ndarray
         title=f"{document['name']}: correction of {len(document['drives'])} drives",
         summary="project-summary.html",
         sections={name: title for name, title in SECTIONS.items() if name != "map" or tracks},
-        content={
-            "document": document,
-            "figures": figures,
-        },
+        content={"document": document, "figures": figures},
         prefix="project-",
     ).write(path)
 

@@ -1,8 +1,8 @@
-"""The map of a project: names of drives that can be read."""
+"""The page of a project: names of drives that can be read, and a row for each drive."""
 
 import numpy as np
 
-from mlscorr.report.project_page import project_map
+from mlscorr.report.project_page import project_map, write_project
 
 
 def test_names_of_drives_from_one_yard_do_not_cover_one_another():
@@ -33,3 +33,27 @@ def test_labels_of_a_project_that_runs_north_do_not_touch():
     boxes = [label.get_window_extent() for label in labels]
     assert len(boxes) >= 2
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def test_a_drive_without_result_and_the_misfit_of_ties_stand_in_the_table(tmp_path):
+    "A drive of which nothing could be corrected has a row, a tied one says 0.412 to 0.021 m"
+    counts = {"n_surveyed": 0, "n_seen": 0, "n_scored": 0}
+    ties = {"friday": {"n": 31, "before": 0.4123, "after": 0.0214}}
+    row = {
+        "name": "monday", "state": "tied", "tied_with": ties, "meaning": "held by others",
+        "rating": "green", "files": 2, "points": 10, "control": counts, "check": counts,
+        "tested_by": None, "before": None, "after": None, "position_sigma": None,
+        "metres_extrapolated": 0.0, "headline": "",
+    }  # fmt: skip
+    fault = {"drive": "sunday", "name": "a.laz", "stage": "find", "fault": "a.laz ends"}
+    document = {
+        "name": "city", "crs": "EPSG:25832", "headline": "1 drive", "rating": "amber",
+        "statements": [], "drives": [row],
+        "faults": [fault, fault | {"name": "b.laz"}, fault | {"drive": "monday"}],
+    }  # fmt: skip
+    write_project(tmp_path / "project.html", document, {})
+    text = (tmp_path / "project.html").read_text(encoding="utf-8")
+    assert "friday (31: 0.412 to 0.021)" in text
+    assert text.count('<th scope="row">sunday</th>') == 1
+    assert "not corrected: see Failures (2)" in text
+    assert text.count('<th scope="row">') == 2
