@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mlscorr.effects.catalogue import RANDOM
+from mlscorr.blind.mix import causes
 from mlscorr.gap.infer.settings import SETTINGS
 
 
@@ -68,7 +68,7 @@ class AnsweredCase:
     @property
     def is_noise(self) -> bool:
         """Whether none, or nothing but noise, was said to be there."""
-        return set(self.named.split("+")) <= {"none", *RANDOM}
+        return set(self.named.split("+")) <= {"none", *causes(is_random=True)}
 
     @property
     def is_only_noise(self) -> bool:
@@ -87,7 +87,7 @@ class AnsweredCase:
         if self.kind == "outside":
             return self.named == "unknown"
         if self.kind == "withheld":
-            is_random = set(self.named.split("+")) <= set(RANDOM)
+            is_random = set(self.named.split("+")) <= set(causes(is_random=True))
             return self.named == "unknown" or is_random or self.resemblance > SETTINGS.same
         return self.names(self.named, by_class=True)
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.blind.grading import grading_mechanisms
-from mlscorr.blind.mix import Case
-from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
+from mlscorr.blind.mix import Case, causes
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.gap.signatures.signatures import signatures
@@ -94,7 +93,7 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
                           "lead": list(lead)},
         }  # fmt: skip
         return label, DisplacedSurvey.of(survey, mechanism)
-    names = names_to_try(RANDOM if case.kind == "noise" else SYSTEMATIC, rng, case.names)
+    names = names_to_try(causes(case.kind == "noise"), rng, case.names)
     drawn = draw_effects(ruler, known, names, len(case.names), case.mdb, rng)
     if drawn is None:
         return None, None
@@ -102,7 +101,7 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
     if case.kind == "withheld":
         label["without"] = label["names"][0]
     elif label["without"] in label["names"]:
-        others = [other for other in SYSTEMATIC if other not in label["names"]]
+        others = [other for other in causes() if other not in label["names"]]
         label["without"] = str(rng.choice(others))
     return label, random_survey((*entropy, 0), name, label["effects"])
 

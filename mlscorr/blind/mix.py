@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.blind.settings import SETTINGS
-from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
+from mlscorr.effects.catalogue import known_effects
 
 
 @dataclass(frozen=True)
@@ -34,18 +34,30 @@ def mix(cases: int, rng: np.random.Generator, mechanisms: Sequence[str] = ()) ->
     shares = {k: v for k, v in SETTINGS.shares if mechanisms or k != "outside"}
     kinds = np.repeat(list(shares), _whole(cases, shares))
     turns = {
-        "noise": _turns(RANDOM, rng),
-        "single": _turns(SYSTEMATIC, rng),
-        "withheld": _turns(SYSTEMATIC, rng),
+        "noise": _turns(causes(is_random=True), rng),
+        "single": _turns(causes(), rng),
+        "withheld": _turns(causes(), rng),
         "outside": _turns(tuple(mechanisms), rng),
     }
     return [_case(str(kind), turns, rng) for kind in rng.permutation(kinds)]
 
 
+def causes(is_random: bool = False) -> tuple[str, ...]:
+    """Names of the effects that a case may have: the library's, and those that were registered.
+
+    Parameters
+    ----------
+    is_random : bool
+        Whether they are noise.
+    """
+    kinds = known_effects()
+    return tuple(k.name for k in kinds if (k.random if is_random else not k.is_scatter()))
+
+
 def _case(kind, turns, rng):
     names, mdb = (), 0.0
     if kind == "pair":
-        names = tuple(map(str, rng.choice(SYSTEMATIC, 2, replace=False)))
+        names = tuple(map(str, rng.choice(causes(), 2, replace=False)))
     elif kind in turns:
         names = (next(turns[kind]),)
     if kind == "single":
@@ -54,7 +66,7 @@ def _case(kind, turns, rng):
     elif kind != "clean":
         is_noise = kind == "noise"
         mdb = float(rng.uniform(*(SETTINGS.noise_sizes if is_noise else SETTINGS.clear_sizes)))
-    without = str(rng.choice([name for name in SYSTEMATIC if name not in names]))
+    without = str(rng.choice([name for name in causes() if name not in names]))
     return Case(kind, names, mdb, names[0] if kind == "withheld" else without)
 
 

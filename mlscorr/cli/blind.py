@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import Exit, Json, Quiet, exit_code, say
+from mlscorr.cli.terminal import Effects, Exit, Json, Quiet, exit_code, say
 from mlscorr.cli.work import print_json
 
 Check = Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the blind check.")]
@@ -26,6 +26,7 @@ def make(
         Path | None,
         typer.Option(help="Python file with mechanisms of your own, instead of those that grade."),
     ] = None,
+    effects: Effects = None,
     workers: Workers = 2,
     quiet: Quiet = False,
 ) -> None:
@@ -33,22 +34,24 @@ def make(
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline.blind import make_blind
 
-        made = make_blind(out, cases, seed, workers, mechanisms, progress)
+        made = make_blind(out, cases, seed, workers, mechanisms, progress, effects)
     say(f"{made} surveys are in {out / 'cases'}, their seals in {out / 'seals.json'}.")
 
 
 @blind.command()
-def run(out: Check, workers: Workers = 2, quiet: Quiet = False) -> None:
+def run(out: Check, effects: Effects = None, workers: Workers = 2, quiet: Quiet = False) -> None:
     """Diagnose each survey that has no answer yet, from its folder alone."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline.blind import run_blind
 
-        answered, failed = run_blind(out, workers, progress)
+        answered, failed = run_blind(out, workers, progress, effects)
     say(f"{answered} surveys are diagnosed ({failed} could not be): {out / 'answers'}.")
 
 
 @blind.command(name="score")
-def score_(out: Check, as_json: Json = False, quiet: Quiet = False) -> None:
+def score_(
+    out: Check, effects: Effects = None, as_json: Json = False, quiet: Quiet = False
+) -> None:
     """Verify the seals and compare answers with labels."""
     with exit_code(Exit.BAD_DATA):
         from mlscorr.pipeline.blind import score_blind
@@ -57,8 +60,7 @@ def score_(out: Check, as_json: Json = False, quiet: Quiet = False) -> None:
     print_json(score, as_json)
     for line in _table(score["rows"]):
         say(line)
-    failed = len(score["failed"])
-    say(f"{score['answered']} of {score['cases']} cases are answered, {failed} failed.")
+    say(f"{score['answered']} of {score['cases']} cases answered, {len(score['failed'])} failed.")
     for case in score["wrong"]:
         size = f" of {case['mdb']:.1f} MDB" if case["mdb"] else ""
         say(

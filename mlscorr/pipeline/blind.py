@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 from mlscorr.blind.cases import make_case, outside_mechanisms
 from mlscorr.blind.mix import mix
 from mlscorr.blind.scoring import score
-from mlscorr.effects import EFFECTS
+from mlscorr.effects import EFFECTS, known_effects, register_file
 from mlscorr.io.output import document, output_file, write_json
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.finding import find_targets, silent
@@ -30,7 +30,7 @@ SECRET = ("truth*", "key*")  # names of files that no diagnosis may see
 
 def make_blind(
     out: Path, cases: int, seed: int, workers: int, mechanisms: Path | None = None,
-    progress: Callable | None = None,
+    progress: Callable | None = None, effects: Path | None = None,
 ) -> int:  # fmt: skip
     """Make the surveys of a blind check: OUT/cases, seals.json (public) and key.json (labels).
 
@@ -47,6 +47,8 @@ def make_blind(
         File with mechanisms that no library knows; by default the half of the grammar that grades.
     progress : function, optional
         progress(title, total) returns a function of the number of cases just done.
+    effects : Path, optional
+        Python file of a user's effects, which are registered already: they are drawn like others.
 
     Raises
     ------
@@ -54,15 +56,13 @@ def make_blind(
         When OUT holds another check, or a case can't be made.
     """
     out, names = Path(out), tuple(outside_mechanisms(mechanisms))
-    key = _opened(out, {"cases": cases, "seed": seed, "mechanisms": list(names)})
-    todo = {
-        _name(i): (case, (seed, i), mechanisms)
-        for i, case in enumerate(mix(cases, np.random.default_rng([seed]), names), start=1)
-        if _name(i) not in key["labels"]
-    }
-    done = (progress or silent)("Making surveys", len(todo))
-    jobs = [(_make, out / "cases" / name, *job) for name, job in todo.items()]
-    for folder, label in _in_processes(jobs, workers):
+    own = [kind.name for kind in known_effects()[len(EFFECTS) :]]
+    key = _opened(out, {"cases": cases, "seed": seed, "mechanisms": list(names), "effects": own})
+    drawn = enumerate(mix(cases, np.random.default_rng([seed]), names), start=1)
+    each = [(out / "cases" / f"{i:04d}", case, (seed, i), mechanisms) for i, case in drawn]
+    jobs = [(_make, folder, *job) for folder, *job in each if folder.name not in key["labels"]]
+    done = (progress or silent)("Making surveys", len(jobs))
+    for folder, label in _in_processes(jobs, workers, effects):
         key["labels"][folder.name] = {"label": label, "salt": secrets.token_hex(16)}
         _write_key(out, key)
         done(1)
@@ -71,7 +71,9 @@ def make_blind(
     return len(seals)
 
 
-def run_blind(out: Path, workers: int, progress: Callable | None = None) -> tuple[int, int]:
+def run_blind(
+    out: Path, workers: int, progress: Callable | None = None, effects: Path | None = None
+) -> tuple[int, int]:
     """Diagnose each survey of a blind check that has no answer yet: OUT/answers.
 
     Each diagnosis sees a copy of its survey's folder in a process of its own; the key can't be
@@ -81,7 +83,7 @@ def run_blind(out: Path, workers: int, progress: Callable | None = None) -> tupl
     ----------
     out : Path
     workers : int
-    progress : function, optional
+    progress, effects
         As in ``make_blind``.
 
     Returns
@@ -102,15 +104,15 @@ def run_blind(out: Path, workers: int, progress: Callable | None = None) -> tupl
         _check_blind(folder)
     answers = out / "answers"
     answers.mkdir(exist_ok=True)
-    todo = [folder for folder in folders if not (answers / f"{folder.name}.json").exists()]
-    done = (progress or silent)("Diagnosing", len(todo))
+    todo = (folder for folder in folders if not (answers / f"{folder.name}.json").exists())
+    jobs = [(_diagnose, folder) for folder in todo]
+    done = (progress or silent)("Diagnosing", len(jobs))
     with _locked(out / "key.json"):
-        for folder, answer in _in_processes([(_diagnose, folder) for folder in todo], workers):
-            with output_file(answers / f"{folder.name}.json") as part:
-                write_json(part, answer)
+        for folder, answer in _in_processes(jobs, workers, effects):
+            write_json(answers / f"{folder.name}.json", answer)
             done(1)
-    failed = sum("error" in json.loads(path.read_text()) for path in answers.glob("*.json"))
-    return len(folders), failed
+    texts = (path.read_text() for path in answers.glob("*.json"))
+    return len(folders), sum("error" in json.loads(text) for text in texts)
 
 
 def score_blind(out: Path) -> dict:
@@ -127,11 +129,7 @@ def score_blind(out: Path) -> dict:
     """
     out = Path(out)
     key, seals = _read(out / "key.json")["labels"], _read(out / "seals.json")["seals"]
-    broken = sorted(
-        name
-        for name in {*key, *seals}
-        if name not in key or name not in seals or _seal(key[name]) != seals[name]
-    )
+    broken = sorted(n for n in {*key, *seals} if n not in key or _seal(key[n]) != seals.get(n))
     if broken:
         raise ValueError(
             f"{len(broken)} of {len(seals)} seals of {out} are broken (first: {broken[0]}): a "
@@ -146,10 +144,6 @@ def score_blind(out: Path) -> dict:
     content = document("score", {"cases": len(seals), "answered": len(answered), **scored})
     write_json(out / "score.json", content)
     return content
-
-
-def _name(number):
-    return f"{number:04d}"
 
 
 def _read(path):
@@ -187,7 +181,7 @@ def _opened(out, plan):
 def _write_key(out, key):
     with output_file(out / "key.json") as part:
         part.touch(mode=0o600)
-        write_json(part, key)
+        part.write_text(json.dumps(key, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 @contextmanager
@@ -210,17 +204,24 @@ def _check_blind(folder):
         )
 
 
-def _in_processes(jobs, workers):
+def _in_processes(jobs, workers, effects):
     """Results of jobs (function, folder, ...) as (folder, result), in the order in which they
     are done. A process is a fresh interpreter with one thread in BLAS.
     """
     context = get_context("spawn")
-    with ProcessPoolExecutor(workers, context, threadpool_limits, (1,)) as pool:
+    with ProcessPoolExecutor(workers, context, _begin, (effects,)) as pool:
         futures = {pool.submit(*job): job[1] for job in jobs}
         try:
             yield from ((futures[future], future.result()) for future in as_completed(futures))
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def _begin(effects):
+    """What a process does first."""
+    threadpool_limits(1)
+    if effects is not None:
+        register_file(effects)
 
 
 def _make(folder, case, entropy, mechanisms):
@@ -246,7 +247,7 @@ def _diagnose(folder):
         shutil.copytree(folder, copy, ignore=shutil.ignore_patterns(*SECRET))
         without = json.loads((copy / "library.json").read_text())["without"]
         (copy / "library.json").unlink()
-        library = tuple(kind for kind in EFFECTS if kind.name not in without)
+        library = tuple(kind for kind in known_effects() if kind.name not in without)
         try:
             rng = np.random.default_rng(0)
             answer = {"document": diagnose(read_survey(copy), library=library, rng=rng).document}

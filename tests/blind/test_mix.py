@@ -1,10 +1,14 @@
 """The cases of a blind check."""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
-from mlscorr.blind.mix import mix
+from mlscorr.blind.mix import causes, mix
 from mlscorr.blind.settings import SETTINGS
+from mlscorr.effects import Effect, catalogue, quantity, register
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
 
 
@@ -23,3 +27,28 @@ def test_the_mix_holds_each_kind_and_each_effect_in_turn(seed):
         assert (case.without in case.names) == (case.kind == "withheld")
         assert case.kind != "noise" or case.names[0] in RANDOM
     assert "outside" not in {case.kind for case in mix(50, np.random.default_rng(seed))}
+
+
+def test_an_effect_of_ones_own_is_drawn_like_the_others(monkeypatch):
+    "A registered effect is single, withheld and in a pair; without it each case is as before"
+    monkeypatch.setattr(catalogue, "_registered", {})
+    assert causes() == SYSTEMATIC
+    assert causes(is_random=True) == RANDOM
+
+    @dataclass(frozen=True)
+    class Lift(Effect):
+        name: ClassVar = "lift"
+        stage: ClassVar = "pos"
+        title: ClassVar = "Lifted vehicle"
+        meaning: ClassVar = "The vehicle stands too high."
+        sentence: ClassVar = "The vehicle stands {size} too {side}."
+        remedy: ClassVar = "Mend it."
+        sides: ClassVar = ("high", "low")
+        magnitude: float = quantity("m", 9.0, "no car flies", typical=0.1, source="estimate")
+
+    register(Lift)
+    assert causes() == (*SYSTEMATIC, "lift")
+    assert causes(is_random=True) == RANDOM
+    cases = mix(300, np.random.default_rng(1))
+    for kind in ("single", "withheld", "pair"):
+        assert any("lift" in case.names for case in cases if case.kind == kind), kind

@@ -3,11 +3,13 @@
 import json
 import shutil
 import stat
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from mlscorr.blind.mix import SYSTEMATIC
+from mlscorr.blind.mix import causes
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.blind import make_blind, run_blind, score_blind
 from mlscorr.simulate import Scenario, simulate
@@ -15,6 +17,32 @@ from mlscorr.simulate import Scenario, simulate
 pytestmark = pytest.mark.long
 
 CASES, SEED = 2, 5
+OWN = """
+import numpy as np
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mlscorr.effects import Effect, quantity, register
+
+
+@register
+@dataclass(frozen=True)
+class Squat(Effect):
+    name: ClassVar = "squat"
+    stage: ClassVar = "pos"
+    title: ClassVar = "Squatting vehicle"
+    meaning: ClassVar = "The body of the vehicle rises when it is fast."
+    sentence: ClassVar = "At 1 m/s the body of the vehicle is {size} too {side}."
+    remedy: ClassVar = "Drive at one speed."
+    sides: ClassVar = ("high", "low")
+    magnitude: float = quantity(
+        "m per (m/s)^2", 0.01, "no car flies", typical=1e-4, source="1 cm at 10 m/s"
+    )
+
+    def _error(self, value, reference, rng):
+        velocity = np.gradient(value.position, value.gps_time, axis=0)
+        return self.magnitude * (velocity**2).sum(axis=1)[:, None] * [0.0, 0.0, 1.0]
+"""
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +68,7 @@ def test_makes_surveys_that_hold_no_truth(made):
         assert len(survey.control) >= 12
         assert 100_000 < sum(file.points for file in survey.clouds) < 3_000_000
         assert (survey.reference is not None) == (folder / "reference.ply").exists()
-        assert json.loads((folder / "library.json").read_text())["without"][0] in SYSTEMATIC
+        assert json.loads((folder / "library.json").read_text())["without"][0] in causes()
     seals = json.loads((made / "seals.json").read_text())["seals"]
     assert all(len(seal) == 64 for seal in seals.values())
 
@@ -120,3 +148,31 @@ def test_answers_depend_on_the_survey_alone(made, short, tmp_path):
     told = score_blind(out)
     assert told["answered"] == 2
     assert json.loads((out / "score.json").read_text()) == told
+
+
+def test_effects_of_a_file_are_drawn_diagnosed_and_scored(tmp_path):
+    "Of 30 effects a user's is the first to be drawn with a seed: it is made, weighed and scored"
+    (tmp_path / "squat.py").write_text(OWN)
+    code = (
+        "import sys, numpy as np; from mlscorr.blind.mix import mix\n"
+        "from mlscorr.effects import register_file; register_file(sys.argv[1])\n"
+        "def drawn(seed): return mix(1, np.random.default_rng([seed]))[0]\n"
+        "print(next(s for s in range(10**4) if drawn(s).names == ('squat',) and drawn(s).mdb >= 4 "
+        "and drawn(s).kind == 'single'))"
+    )
+
+    def run(*command):
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+
+    seed = run(sys.executable, "-c", code, "squat.py").stdout.strip()
+    blind, own = (sys.executable, "-m", "mlscorr", "blind"), ("--effects", "squat.py")
+    run(*blind, "make", "out", "--cases", "1", "--seed", seed, "--workers", "1", *own)
+    key = json.loads((tmp_path / "out" / "key.json").read_text())
+    assert key["plan"]["effects"] == ["squat"]
+    assert key["labels"]["0001"]["label"]["names"] == ["squat"]
+    run(*blind, "run", "out", "--workers", "1", *own)
+    answer = json.loads((tmp_path / "out" / "answers" / "0001.json").read_text())
+    assert "squat" in {cause["effect"] for cause in answer["document"]["causes"]}
+    score = json.loads(run(*blind, "score", "out", "--json", *own).stdout)
+    assert score["answered"] == 1
+    assert not score["failed"]
