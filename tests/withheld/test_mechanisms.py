@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mlscorr
-from mlscorr.blind.mix import SYSTEMATIC
+from mlscorr.effects.catalogue import SYSTEMATIC
 from mlscorr.frames import attitude_from_angles
 from mlscorr.simulate.displacement import RecordedPoints
 from mlscorr.simulate.mechanisms import load_mechanisms
