@@ -3,7 +3,7 @@
 import base64
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import version
+from importlib.metadata import distributions
 from pathlib import Path
 
 import numpy as np
@@ -122,7 +122,8 @@ def drawn(figures: Figures) -> dict[str, str]:
 
 def versions() -> list[tuple[str, str]]:
     """Names and versions of mlscorr and the libraries that made the numbers."""
-    return [(name, version(name)) for name in ("mlscorr", *LIBRARIES)]
+    known = (next(iter(distributions(name=name)), None) for name in ("mlscorr", *LIBRARIES))
+    return [(package.name, package.version) for package in known if package is not None]
 
 
 def now() -> str:
