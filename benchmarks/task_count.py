@@ -1,10 +1,12 @@
-"""What a task of a cluster takes by itself: python benchmarks/task_count.py tcp://HOST:8786 1500
+"""What a task of a cluster takes by itself.
+
+    python benchmarks/task_count.py tcp://HOST:8786 1500
 
 Calls that do nothing are handed out as a run hands out its tasks, twice as many as there are
 workers at a time.
 """
 
-import sys
+import argparse
 import time
 from concurrent.futures import FIRST_COMPLETED, wait
 
@@ -24,5 +26,16 @@ def seconds_each(scheduler: str, number: int) -> float:
         return (time.perf_counter() - start) / number
 
 
+def main() -> None:
+    """Print it."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scheduler", help="its address")
+    parser.add_argument("number", type=int, help="of calls")
+    given = parser.parse_args()
+    print(f"{1000 * seconds_each(given.scheduler, given.number):.1f} ms a task")
+
+
 if __name__ == "__main__":
-    print(f"{1000 * seconds_each(sys.argv[1], int(sys.argv[2])):.1f} ms a task")
+    main()

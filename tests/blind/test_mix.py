@@ -1,15 +1,13 @@
 """The cases of a blind check."""
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 import pytest
 
 from mlscorr.blind.mix import causes, mix
 from mlscorr.blind.settings import SETTINGS
-from mlscorr.effects import Effect, catalogue, quantity, register
+from mlscorr.effects import catalogue, register
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
+from tests.beds.own_effects import Squat
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -34,21 +32,9 @@ def test_an_effect_of_ones_own_is_drawn_like_the_others(monkeypatch):
     monkeypatch.setattr(catalogue, "_registered", {})
     assert causes() == SYSTEMATIC
     assert causes(is_random=True) == RANDOM
-
-    @dataclass(frozen=True)
-    class Lift(Effect):
-        name: ClassVar = "lift"
-        stage: ClassVar = "pos"
-        title: ClassVar = "Lifted vehicle"
-        meaning: ClassVar = "The vehicle stands too high."
-        sentence: ClassVar = "The vehicle stands {size} too {side}."
-        remedy: ClassVar = "Mend it."
-        sides: ClassVar = ("high", "low")
-        magnitude: float = quantity("m", 9.0, "no car flies", typical=0.1, source="estimate")
-
-    register(Lift)
-    assert causes() == (*SYSTEMATIC, "lift")
+    register(Squat)
+    assert causes() == (*SYSTEMATIC, "squat")
     assert causes(is_random=True) == RANDOM
     cases = mix(300, np.random.default_rng(1))
     for kind in ("single", "withheld", "pair"):
-        assert any("lift" in case.names for case in cases if case.kind == kind), kind
+        assert any("squat" in case.names for case in cases if case.kind == kind), kind

@@ -5,6 +5,7 @@ import shutil
 import stat
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,36 +14,11 @@ from mlscorr.blind.mix import causes
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline.blind import make_blind, run_blind, score_blind
 from mlscorr.simulate import Scenario, simulate
+from tests.beds import own_effects
 
 pytestmark = pytest.mark.long
 
 CASES, SEED = 2, 5
-OWN = """
-import numpy as np
-from dataclasses import dataclass
-from typing import ClassVar
-
-from mlscorr.effects import Effect, quantity, register
-
-
-@register
-@dataclass(frozen=True)
-class Squat(Effect):
-    name: ClassVar = "squat"
-    stage: ClassVar = "pos"
-    title: ClassVar = "Squatting vehicle"
-    meaning: ClassVar = "The body of the vehicle rises when it is fast."
-    sentence: ClassVar = "At 1 m/s the body of the vehicle is {size} too {side}."
-    remedy: ClassVar = "Drive at one speed."
-    sides: ClassVar = ("high", "low")
-    magnitude: float = quantity(
-        "m per (m/s)^2", 0.01, "no car flies", typical=1e-4, source="1 cm at 10 m/s"
-    )
-
-    def _error(self, value, reference, rng):
-        velocity = np.gradient(value.position, value.gps_time, axis=0)
-        return self.magnitude * (velocity**2).sum(axis=1)[:, None] * [0.0, 0.0, 1.0]
-"""
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +128,9 @@ def test_answers_depend_on_the_survey_alone(made, short, tmp_path):
 
 def test_effects_of_a_file_are_drawn_diagnosed_and_scored(tmp_path):
     "Of 30 effects a user's is the first to be drawn with a seed: it is made, weighed and scored"
-    (tmp_path / "squat.py").write_text(OWN)
+    own = Path(own_effects.__file__).read_text()
+    own += "\n\nfrom mlscorr.effects import register\n\nregister(Squat)\n"
+    (tmp_path / "squat.py").write_text(own)
     code = (
         "import sys, numpy as np; from mlscorr.blind.mix import mix\n"
         "from mlscorr.effects import register_file; register_file(sys.argv[1])\n"
