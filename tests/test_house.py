@@ -1,6 +1,6 @@
-"""The size of the house: short modules and functions, few constants, documented and tested.
+"""Public names are documented and typed, and every test opens with a sentence.
 
-``python tests/test_house.py`` prints the figures of each room.
+``python tests/test_house.py`` prints figures of each room, which are no limits.
 """
 
 import ast
@@ -20,15 +20,7 @@ BLANKS = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, toke
           tokenize.ENDMARKER)  # fmt: skip
 FUNCTIONS = ast.FunctionDef | ast.AsyncFunctionDef
 DEFINITIONS = ast.ClassDef | FUNCTIONS
-MODULE_LINES, FUNCTION_LINES = 300, 40
-CONSTANTS = 578  # at most in the package, on the way to 300
 DOCUMENTED = 0.65  # share of the public names with sections
-TESTS_PER_SOURCE = 0.7  # lines of code
-CODE_LINES = 41_326
-MIRRORED = (  # rooms whose every module has a test file of its own
-    *("baselines", "collocation", "correction", "effects", "estimate", "evaluate"),
-    *("gap", "matching", "pos", "survey", "targets"),
-)
 UNANNOTATED = {"pipeline": 2, "report": 1}  # public functions without types, at most
 
 
@@ -43,11 +35,6 @@ def name_of(path):
 
 def room_of(path):
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-
-
-def mirror_of(path):
-    "The test file of a module"
-    return ROOT / "tests" / path.relative_to(PACKAGE).parent / f"test_{path.name}"
 
 
 def docstring_lines(tree):
@@ -137,36 +124,6 @@ def total(figure):
     return sum(room[figure] for room in figures().values())
 
 
-def test_modules_are_short():
-    "A module is read in one sitting: at most 300 lines"
-    lengths = {name_of(path): len(path.read_text().splitlines()) for path in MODULES}
-    long = {name for name, length in lengths.items() if length > MODULE_LINES}
-    assert not long
-
-
-def test_functions_are_short():
-    "A function fits a screen: at most 40 lines without its docstring"
-    long = set()
-    for path in MODULES:
-        for node in ast.walk(parsed(path)):
-            if isinstance(node, FUNCTIONS):
-                documented = ast.get_docstring(node) is not None
-                first = node.body[1 if documented and len(node.body) > 1 else 0].lineno
-                if node.end_lineno - first >= FUNCTION_LINES:
-                    long.add(f"{name_of(path)}:{node.name}")
-    assert not long
-
-
-def test_there_are_few_constants():
-    "Numbers set by hand stay few, those in Settings among them"
-    assert total("constants") <= CONSTANTS
-
-
-def test_the_house_stays_small():
-    "What is added has to be paid for by what goes"
-    assert total("lines") <= CODE_LINES
-
-
 def test_public_names_say_what_they_take_and_give():
     "Docstrings of public functions and classes have sections Parameters, Returns or Raises"
     assert total("documented") >= DOCUMENTED * total("public")
@@ -177,20 +134,6 @@ def test_public_functions_state_their_types(room):
     "Every public function and method annotates its parameters and its result"
     names = [name for path in MODULES if room_of(path) == room for name in unannotated(path)]
     assert len(names) <= UNANNOTATED.get(room, 0), "\n".join(names)
-
-
-def test_there_is_enough_test_code():
-    "Lines of test code per line of source code"
-    tests = sum(code_lines(path) for path in (ROOT / "tests").rglob("*.py"))
-    assert tests >= TESTS_PER_SOURCE * total("lines")
-
-
-@pytest.mark.parametrize("room", MIRRORED)
-def test_tests_mirror_the_package(room):
-    "What is known of a module stands in a test file of its name"
-    modules = [path for path in MODULES if room_of(path) == room and path.stem != "__init__"]
-    lacking = [name_of(path) for path in modules if not mirror_of(path).exists()]
-    assert not lacking
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "tests").rglob("test_*.py")), ids=name_of)
