@@ -1,23 +1,178 @@
-"""Control in another datum or scale: the cloud would follow it by more than the POS allows."""
+"""Control that differs from the cloud by one linear term: a shift, a scale, a turn, a tilt.
 
-from collections.abc import Iterator
+The corrected cloud follows the control, and check points of the same survey follow it too: nothing
+else shows that a net is in ground distances or in another datum. Two explanations of the same
+misclosures are compared by their marginal likelihoods (Kass and Raftery 1995): a POS whose errors
+are as the estimate models them, with their own scales and correlation times; and the same POS with
+a linear term of the control beside it, whose size is open within a wide prior. A POS that errs by
+several times its stated sigma is possible, but seldom along a straight line.
+
+A shift can't be told from a constant error of the POS by its shape, only by its size: there the POS
+is taken by its word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import chain, combinations
 
 import numpy as np
+from scipy.special import logsumexp
+from threadpoolctl import threadpool_limits
 
+from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
+from mlscorr.estimate import SETTINGS as ESTIMATE
+from mlscorr.estimate.assembly import position_equations, with_mountings
+from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.inputs import filled_sigmas
+from mlscorr.estimate.outages import with_drift_history
+from mlscorr.estimate.posterior import Objective
+from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate.signals import SignalParameters
 from mlscorr.evaluate.settings import SETTINGS
+from mlscorr.io.projection import MapFactors, map_factors
 from mlscorr.matching.settings import SETTINGS as MATCHING
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Matched, Pos, Trajectory
 
+SHIFT, HEIGHT, SCALE, TURN, TILT = TERMS = ("shift", "height", "scale", "turn", "tilt")
+UNITS = {SHIFT: "m", HEIGHT: "m", SCALE: "ratio", TURN: "rad", TILT: "m/m"}
+COLUMNS = {SCALE: [0], TURN: [1], TILT: [2, 3]}  # of linear_columns
+SETS = [tuple(s) for k in range(4) for s in combinations(COLUMNS, k)]  # of terms, the empty first
 FOLLOWS = "The corrected cloud follows the control; find out which of the two is right."
 
 
-def datum_warnings(control: Matched, trajectory: Trajectory, pos: Pos) -> tuple[str, ...]:
-    """Sentences where what all control points have in common is no error of this POS.
+@dataclass(frozen=True)
+class DatumDifference:
+    """A term by which all control points together differ from the cloud as the POS puts it.
 
-    A constant misclosure beyond what the POS states, and a scale or a turn of the map, are said
-    where they explain the misclosures: a POS that drifts by more than it states is no datum.
+    Parameters
+    ----------
+    term : str
+        Of TERMS.
+    size, sigma : (k,) array
+        Estimate and its one sigma: E and N (shift), height, scale less one, turn to the left (rad),
+        rise of the control towards E and towards N (tilt). Units: those of UNITS.
+    log_evidence : float
+        Logarithm of the Bayes factor of the term against an error of the POS.
+    observations : int
+        Number of control observations that it rests on.
+    extent : float
+        RMS distance of the control points from their middle, in plan. Units: m.
+    ground : MapFactors, optional
+        Of the survey's CRS at the control; None without a CRS.
+    """
+
+    term: str
+    size: np.ndarray
+    sigma: np.ndarray
+    log_evidence: float
+    observations: int
+    extent: float
+    ground: MapFactors | None = None
+
+    @property
+    def length(self) -> float:
+        """The shift, or what the term makes at the extent. Units: m."""
+        size = float(np.linalg.norm(self.size))
+        return size if self.term in (SHIFT, HEIGHT) else size * self.extent
+
+    def document(self) -> dict[str, object]:
+        """The row of ``datum[]`` in report.json."""
+        ground = None if self.ground is None else self.ground.document()
+        return {
+            "term": self.term, "unit": UNITS[self.term], "size": self.size.tolist(),
+            "sigma": self.sigma.tolist(), "length_m": self.length, "extent_m": self.extent,
+            "log_evidence": self.log_evidence, "observations": self.observations,
+            "map_factor": ground, "sentence": self.sentence,
+        }  # fmt: skip
+
+    @property
+    def sentence(self) -> str:
+        """The warning that check, correct and the page share."""
+        return f"{self._finding()} {self._cause()} {FOLLOWS}"
+
+    def _finding(self):
+        """The term with its size, and the evidence for it."""
+        size = self.size
+        if self.term == HEIGHT:
+            where = "below" if size[0] < 0 else "above"
+            return (
+                f"The control points lie {abs(size[0]):.2f} m {where} the cloud as the POS puts "
+                f"it ({self._evidence()})."
+            )
+        if self.term == SHIFT:
+            return (
+                f"The control points lie {self.length:.2f} m beside the cloud as the POS puts it "
+                f"(E {size[0]:+.2f}, N {size[1]:+.2f} m; {self._evidence()})."
+            )
+        if self.term == SCALE:
+            ppm, sigma = 1e6 * size[0], 1e6 * self.sigma[0]
+            words = f"larger than in the cloud by {ppm:+.0f} +/- {sigma:.0f} ppm"
+        elif self.term == TURN:
+            turn, sigma = np.degrees([size[0], self.sigma[0]])
+            words = f"turned to the left against the cloud by {turn:+.4f} +/- {sigma:.4f} deg"
+        else:
+            rise, sigma = 1e3 * size, 1e3 * self.sigma
+            words = (
+                f"tilted against the cloud: it rises by {rise[0]:+.2f} +/- {sigma[0]:.2f} mm/m "
+                f"towards east and {rise[1]:+.2f} +/- {sigma[1]:.2f} mm/m towards north"
+            )
+        edge = f"{self.length:.3f} m at {self.extent:.0f} m from its middle"
+        return f"The net of control points is {words} ({edge}; {self._evidence()})."
+
+    def _evidence(self):
+        return (
+            f"{self.observations} observations, Bayes factor {_rounded(self.log_evidence)} against "
+            "an error of the POS"
+        )
+
+    def _cause(self):
+        """The likely cause, and the way out."""
+        if self.term == HEIGHT:
+            return (
+                "It looks like heights of another vertical datum or geoid, or a wrong height of an "
+                "antenna, an instrument or a post."
+            )
+        if self.term == SHIFT:
+            return "It looks like another horizontal datum, realization or epoch."
+        if self.term == TILT:
+            return (
+                "It looks like heights of another geoid model, or like a network whose vertical "
+                "was never levelled: export the control with the geoid of the cloud."
+            )
+        if self.term == TURN:
+            beside = ""
+            if self.ground is not None:
+                angle = -np.degrees(self.ground.convergence)
+                beside = f" (one to true north would be turned by {angle:+.4f} deg)"
+            return (
+                "It looks like another projection or zone, or a local net oriented to another "
+                f"north{beside}: export the control in the crs of the cloud."
+            )
+        return self._cause_of_scale()
+
+    def _cause_of_scale(self):
+        """The scale beside that of ground distances, and how to declare it."""
+        factor = f"scale_factor = {1 / (1 + self.size[0]):.6f}"
+        if self.ground is None:
+            return (
+                "It looks like ground distances without the map's scale: if they are, set "
+                f"{factor} under [control]."
+            )
+        ppm = 1e6 * (1 / self.ground.combined - 1)
+        return (
+            f"Ground distances would be larger by {ppm:+.0f} ppm there ({self.ground}): if the "
+            f'control is in them, set scale_factor = "ground" under [control], for any other known '
+            f"scale {factor}."
+        )
+
+
+def datum_differences(
+    control: Matched, trajectory: Trajectory, pos: Pos, crs: str | None = None
+) -> tuple[DatumDifference, ...]:
+    """Terms of the control that explain its misclosures better than an error of the POS does.
 
     Parameters
     ----------
@@ -26,64 +181,192 @@ def datum_warnings(control: Matched, trajectory: Trajectory, pos: Pos) -> tuple[
     trajectory : Trajectory
         As recorded.
     pos : Pos
+    crs : str, optional
+        Of the survey: the map's own scale and convergence are stated beside those found.
 
     Returns
     -------
-    tuple of str
+    tuple of DatumDifference
+        With strong evidence (a Bayes factor of 20) each; empty for fewer than three observations.
     """
     if len(control) < 3:
         return ()
     filled, _ = filled_sigmas(trajectory)
+    linear = _linear_terms(_spread(control), filled, pos)
+    place = control.surveyed.position
+    columns = linear_columns(place)
+    rest = control.misclosure - sum(
+        (columns[:, :, COLUMNS[term]] @ size for term, size, _, _ in linear), np.zeros(3)
+    )
     sigma = stated_sigma(filled, pos, control.gps_time).position
-    return *_height(control.misclosure[:, 2], sigma[:, 2]), *_plan(control, sigma[:, :2], pos)
+    found = [*_shift(rest[:, :2], sigma[:, :2], SHIFT), *_shift(rest[:, 2:], sigma[:, 2:], HEIGHT)]
+    middle = place.mean(axis=0)
+    about = {"observations": len(control), "extent": _extent(place)}
+    if crs is not None:
+        about["ground"] = map_factors(crs, middle)
+    return tuple(DatumDifference(*terms, **about) for terms in chain(found, linear))
 
 
-def _height(misclosure, sigma):
-    """A sentence on heights that differ by a constant."""
-    shift = np.average(misclosure, weights=sigma**-2)
-    scatter, limit = np.std(misclosure), _common_sigma(sigma)
-    if _stands_out(abs(shift), limit, scatter):
-        yield (
-            f"The control points lie {abs(shift):.2f} m {'below' if shift < 0 else 'above'} the "
-            f"cloud as the POS puts it ({len(misclosure)} observations agree to {scatter:.3f} m), "
-            f"{abs(shift) / limit:.0f} times the sigma of {limit:.3f} m that this leaves room for: "
-            "they look like heights of another vertical datum or geoid, or the height of an "
-            f"antenna, an instrument or a post is wrong. {FOLLOWS}"
-        )
+def linear_columns(place: np.ndarray) -> np.ndarray:
+    """Partial derivatives (n, 3, 4) of places by scale, turn to the left, and rise to E and N.
+
+    Parameters
+    ----------
+    place : (n, 3) array
+        Units: m.
+    """
+    east, north, _ = (place - place.mean(axis=0)).T
+    columns = np.zeros((len(place), 3, 4))
+    columns[:, 0, 0] = east
+    columns[:, 1, 0] = north
+    columns[:, 0, 1] = -north
+    columns[:, 1, 1] = east
+    columns[:, 2, 2] = east
+    columns[:, 2, 3] = north
+    return columns
 
 
-def _plan(control, sigma, pos) -> Iterator[str]:
-    """Sentences on a constant shift, a scale and a turn of the map."""
-    place = control.surveyed.position[:, :2]
-    local = place - place.mean(axis=0)
-    design = np.zeros((len(local), 2, 4))  # of shift east, shift north, scale, turn to the left
-    design[:, 0, 0] = design[:, 1, 1] = 1.0
-    design[:, :, 2], design[:, :, 3] = local, local[:, ::-1] * [-1.0, 1.0]
-    rows, values = (design / sigma[..., None]).reshape(-1, 4), control.misclosure[:, :2] / sigma
-    # Where the points leave scale and turn open they are zero: the solution of least length.
-    x = np.linalg.lstsq(rows, values.ravel(), rcond=1e-9)[0]
-    scatter = float(np.std(control.misclosure[:, :2] - design @ x, axis=0).max())
-    shift, limit = float(np.hypot(*x[:2])), _common_sigma(sigma.max(axis=1))
-    if _stands_out(shift, limit, scatter):
-        yield (
-            f"The control points lie {shift:.2f} m beside the cloud as the POS puts it (E "
-            f"{x[0]:+.2f}, N {x[1]:+.2f} m; {len(local)} observations agree to {scatter:.3f} m), "
-            f"{shift / limit:.0f} times the sigma of {limit:.3f} m that this leaves room for: they "
-            f"look like points of another horizontal datum, realisation or epoch. {FOLLOWS}"
-        )
-    extent = float(np.sqrt(np.mean(np.sum(local**2, axis=1))))
-    typical = float(np.sqrt(np.mean(sigma**2)))
-    stretches = min(len(local), 1.0 + np.ptp(control.gps_time) / pos.correlation_time)
-    apart, limit = float(np.hypot(*x[2:])) * extent, typical / np.sqrt(stretches)
-    # A drift may look like a scale too; then the rest is larger than the POS states.
-    if len(local) > 3 and scatter < 2 * typical and _stands_out(apart, limit, scatter):
-        yield (
-            f"The net of control points is larger by {x[2] * 1e6:+.0f} ppm than what the POS says "
-            f"of it, and turned by {np.degrees(x[3]):+.4f} deg ({apart:.2f} m at {extent:.0f} m "
-            f"from its middle, {apart / limit:.0f} times the sigma of {limit:.3f} m): it looks "
-            "like ground distances without the map's scale, or another projection or zone. "
-            f"{FOLLOWS}"
-        )
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def _linear_terms(control, trajectory, pos):
+    """(term, size, sigma, log evidence) of each linear term in the most probable set of them."""
+    equations = position_equations(trajectory, control, pos, ESTIMATE.order, position_prior)
+    equations = with_drift_history(equations)
+    columns = linear_columns(control.surveyed.position)
+    prior = np.array([SETTINGS.datum_scale, SETTINGS.datum_turn, *2 * [SETTINGS.datum_tilt]])
+    evidence = _Evidence(equations, columns, prior)
+    best = max(SETS, key=evidence.of)
+    terms = []
+    for term in best:
+        others = tuple(other for other in best if other != term)
+        gain = evidence.of(best) - evidence.of(others)
+        if gain > np.log(ESTIMATE.strong_evidence):
+            terms.append((term, *evidence.size(best, term), gain))
+    return terms
+
+
+class _Evidence:
+    """Marginal likelihood of sets of linear terms beside the POS error.
+
+    For given parameters of the POS the terms' coefficients x ~ N(0, D^2) are integrated out in
+    closed form: with r = M'P l and N = M'P M the likelihood is that without them times
+    exp(r'(N + D^-2)^-1 r / 2) / sqrt(det(I + D N D)). The parameters are the most probable ones of
+    each covariance family, without any term and with all of them; the better of the two counts.
+
+    Parameters
+    ----------
+    equations : Equations
+    columns : (n, 3, k) array
+        M, of the n observations.
+    prior : (k,) array
+        D, one sigma of each coefficient.
+    """
+
+    def __init__(self, equations: Equations, columns: np.ndarray, prior: np.ndarray):
+        self.prior = prior
+        everything = with_mountings(equations, *_padded(columns, prior))
+        rows = np.zeros((len(equations.gps_time), *columns.shape[1:]))
+        rows[: len(columns)] = columns
+        matrix = rows.reshape(-1, columns.shape[2])
+        objective, complete = Objective.of(equations), Objective.of(everything)
+        self.modes = []  # (family, log posterior without terms, N, r)
+        for family in (*FAMILIES, INTEGRATED):
+            alone, _ = objective.maximum(family, objective.initial)
+            # From the same start: from the mode of a POS that explains all, it would stay there
+            beside, _ = complete.maximum(family, complete.initial)
+            for logarithms in (alone, beside):
+                value = objective(family, logarithms)
+                parameters = objective.parameters(family, logarithms)
+                self.modes.append((family, value, *_normal(equations, parameters, matrix)))
+
+    def of(self, terms: Iterable[str]) -> float:
+        """Log evidence of a set of terms, but for a constant.
+
+        Parameters
+        ----------
+        terms : iterable of str
+        """
+        best = {family: -np.inf for family, *_ in self.modes}
+        for family, value, normal, right in self.modes:
+            best[family] = max(best[family], value + self._gain(terms, normal, right))
+        return float(logsumexp(list(best.values())))
+
+    def size(self, terms: Iterable[str], term: str) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients and one sigma of a term among others, under the most probable parameters.
+
+        Parameters
+        ----------
+        terms : iterable of str
+        term : str
+        """
+        mode = max(self.modes, key=lambda mode: mode[1] + self._gain(terms, *mode[2:]))
+        numbers, covariance, size = self._solved(terms, *mode[2:])
+        rows = np.isin(numbers, COLUMNS[term])
+        return size[rows], np.sqrt(np.diag(covariance))[rows]
+
+    def _gain(self, terms, normal, right):
+        """By how much the terms raise the log-likelihood."""
+        numbers, covariance, size = self._solved(terms, normal, right)
+        if len(numbers) == 0:
+            return 0.0
+        spread = np.linalg.slogdet(covariance)[1] - 2 * np.log(self.prior[numbers]).sum()
+        return 0.5 * float(right[numbers] @ size + spread)
+
+    def _solved(self, terms, normal, right):
+        """Numbers of the coefficients, their covariance and their values."""
+        numbers = np.array([number for term in terms for number in COLUMNS[term]], dtype=int)
+        information = normal[np.ix_(numbers, numbers)] + np.diag(self.prior[numbers] ** -2.0)
+        covariance = np.linalg.inv(information)
+        return numbers, covariance, covariance @ right[numbers]
+
+
+def _padded(columns, prior):
+    """Columns, misclosures and sigmas as with_mountings takes them: three to each epoch."""
+    lacking = -len(prior) % 3
+    padding = np.zeros((*columns.shape[:2], lacking))
+    sigma = np.append(prior, np.ones(lacking))
+    return np.concatenate([columns, padding], axis=2), np.zeros(len(sigma)), sigma
+
+
+def _normal(equations: Equations, parameters: SignalParameters, matrix: np.ndarray):
+    """N = M'P M and r = M'P l, where P leaves out the trend."""
+    solved = equations.solve(parameters)
+    white = solved.solver.whiten(np.column_stack([solved.design, matrix, solved.misclosure]))
+    believed = np.zeros((len(solved.believed), white.shape[1]))
+    believed[:, : solved.design.shape[1]] = solved.believed
+    white = np.vstack([white, believed])
+    trend, rest = np.split(white, [solved.design.shape[1]], axis=1)
+    basis = np.linalg.qr(trend)[0]
+    rest = rest - basis @ (basis.T @ rest)
+    product = rest.T @ rest
+    return product[:-1, :-1], product[:-1, -1]
+
+
+def _spread(control):
+    """At most as many observations as one likelihood takes, of control points along the drive."""
+    names = list(dict.fromkeys(np.array(control.name)[np.argsort(control.gps_time)].tolist()))
+    passes = max(1.0, len(control) / len(names))
+    count = min(len(names), max(3, int(ESTIMATE.block / passes)))
+    kept = {names[i] for i in np.rint(np.linspace(0, len(names) - 1, count)).astype(int)}
+    return control[np.array([name in kept for name in control.name])]
+
+
+def _shift(misclosure, sigma, term):
+    """(term, size, sigma, log evidence) of what all misclosures (n, k) share, where it is a datum.
+
+    Two hypotheses of the same mean, which is known much better than either: N(0, s^2) of a POS that
+    errs alike all along, as it states, and N(0, D^2) of a datum.
+    """
+    weights = sigma**-2
+    shift = np.sum(weights * misclosure, axis=0) / np.sum(weights, axis=0)
+    scatter = float(np.std(misclosure - shift, axis=0).max())
+    size = float(np.linalg.norm(shift))
+    limit = _common_sigma(sigma.max(axis=1))
+    ratio = SETTINGS.datum_shift / limit
+    gain = 0.5 * (size / limit) ** 2 * (1 - ratio**-2) - len(shift) * np.log(ratio)
+    # What scatters as much as it is shifted is a POS that drifts, by more than it states
+    if gain > np.log(ESTIMATE.strong_evidence) and 3 * scatter < size:
+        known = scatter / np.sqrt(len(misclosure))
+        yield term, shift, np.full(len(shift), known), float(gain)
 
 
 def _common_sigma(sigma):
@@ -92,6 +375,13 @@ def _common_sigma(sigma):
     return float(np.hypot(mean, MATCHING.unstated_sigmas[0]))
 
 
-def _stands_out(value, limit, scatter):
-    """Whether a value is beyond its sigma, and explains what it was estimated from."""
-    return value > SETTINGS.datum_sigmas * limit and 3 * scatter < value
+def _extent(place):
+    """RMS distance of places (n, 3) from their middle, in plan. Units: m."""
+    local = place[:, :2] - place[:, :2].mean(axis=0)
+    return float(np.sqrt(np.mean(np.sum(local**2, axis=1))))
+
+
+def _rounded(log_evidence):
+    """A Bayes factor in words: its power of ten where it is large."""
+    power = log_evidence / np.log(10)
+    return f"{np.exp(log_evidence):.0f}" if power < 3 else f"1e{power:.0f}"

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,13 +25,14 @@ from mlscorr.io.control_lists import (
 )
 from mlscorr.io.nearness import check_together
 from mlscorr.io.opening import open_file
+from mlscorr.io.projection import map_factors
 from mlscorr.io.sheets import SUFFIX
 from mlscorr.io.storage import as_path
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.table_rows import read_rows
 from mlscorr.io.tables import read_layout
 from mlscorr.io.text_files import ENCODING, shown, warn_of_cut
-from mlscorr.survey import ControlPoints, Trajectory
+from mlscorr.survey import ControlPoints, SurveyFileError, Trajectory
 
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
 ROLES = tuple(WORDS["role"])
@@ -113,7 +115,7 @@ def read_control(
 
 
 def read_surveyed(
-    path: Path | None, section: ControlSection, trajectory: Trajectory
+    path: Path | None, section: ControlSection, trajectory: Trajectory, crs: str | None = None
 ) -> ControlList:
     """Points of a list that lies near a trajectory; none of none, and of an empty file.
 
@@ -122,6 +124,8 @@ def read_surveyed(
     path : Path or None
     section : ControlSection
     trajectory : Trajectory
+    crs : str, optional
+        Of the survey, for control in ground distances.
 
     Raises
     ------
@@ -130,9 +134,51 @@ def read_surveyed(
     """
     if path is None or not holds_points(path):
         return NOTHING_SURVEYED
-    points = read_control(path, section, trajectory)
+    points = scaled(read_control(path, section, trajectory), section, crs)
     check_together(path, points.control + points.check, trajectory)
     return points
+
+
+def scaled(points: ControlList, section: ControlSection, crs: str | None) -> ControlList:
+    """Points whose eastings and northings are multiplied as [control] says, about its origin.
+
+    Parameters
+    ----------
+    points : ControlList
+    section : ControlSection
+        Without a scale_origin it is the middle of the control points (of all, where all are check
+        points), which then stays where it is.
+    crs : str or None
+        Of the survey.
+
+    Raises
+    ------
+    SurveyFileError
+        For ground distances without a CRS.
+    """
+    if section.scale_factor is None:
+        return points
+    middle = (points.control if len(points.control) else points.check).position.mean(axis=0)
+    origin = np.array([*(section.scale_origin or middle[:2]), 0.0])
+    if section.scale_factor == "ground":
+        if crs is None:
+            raise SurveyFileError(
+                'scale_factor = "ground" under [control] takes the scale of the map, and '
+                "survey.toml has no crs: add it, or give scale_factor as a number."
+            )
+        ground = map_factors(crs, middle)
+        factor, words = ground.combined, f", from ground distances to {crs}: {ground}"
+    else:
+        factor, words = float(section.scale_factor), ""
+    sentence = (
+        f"Eastings and northings of the control were multiplied by {factor:.7f} about E "
+        f"{origin[0]:.3f}, N {origin[1]:.3f} m (scale_factor under [control]{words})."
+    )
+    control, check = (
+        replace(part, position=origin + (part.position - origin) * [factor, factor, 1.0])
+        for part in (points.control, points.check)
+    )
+    return ControlList(control, check, " ".join(filter(None, [points.layout, sentence])))
 
 
 def holds_points(path: str | Path) -> bool:

@@ -149,7 +149,7 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
         file = existing(path, "control.file", settings.control.file)
         inputs.append(input_file("control", file))
         try:
-            surveyed = read_surveyed(file, settings.control, _everywhere(drives))
+            surveyed = read_surveyed(file, settings.control, _everywhere(drives), crs)
         except ValueError as error:  # which names where a survey has its [control]
             error.args = (str(error).replace("survey.toml", path.name),)
             raise

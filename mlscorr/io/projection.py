@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -45,6 +46,75 @@ def check_crs(crs: str) -> CRS:
             "axes must point east and north, and up where there is a height."
         )
     return crs
+
+
+@dataclass(frozen=True)
+class MapFactors:
+    """How a map differs from the ground at a place.
+
+    Parameters
+    ----------
+    projection : float
+        By what a distance on the ellipsoid is multiplied on the map.
+    height : float
+        By what one on the ground is multiplied on the ellipsoid, R / (R + h); one where the CRS has
+        no heights.
+    convergence : float
+        Direction of grid north, clockwise from true north. Units: rad.
+    """
+
+    projection: float
+    height: float
+    convergence: float
+
+    @property
+    def combined(self) -> float:
+        """By what a distance on the ground is multiplied on the map."""
+        return self.projection * self.height
+
+    def document(self) -> dict[str, float]:
+        """``projection``, ``height``, ``combined`` and ``convergence`` (deg)."""
+        angle = {"convergence": float(np.degrees(self.convergence))}
+        return asdict(self) | {"combined": self.combined} | angle
+
+    def __str__(self) -> str:
+        """The factors in words."""
+        height = f", height factor {self.height:.6f}" if self.height != 1 else ""
+        return f"scale factor of the projection {self.projection:.6f}{height}"
+
+
+def map_factors(crs: str, place: np.ndarray) -> MapFactors:
+    """Factors between the ground and the map at a place.
+
+    R is the mean radius of the ellipsoid there, sqrt(M N) = a sqrt(1 - e^2) / (1 - e^2 sin^2 phi)
+    (Gauss). The height is taken as it is: over the geoid in place of the ellipsoid it changes the
+    factor by 1.6e-5 at most. The scale is the root of the areal scale, which is that of any
+    direction where the projection is conformal.
+
+    Parameters
+    ----------
+    crs : str
+        See check_crs.
+    place : (3,) array
+        E, N, H. Units: m.
+
+    >>> str(map_factors("EPSG:32650", np.array([500000.0, 3374000.0, 42.0])))
+    'scale factor of the projection 0.999600'
+    """
+    projected = check_crs(crs)
+    plane = map_of(projected)
+    east, north, height = place
+    longitude, latitude = plane(east, north, inverse=True)
+    factors = plane.get_factors(longitude, latitude)
+    projection = float(np.sqrt(factors.areal_scale))
+    convergence = float(np.radians(factors.meridian_convergence))
+    if len(projected.axis_info) < 3:
+        return MapFactors(projection, 1.0, convergence)
+    ellipsoid = projected.ellipsoid
+    ratio = (ellipsoid.semi_minor_metre / ellipsoid.semi_major_metre) ** 2  # 1 - e^2
+    flattened = 1 - (1 - ratio) * np.sin(np.radians(latitude)) ** 2
+    radius = ellipsoid.semi_major_metre * np.sqrt(ratio) / flattened
+    return MapFactors(projection, float(radius / (radius + height)), convergence)
 
 
 @lru_cache

@@ -157,7 +157,7 @@ def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> S
     """
     inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
     recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
-    surveyed = read_surveyed(files.control, settings.control, recorded.trajectory)
+    surveyed = read_surveyed(files.control, settings.control, recorded.trajectory, settings.crs)
     return SurveyParts(path, settings, files, recorded, *surveyed, inputs)
 
 

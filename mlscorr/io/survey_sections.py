@@ -12,6 +12,7 @@ from mlscorr.survey import SEARCH_RADIUS, Mounting, Pos, Scanner
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+Coordinate = Annotated[float, Field(allow_inf_nan=False)]
 Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
 Three = Field(min_length=3, max_length=3)
 Six = Field(min_length=6, max_length=6)
@@ -159,6 +160,15 @@ class ControlSection(TomlSection):
     sigma: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None  # m: E/N, H
     check: list[str] = Field(default_factory=list)  # names of check points, or patterns
     columns: ControlColumns = ControlColumns()
+    # By what eastings and northings are multiplied; "ground": by the map's own factor there
+    scale_factor: Annotated[float, Field(ge=0.99, le=1.01)] | Literal["ground"] | None = None
+    scale_origin: Annotated[list[Coordinate], Field(min_length=2, max_length=2)] | None = None  # m
+
+    @model_validator(mode="after")
+    def _scales_about_an_origin(self) -> Self:
+        if self.scale_origin is not None and self.scale_factor is None:
+            raise ValueError('scale_origin needs a scale_factor: a number, or "ground"')
+        return self
 
 
 class ScannerSection(TomlSection):

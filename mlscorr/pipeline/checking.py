@@ -8,7 +8,7 @@ import numpy as np
 
 from mlscorr.estimate import few_targets
 from mlscorr.evaluate.beams import outside_warnings
-from mlscorr.evaluate.datum import datum_warnings
+from mlscorr.evaluate.datum import DatumDifference, datum_differences
 from mlscorr.io.conversion import read_in_part
 from mlscorr.io.las import spread_records
 from mlscorr.io.las_checks import read_layout
@@ -40,6 +40,9 @@ class CheckedSurvey:
         What was not checked, and why.
     read, written, needed : tuple of Amount
         Of a correction. Empty where a fault hides the survey.
+    datum : tuple of DatumDifference
+        By what the control that was looked at differs from the cloud as a whole; the warnings hold
+        its sentences.
     """
 
     faults: tuple[Fault, ...]
@@ -49,6 +52,7 @@ class CheckedSurvey:
     read: tuple[needs.Amount, ...] = ()
     written: tuple[needs.Amount, ...] = ()
     needed: tuple[needs.Amount, ...] = ()
+    datum: tuple[DatumDifference, ...] = ()
 
 
 def check(path: str | Path) -> CheckedSurvey:
@@ -122,6 +126,10 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
     sample = faults.of("data", needs.sample_clouds, survey)
     faults.warn(*(sample.warnings if sample else ()))
     probe, notes, unchecked = _looked(survey, faults, needs_control, is_beside)
+    datum: tuple[DatumDifference, ...] = ()
+    if probe is not None:
+        datum = datum_differences(probe.matched, survey.trajectory, survey.pos, survey.crs)
+    faults.warn(*(difference.sentence for difference in datum))
     return CheckedSurvey(
         faults=tuple(faults.faults),
         warnings=tuple(faults.warnings),
@@ -130,6 +138,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
         read=needs.amounts_read(survey, passes),
         written=needs.amounts_written(survey),
         needed=needs.amounts_needed(survey, sample, probe) if sample else (),
+        datum=datum,
     )
 
 
@@ -209,7 +218,7 @@ def _looked(
         faults.add("data", probe.fault or words)
     elif probe.doubt:
         faults.warn(probe.doubt)
-    faults.warn(*problems.warnings, *datum_warnings(matched, survey.trajectory, survey.pos))
+    faults.warn(*problems.warnings)
     names, targets = probe.points.name, set(matched.name)
     missing = f", not {', '.join(lost)}" if (lost := [n for n in names if n not in targets]) else ""
     notes = [f"{len(targets)} of {len(names)} targets that were looked at are found{missing}."]

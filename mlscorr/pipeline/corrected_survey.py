@@ -12,6 +12,7 @@ import numpy as np
 
 from mlscorr.correction import PointSigma
 from mlscorr.estimate import Estimate, NextControl, Support, place_control
+from mlscorr.evaluate.datum import DatumDifference
 from mlscorr.evaluate.model import largest_sigma, model_section
 from mlscorr.evaluate.rows import PointCounts, Score, TargetRow
 from mlscorr.evaluate.scores import accuracy, score
@@ -51,7 +52,9 @@ class CorrectedSurvey(Summary):
     fitted : dict
         The targets by (pass number, gps_time), for their figures.
     warnings : tuple of str
-        On clouds and control, beside those of the estimate.
+        On clouds and control, beside those of the estimate and of ``datum``.
+    datum : tuple of DatumDifference
+        By what the control that was used differs from the cloud as a whole.
     """
 
     survey: Survey
@@ -61,6 +64,7 @@ class CorrectedSurvey(Summary):
     missing: list[TargetRow] = field(default_factory=list)
     fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    datum: tuple[DatumDifference, ...] = ()
 
     @property
     def trajectory(self) -> Trajectory:
@@ -288,5 +292,5 @@ class CorrectedSurvey(Summary):
             model=model_section(self.estimate, self.warnings),
             coverage=Coverage(self.estimate.span, end - start),
             support=self.estimate.support, ties=self.tie_section,
-            position_sigma=largest_sigma(self.trajectory, self.survey),
+            position_sigma=largest_sigma(self.trajectory, self.survey), datum=self.datum,
         )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mlscorr.estimate import SETTINGS, Estimate
-from mlscorr.evaluate.datum import datum_warnings
+from mlscorr.evaluate.datum import datum_differences
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.finding import Finding
@@ -65,7 +65,8 @@ def correct(
     survey, control, check, finding, estimate = estimate_survey(survey, order, ties, rng, progress)
     result = CorrectedSurvey(**corrected_fields(survey, control, check, finding, estimate))
     others = result.warnings[len(finding.warnings) :]  # those of the finding were told meanwhile
-    for sentence in (*others, *estimate.warnings):
+    datum = (difference.sentence for difference in result.datum)
+    for sentence in (*others, *datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
     return result
 
@@ -84,8 +85,8 @@ def corrected_fields(
     estimate : Estimate
         By the control points.
     """
-    datum = datum_warnings(control[estimate.used], survey.trajectory, survey.pos)
-    others = *finding.uncovered, *datum, *reuse_warnings(survey)
+    used = control[estimate.used]
+    others = *finding.uncovered, *reuse_warnings(survey)
     return {
         "survey": survey,
         "estimate": estimate,
@@ -96,4 +97,5 @@ def corrected_fields(
         ),
         "fitted": finding.fitted,
         "warnings": (*finding.warnings, *others),
+        "datum": datum_differences(used, survey.trajectory, survey.pos, survey.crs),
     }

@@ -6,6 +6,7 @@ import numpy as np
 
 from mlscorr.estimate import NextControl, Support
 from mlscorr.estimate.support import DRIFT, REASONS
+from mlscorr.evaluate.datum import DatumDifference
 from mlscorr.evaluate.rows import PointCounts, Score, Statistics, TargetRow
 from mlscorr.survey import PointCloud
 
@@ -107,6 +108,8 @@ class CorrectionReport:
     position_sigma : dict or None
         3D sigma of the corrected position, in m: ``median``, ``largest``, and the ``time`` (s) of
         the latter.
+    datum : tuple of DatumDifference
+        By what the control that was used differs from the cloud as a whole.
     """
 
     name: str
@@ -125,6 +128,7 @@ class CorrectionReport:
     next_control: tuple[NextControl, ...] = ()
     ties: dict | None = None
     position_sigma: dict[str, float] | None = None
+    datum: tuple[DatumDifference, ...] = ()
 
     def document(self) -> dict:
         """The content of report.json."""
@@ -138,6 +142,7 @@ class CorrectionReport:
             "check": self.check.document() | self.points("check").document(),
             "accuracy": self.accuracy,
             "model": self.model,
+            "datum": [difference.document() for difference in self.datum],
             "coverage": self.coverage.document()
             | {"seconds_extrapolated": self.seconds_extrapolated}
             | {"metres_extrapolated": self.metres_extrapolated},

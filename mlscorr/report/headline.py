@@ -74,6 +74,7 @@ def statements(report: CorrectionReport) -> list[Statement]:
         _points_moved(report),
         check_statement(report.points("check")),
         _control(report),
+        *_datum(report),
         _extrapolated(report),
         *_left_out(report),
         *_sigma(report),
@@ -101,6 +102,7 @@ def _result(report):
     sentences, is_worse = verdict(report)
     before, after, kind = report.judgement
     is_tested = kind == "check" and after.rmse[4] <= before.rmse[4] + SETTINGS.difference
+    is_tested &= not report.datum  # which check points of the same survey share
     rating = "red" if is_worse else "green" if is_tested else "amber"
     return Statement("Result", rating, sentences[0], tuple(("", text) for text in sentences[1:]))
 
@@ -181,6 +183,18 @@ def control_statement(points: PointCounts) -> Statement:
     parts += [f"{number} where {where}" for where, number in _away(points)]
     rating = "amber" if points.refused or points.missing else "green"
     return Statement("Control points", rating, ", ".join(parts) + ".", _named(points))
+
+
+def _datum(report) -> Iterator[Statement]:
+    """What the control as a whole differs by from the cloud."""
+    if report.datum:
+        terms = ", ".join(f"{each.term} {length_in_words(each.length)}" for each in report.datum)
+        sentence = (
+            f"Control and cloud differ by one linear term each ({terms}), which check points of "
+            "the same survey cannot show."
+        )
+        items = tuple((each.term, each.sentence) for each in report.datum)
+        yield Statement("Datum", "amber", sentence, items)
 
 
 def _uncontrolled(report):

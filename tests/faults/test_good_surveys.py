@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.evaluate.datum import datum_warnings
+from mlscorr.evaluate.datum import datum_differences
 from mlscorr.simulate.random_survey import random_scenario
 from mlscorr.survey import Pos
 from tests.beds.places import BENCHMARKS
@@ -37,7 +37,8 @@ def test_good_surveys_hear_no_warning(monkeypatch, record_property):
                 continue
             estimate = estimate_correction(survey.recorded, survey.matched)
         control = survey.matched[estimate.used]
-        sentences = [*datum_warnings(control, survey.recorded, Pos()), *estimate.warnings]
+        datum = datum_differences(control, survey.recorded, Pos())
+        sentences = [*(difference.sentence for difference in datum), *estimate.warnings]
         sentences += [f"{outlier.name} is an outlier" for outlier in estimate.outliers]
         false = [sentence for sentence in sentences if not sentence.startswith(TRUE)]
         if false:

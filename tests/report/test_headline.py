@@ -8,6 +8,7 @@ import pytest
 from mlscorr.cli.correct import tell
 from mlscorr.estimate import Support, WeakStretch
 from mlscorr.estimate.support import DRIFT, NO_CONTROL, REASONS
+from mlscorr.evaluate.datum import DatumDifference
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.report.headline import first_screen, headline, statements
 from tests.beds.reports import START, drive, fabricate, page, report_of, words
@@ -49,6 +50,23 @@ def test_refused_and_missing_control_points_are_counted():
     rows = [replace(report.targets[0], **out), *report.targets[1:], lost("T40", "control")]
     text = headline(replace(report, targets=rows))
     assert "Control: 5 of 7 surveyed points used, 1 refused (T01), 1 not seen (T40)." in text
+
+
+def test_control_in_another_scale_is_not_green():
+    "The term, what it makes, and the sentence of the warning; the result is amber however good"
+    report = replace(fabricate(drive())[2], support=Support())
+    size, sigma = np.array([4e-4]), np.array([1e-5])
+    scale = DatumDifference("scale", size, sigma, 20.0, 12, 250.0)
+    report = replace(report, datum=(scale,))
+    screen = first_screen(report)
+    (fact,) = [fact for fact in screen["statements"] if fact["what"] == "Datum"]
+    assert (fact["rating"], screen["rating"]) == ("amber", "amber")
+    assert "scale 10.0 cm" in fact["sentence"]
+    assert fact["items"] == [{"name": "scale", "text": scale.sentence}]
+    assert [fact["rating"] for fact in screen["statements"] if fact["what"] == "Result"] == [
+        "amber"
+    ]
+    assert report.document()["datum"] == [scale.document()]
 
 
 @pytest.mark.parametrize("checks", [True, False])

@@ -51,6 +51,7 @@ def check_project(path: str | Path) -> CheckedSurvey:
         read=_with_control(_sums([each.read for _, each in checked]), project),
         written=_sums([each.written for _, each in checked]),
         needed=_sums([each.needed for _, each in checked]),
+        datum=tuple(difference for _, each in checked for difference in each.datum),
     )
 
 
