@@ -445,6 +445,72 @@ def test_heights_among_places_are_named(folder):
 # ---- control.csv
 
 
+def declared(folder, text):
+    return toml(folder, 'file = "control.csv"', f'file = "control.csv"\n{text}')
+
+
+def test_control_is_scaled_about_its_own_middle(folder):
+    "By 0.9996: control points keep their middle, check points follow, heights stay; and it is said"
+    plain = read_survey(folder)
+    survey = read_survey(declared(folder, "scale_factor = 0.9996"))
+    middle = plain.control.position.mean(axis=0)
+    for role in ("control", "check"):
+        before, after = (getattr(each, role).position - middle for each in (plain, survey))
+        assert after[:, :2] == pytest.approx(0.9996 * before[:, :2], abs=1e-6)
+        assert after[:, 2] == pytest.approx(before[:, 2], abs=1e-9)
+    (note,) = [note for note in survey.notes if "scale_factor" in note]
+    assert "multiplied by 0.9996000 about E 532036.246, N 3373999.828 m" in note
+
+
+def test_control_is_scaled_about_a_stated_origin(folder):
+    "A point 1 km to the west stays: the first target moves 40 cm towards it"
+    plain = read_survey(folder).control.position[0]
+    origin = plain[:2] - [1000.0, 0.0]
+    text = f"scale_factor = 0.9996\nscale_origin = {origin.tolist()}"
+    scaled = read_survey(declared(folder, text)).control.position[0]
+    assert scaled - plain == pytest.approx([-0.4, 0.0, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("heights", ["", "+5773"])
+def test_ground_distances_take_the_factor_of_the_map(folder, heights):
+    """32 km beside the central meridian of UTM 0.9996 (1 + x^2 / 2 R^2) of the ground at sea level,
+    and less by h / R at 42 m where the CRS has heights: to 1e-7
+    """
+    toml(folder, "EPSG:32650", f"EPSG:32650{heights}")
+    plain = read_survey(folder).control.position
+    scaled = read_survey(declared(folder, 'scale_factor = "ground"')).control.position
+    radius = 6371000.0
+    expected = 0.9996 * (1 + (32036.2 / 0.9996 / radius) ** 2 / 2)
+    if heights:
+        expected *= 1 - 43.5 / radius
+    ratio = np.linalg.norm(np.diff(scaled[:, :2], axis=0)) / np.linalg.norm(
+        np.diff(plain[:, :2], axis=0)
+    )
+    assert ratio == pytest.approx(expected, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("scale_factor = 0.3048", r"control\.scale_factor"),
+        ('scale_factor = "grid"', r"control\.scale_factor"),
+        ("scale_origin = [1.0, 2.0]", "scale_origin needs a scale_factor"),
+        ("scale_factor = 0.9996\nscale_origin = [1.0]", r"control\.scale_origin"),
+    ],
+)
+def test_scales_that_can_not_be_meant_are_refused(folder, text, message):
+    "Feet, another word, an origin of nothing, half an origin"
+    with pytest.raises(ValueError, match=message):
+        read_survey(declared(folder, text))
+
+
+def test_ground_distances_need_a_crs(folder):
+    "Nothing else tells the scale of the map"
+    toml(folder, 'crs = "EPSG:32650"', "")
+    with pytest.raises(ValueError, match=r"has no crs: add it, or give scale_factor as a number"):
+        read_survey(declared(folder, 'scale_factor = "ground"'))
+
+
 def control(tmp_path, old="", new="", text=CONTROL):
     assert old in text
     (tmp_path / "control.csv").write_text(text.replace(old, new, 1) if old else text)

@@ -198,6 +198,25 @@ def test_a_small_difference_of_heights_is_a_warning_as_in_a_correction(survey):
     assert any("vertical datum" in sentence for sentence in checked.warnings)
 
 
+def test_a_scale_of_the_control_is_a_value_and_a_warning(street, tmp_path):
+    "Distances longer by 5000 ppm on a drive of 50 m: to 1000 ppm, as in a correction"
+    survey = shutil.copytree(street, tmp_path / "survey")
+    header, *rows = (survey / "control.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    place = np.array([row[1:3] for row in cells], dtype=float)
+    place += 0.005 * (place - place.mean(axis=0))
+    for row, scaled in zip(cells, place, strict=True):
+        row[1:3] = [f"{value:.4f}" for value in scaled]
+    (survey / "control.csv").write_text("\n".join([header, *map(",".join, cells)]) + "\n")
+    checked = mlscorr.check(survey)
+    (found,) = checked.datum
+    assert found.term == "scale" and found.sentence in checked.warnings
+    assert found.size[0] == pytest.approx(0.005, abs=0.001)
+    with pytest.warns(UserWarning, match="net of control points is larger"):
+        (corrected,) = mlscorr.correct(mlscorr.read_survey(survey)).datum
+    assert corrected.size[0] == pytest.approx(0.005, abs=0.001)
+
+
 @pytest.mark.long
 def test_the_crs_of_the_cloud_counts(survey):
     "Another zone in survey.toml is a fault here and a warning in a correction; none is a hint"

@@ -53,6 +53,7 @@ def test_the_document_has_its_parts_in_order():
     content = report.document()
     assert list(content) == [
         *("name", "crs", "notes", "targets", "control", "check", "accuracy", "model"),
+        "datum",
         *("coverage", "ties", "weak", "drift", "position_sigma", "next_control"),
         *("files", "inputs", "outputs"),
     ]

@@ -52,12 +52,14 @@ def test_refused_and_missing_control_points_are_counted():
     assert "Control: 5 of 7 surveyed points used, 1 refused (T01), 1 not seen (T40)." in text
 
 
-def test_control_in_another_scale_is_not_green():
+def test_control_in_another_scale_is_not_green(tmp_path):
     "The term, what it makes, and the sentence of the warning; the result is amber however good"
-    report = replace(fabricate(drive())[2], support=Support())
+    survey, correction, report = fabricate(drive())
     size, sigma = np.array([4e-4]), np.array([1e-5])
     scale = DatumDifference("scale", size, sigma, 20.0, 12, 250.0)
-    report = replace(report, datum=(scale,))
+    report = replace(report, support=Support(), datum=(scale,))
+    print(words(page(tmp_path, survey, correction, report))[:3000])
+    assert scale.sentence in words(page(tmp_path, survey, correction, report))
     screen = first_screen(report)
     (fact,) = [fact for fact in screen["statements"] if fact["what"] == "Datum"]
     assert (fact["rating"], screen["rating"]) == ("amber", "amber")
