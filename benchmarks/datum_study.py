@@ -1,26 +1,36 @@
 """How often is control in another scale, turn or tilt found, and how often where there is none?
 
-python benchmarks/datum_study.py [FILE of real POS errors (.err)] [--seeds 20] [--points 8] [--good]
+python benchmarks/datum_study.py [KIND ...] [--seeds 20] [--points 8] [--good]
 
-Of the drives of pos_study.py, each kind of POS with as many seeds: the share of good surveys that
-are told that their control differs from the cloud by a linear term (false alarms), and the share of
-the same surveys, with their control changed by one term, that are told this term. With --points,
-of so many control points spread over the drive, as ``check`` looks at. With --good, of good
-surveys alone.
+Surveys at feature level under each kind of POS that the simulator makes: MEMS and tactical units,
+filtered and smoothed, with their stated sigma(t), without any, and with sigmas ten times too small
+and too large; under open sky, in outages, and among houses that leave few satellites; the paper's
+car and boat; a POS whose GNSS is fixed in turns; and one that drifts for seconds unstated.
+
+The table has the share of good surveys in which a term is found (false alarms), and of the same
+surveys, with their control changed by one term, in which this term is found. With --points, of so
+many control points spread over the drive, as ``check`` takes; with --good, of good surveys alone.
 """
 
 import argparse
 import sys
 import warnings
-from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
-from pos_study import surveys
+from feature_surveys import feature_survey, scenarios
+from pos_study import bumped, unfixed
 
 from mlscorr.evaluate.datum import datum_differences
+from mlscorr.simulate.scenario import DriveScenario, PosScenario
 from mlscorr.survey import Pos
 
+SKIES = {  # spans (s) without GNSS, and with few satellites
+    "open sky": {},
+    "outages": {"outages": ((60.0, 40.0), (150.0, 50.0))},
+    "few satellites": {"canyons": ((30.0, 60.0), (140.0, 70.0))},
+}
+STATED = {"": 1.0, ", no sigma": None, ", sigma / 10": 0.1, ", sigma x 10": 10.0}
 TURN = np.radians(0.03)
 CHANGES = {  # of places about their middle
     "none": np.zeros((3, 3)),
@@ -28,6 +38,38 @@ CHANGES = {  # of places about their middle
     "turn": TURN * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
     "tilt": 4e-4 * np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.6, 0.8, 0.0]]),
 }
+
+
+def kinds():
+    """Functions of a seed by the kind of POS: recorded trajectory and matched control."""
+    known = scenarios()
+    made = {name: known[name] for name in ("car", "boat")}
+    for grade in ("tactical", "mems"):
+        for processing in ("smoothed", "filtered"):
+            for sky, spans in SKIES.items():
+                pos = PosScenario(grade=grade, processing=processing, **spans)
+                changes = {"pos": pos, "drive": DriveScenario(duration=240.0, speed=8.0)}
+                made[f"{grade} {processing}, {sky}"] = known["motorway"].model_copy(update=changes)
+    found = {}
+    for name, scenario in made.items():
+        is_filtered = "filtered, outages" in name
+        for title, factor in STATED.items():
+            if is_filtered or factor == 1.0:
+                found[name + title] = recorded(scenario, factor)
+    found["fixed in turns"] = lambda seed: unfixed(seed)[:2]
+    found["drifting for seconds"] = lambda seed: bumped(seed)[:2]
+    return found
+
+
+def recorded(scenario, factor):
+    """A function of a seed, with the stated sigma of position times a factor, or without any."""
+
+    def survey(seed):
+        made = feature_survey(scenario, seed)
+        sigma = None if factor is None else factor * made.recorded.position_sigma
+        return replace(made.recorded, position_sigma=sigma), made.matched
+
+    return survey
 
 
 def changed(matched, matrix):
@@ -43,43 +85,44 @@ def spread(matched, number):
     return matched[np.argsort(matched.gps_time)[rows]]
 
 
+def terms_found(survey, seed, changes, points):
+    """The terms found under each change, and the extent of the control (m)."""
+    trajectory, matched = survey(seed)
+    matched = matched if points is None else spread(matched, points)
+    found = {
+        change: [each.term for each in datum_differences(moved, trajectory, Pos())]
+        for change in changes
+        for moved in [changed(matched, CHANGES[change])]
+    }
+    place = matched.surveyed.position[:, :2]
+    return found, np.sqrt(np.mean(np.sum((place - place.mean(axis=0)) ** 2, axis=1)))
+
+
 def main():
+    """Print the table, a kind as soon as it is done."""
+    known = kinds()
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("series", nargs="?")
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(known)}")
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--points", type=int, default=None)
     parser.add_argument("--good", action="store_true")
     options = parser.parse_args()
-    found = defaultdict(list)
-    extents = defaultdict(list)
-    for name, trajectory, matched, _, pos in surveys(options.series, options.seeds):
-        kind = name.split(" window")[0]
-        some = matched if options.points is None else spread(matched, options.points)
-        for change in ["none"] if options.good else CHANGES:
+    changes = ["none"] if options.good else [*CHANGES]
+    print(f"| kind of POS | surveys | extent (m) | false alarms | {' | '.join(changes[1:])} |")
+    print("|---|---|---|---|" + "---|" * (len(changes) - 1))
+    for name in options.kinds or known:
+        rows, extents = [], []
+        for seed in range(options.seeds):
             with warnings.catch_warnings(action="ignore"):
-                moved = changed(some, CHANGES[change])
-                differences = datum_differences(moved, trajectory, pos or Pos())
-            terms = {difference.term for difference in differences}
-            found[kind, change].append(terms)
-            print(f"{name}, {change}: {', '.join(terms) or '-'}", file=sys.stderr, flush=True)
-        local = some.surveyed.position[:, :2] - some.surveyed.position[:, :2].mean(axis=0)
-        extents[kind].append(np.sqrt(np.mean(np.sum(local**2, axis=1))))
-    print(f"| kind of POS | surveys | extent (m) | false alarms | {' | '.join([*CHANGES][1:])} |")
-    print("|---|---|---|---|---|---|---|")
-    print(*(row(kind, found, extents) for kind in extents), sep="\n")
-
-
-def row(kind, found, extents):
-    """A line of the table: surveys with a false alarm, and shares that are found."""
-    good = found[kind, "none"]
-    alarms = [sorted(terms) for terms in good if terms]
-    shares = [
-        f"{sum(change in terms for terms in found[kind, change])}/{len(found[kind, change])}"
-        for change in list(CHANGES)[1:]
-    ]
-    said = f"{len(alarms)}/{len(good)}" + (f" {alarms}" if alarms else "")
-    extent = f"{np.median(extents[kind]):.0f}"
-    return f"| {' | '.join([kind, str(len(good)), extent, said, *shares])} |"
+                found, extent = terms_found(known[name], seed, changes, options.points)
+            rows.append(found)
+            extents.append(extent)
+            if found["none"]:
+                print(f"{name}, seed {seed}: {found['none']}", file=sys.stderr, flush=True)
+        alarms = sum(bool(row["none"]) for row in rows)
+        shares = [sum(change in row[change] for row in rows) for change in changes[1:]]
+        cells = [name, len(rows), f"{np.median(extents):.0f}", alarms, *shares]
+        print(f"| {' | '.join(map(str, cells))} |", flush=True)
 
 
 if __name__ == "__main__":

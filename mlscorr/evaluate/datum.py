@@ -158,7 +158,7 @@ class DatumDifference:
         factor = f"scale_factor = {1 / (1 + self.size[0]):.6f}"
         if self.ground is None:
             return (
-                "It looks like ground distances without the map's scale: if they are, set "
+                "It looks like ground distances without the scale of the map: if they are, set "
                 f"{factor} under [control]."
             )
         ppm = 1e6 * (1 / self.ground.combined - 1)

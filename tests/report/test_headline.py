@@ -58,7 +58,6 @@ def test_control_in_another_scale_is_not_green(tmp_path):
     size, sigma = np.array([4e-4]), np.array([1e-5])
     scale = DatumDifference("scale", size, sigma, 20.0, 12, 250.0)
     report = replace(report, support=Support(), datum=(scale,))
-    print(words(page(tmp_path, survey, correction, report))[:3000])
     assert scale.sentence in words(page(tmp_path, survey, correction, report))
     screen = first_screen(report)
     (fact,) = [fact for fact in screen["statements"] if fact["what"] == "Datum"]
