@@ -199,12 +199,15 @@ def datum_differences(
         (columns[:, :, COLUMNS[term]] @ size for term, size, _, _ in linear), np.zeros(3)
     )
     sigma = stated_sigma(filled, pos, control.gps_time).position
-    found = [*_shift(rest[:, :2], sigma[:, :2], SHIFT), *_shift(rest[:, 2:], sigma[:, 2:], HEIGHT)]
+    shifts = (
+        *_shift(rest[:, :2], sigma[:, :2], SHIFT),
+        *_shift(rest[:, 2:], sigma[:, 2:], HEIGHT),
+    )
     middle = place.mean(axis=0)
     about = {"observations": len(control), "extent": _extent(place)}
     if crs is not None:
         about["ground"] = map_factors(crs, middle)
-    return tuple(DatumDifference(*terms, **about) for terms in chain(found, linear))
+    return tuple(DatumDifference(*terms, **about) for terms in chain(shifts, linear))
 
 
 def linear_columns(place: np.ndarray) -> np.ndarray:
@@ -270,10 +273,10 @@ class _Evidence:
         objective, complete = Objective.of(equations), Objective.of(everything)
         self.modes = []  # (family, log posterior without terms, N, r)
         for family in (*FAMILIES, INTEGRATED):
-            alone, _ = objective.maximum(family, objective.initial)
+            plain, _ = objective.maximum(family, objective.initial)
             # From the same start: from the mode of a POS that explains all, it would stay there
             beside, _ = complete.maximum(family, complete.initial)
-            for logarithms in (alone, beside):
+            for logarithms in (plain, beside):
                 value = objective(family, logarithms)
                 parameters = objective.parameters(family, logarithms)
                 self.modes.append((family, value, *_normal(equations, parameters, matrix)))
