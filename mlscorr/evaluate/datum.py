@@ -161,11 +161,18 @@ class DatumDifference:
                 "It looks like ground distances without the scale of the map: if they are, set "
                 f"{factor} under [control]."
             )
-        ppm = 1e6 * (1 / self.ground.combined - 1)
+        expected = 1 / self.ground.combined - 1
+        where = (
+            f"Ground distances would be larger by {1e6 * expected:+.0f} ppm there ({self.ground})"
+        )
+        if abs(self.size[0] - expected) <= 3 * self.sigma[0]:
+            return (
+                f'{where}, which fits: if the control is in them, set scale_factor = "ground" under '
+                f"[control], or {factor}."
+            )
         return (
-            f"Ground distances would be larger by {ppm:+.0f} ppm there ({self.ground}): if the "
-            f'control is in them, set scale_factor = "ground" under [control], for any other known '
-            f"scale {factor}."
+            f"{where}, which does not fit: look for another projection or a wrong unit. If the "
+            f"control has this scale, set {factor} under [control]."
         )
 
 

@@ -169,5 +169,8 @@ def test_a_scale_stands_beside_that_of_the_map():
     ground = map_factors(CENTRAL, DRIVE.position[0])
     found = DatumDifference("scale", np.array([4e-4]), np.array([1e-5]), 20.0, 12, 100.0, ground)
     assert "larger by +394 ppm there (scale factor of the projection 0.999607)" in found.sentence
-    assert 'scale_factor = "ground"' in found.sentence
+    assert 'which fits: if the control is in them, set scale_factor = "ground"' in found.sentence
     assert "scale_factor = 0.999600" in found.sentence
+    other = replace(found, size=np.array([5e-3]))
+    assert "which does not fit" in other.sentence and '"ground"' not in other.sentence
+    assert "scale_factor = 0.995025" in other.sentence
