@@ -167,8 +167,8 @@ class DatumDifference:
         )
         if abs(self.size[0] - expected) <= 3 * self.sigma[0]:
             return (
-                f'{where}, which fits: if the control is in them, set scale_factor = "ground" under '
-                f"[control], or {factor}."
+                f'{where}, which fits: if the control is in them, set scale_factor = "ground" '
+                f"under [control], or {factor}."
             )
         return (
             f"{where}, which does not fit: look for another projection or a wrong unit. If the "
