@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.time_systems import DAY, WEEK
+from mlscorr.io.time_systems import DAY
 from mlscorr.survey import Trajectory
+from mlscorr.survey.clouds import WEEK
 
 
 def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:

@@ -15,6 +15,7 @@ from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.time_systems import count_on
 from mlscorr.io.trajectory_tables import COLUMNS, tum_columns
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
@@ -121,7 +122,9 @@ def _is_timed(path, fields, limit):
     """Whether a file starts with records whose times increase, and whose places are in a limit."""
     values = np.fromfile(path, "<f8", 100 * len(fields))
     table = values[: len(values) // len(fields) * len(fields)].reshape(-1, len(fields))
-    is_timed = len(table) and np.isfinite(table).all() and (np.diff(table[:, 0]) > 0).all()
+    if not len(table) or not np.isfinite(table).all():
+        return False
+    is_timed = (np.diff(count_on(table[:, 0])[0]) > 0).all()
     return bool(is_timed and np.abs(table[:, 1:3]).max() <= limit)
 
 

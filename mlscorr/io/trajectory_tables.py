@@ -22,6 +22,7 @@ from mlscorr.io.layouts import TableLayout
 from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.table_rows import read_numbers
 from mlscorr.io.tables import read_layout
+from mlscorr.io.time_systems import counting_on
 from mlscorr.io.trj import read_trj
 
 COLUMNS = ("gps_time", *AXES, *ANGLES)
@@ -81,6 +82,7 @@ def read_table(
         factors = {name: UNITS[section.angles] for name in angles if name in layout.columns}
         layout = replace(layout, factors=layout.factors | factors)
     table = _place_in_degrees(path, layout, read_numbers(layout).T, section.angles)
+    table = counting_on(table)
     if "qw" in layout.columns:
         table, axes = attitude_of_quaternions(path, table, section.axes)
         return table, f"{layout}; body axes {axes}{layout.not_used}."
@@ -114,7 +116,7 @@ def read_terrascan(
     layout : str
     """
     conventions = Conventions.of(section, GRID)
-    table = in_our_conventions(path, read_trj(path), conventions, crs)
+    table = in_our_conventions(path, counting_on(read_trj(path)), conventions, crs)
     return table, f"{path.name} was read as a TerraScan trajectory; {conventions}."
 
 
