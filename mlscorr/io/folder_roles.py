@@ -9,6 +9,7 @@ import numpy as np
 
 from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings, listed
 from mlscorr.io.control_lists import lacking, unnamed_columns
+from mlscorr.io.conventions import QUATERNION
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
 from mlscorr.io.ply import announced_faces
@@ -132,7 +133,7 @@ def _table(path) -> tuple[Role, str]:
     """Role of a table by the names of its columns, or by numbers without names."""
     header = likely_header(path, TRAJECTORY_NAMES)
     driven = set(find_meanings(header, TRAJECTORY_NAMES))
-    if len(driven & {"roll", "pitch", "heading"}) > 1:
+    if len(driven & {"roll", "pitch", "heading"}) > 1 or set(QUATERNION) <= driven:
         return "trajectory", f"columns {', '.join(sorted(driven))}"
     if find_layout(path, {}, lambda _: ["gps_time"], {}, tum_columns) is not None:
         return "trajectory", "rows of eight numbers, as time, place and quaternion"

@@ -66,6 +66,6 @@ def _place(layout: LasLayout, file: CloudFile, places, times, time, side):
     bounds = [int(places[k - 1]), int(places[k]) + 1]
     while bounds[1] - bounds[0] > SETTINGS.close_places:
         middle = sum(bounds) // 2
-        found = file.counted(records_at(layout, [middle])["gps_time"])[0]
-        bounds[int(found >= time)] = middle
+        time_there = file.counted(records_at(layout, [middle])["gps_time"])[0]
+        bounds[int(time_there >= time)] = middle
     return bounds[side]

@@ -60,6 +60,10 @@ class TrajectoryColumns(PlaceColumns):
     roll: Column = None
     pitch: Column = None
     heading: Column = None
+    qx: Column = None
+    qy: Column = None
+    qz: Column = None
+    qw: Column = None
     sigma_easting: Column = None
     sigma_northing: Column = None
     sigma_height: Column = None

@@ -223,7 +223,9 @@ def test_seconds_of_week_may_start_again_between_two(folder):
         chunk = next(read_chunks(cloud))
         assert (survey.trajectory.segment(chunk.gps_time) == run).all()
     assert survey.trajectory.gps_time[-1] == pytest.approx(604_800.0 + 114.95, abs=1e-6)
-    assert any("The GPS week ends before epoch 1 of run-2.csv (100.000 s)" in n for n in survey.notes)
+    assert any(
+        "The GPS week ends before epoch 1 of run-2.csv (100.000 s)" in n for n in survey.notes
+    )
     write_trajectory_csv(folder / "again.csv", survey.trajectory)
     own = np.loadtxt(folder / "again.csv", delimiter=",", skiprows=1)[:, 0]
     assert own[[0, -1]] == pytest.approx([604_000.0, 114.95], abs=1e-6)
