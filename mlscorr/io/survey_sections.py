@@ -79,7 +79,7 @@ class TrajectorySection(TomlSection):
     accuracy: str | None = None
     time_constant: Annotated[float, Field(allow_inf_nan=False)] = 0.0  # s, added to its times
     columns: TrajectoryColumns = TrajectoryColumns()
-    angles: Literal["deg", "rad"] | None = None
+    angles: Literal["deg", "rad", "gon"] | None = None
     heading: (
         Literal[
             "clockwise from grid north", "clockwise from true north", "counterclockwise from east"

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.course import check_heading, checked_motion
+from mlscorr.io.course import check_units, checked_motion
 from mlscorr.io.opening import open_file
 from mlscorr.io.output import output_file
 from mlscorr.io.pof import POF_SUFFIX
@@ -191,7 +191,7 @@ def _trajectory_of(path, table):
     _check_values(path, table)
     angles = np.column_stack([table[name] for name in COLUMNS[4:]])
     position = np.column_stack([table[name] for name in COLUMNS[1:4]])
-    check_heading(path, table["gps_time"], position, angles)
+    check_units(path, table["gps_time"], position, angles)
 
     def sigmas(names):
         return np.column_stack([table[name] for name in names]) if names[0] in table else None
