@@ -14,6 +14,7 @@ from mlscorr.io.las_checks import read_layout
 from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
 from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
+from mlscorr.io.positions import POSITION_SUFFIX, position_file
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_systems import count_on
@@ -24,7 +25,7 @@ CLOUDS = (".las", ".laz", ".e57")
 MESHES = (".ply",)
 TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
 OTHER_WORKBOOKS = (".xls", ".ods")
-TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx")
+TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx", POSITION_SUFFIX)
 RECORDS = (".out", ".smrmsg", ".bin")
 RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json")
 SIMULATED = "a simulated survey, which is one by itself"
@@ -133,7 +134,8 @@ def _table(path) -> tuple[Role, str]:
     """Role of a table by the names of its columns, or by numbers without names."""
     header = likely_header(path, TRAJECTORY_NAMES)
     driven = set(find_meanings(header, TRAJECTORY_NAMES))
-    if len(driven & {"roll", "pitch", "heading"}) > 1 or set(QUATERNION) <= driven:
+    is_oriented = len(driven & {"roll", "pitch", "heading"}) > 1 or set(QUATERNION) <= driven
+    if is_oriented or ("gps_time" in driven and position_file(path)):  # its reader says what lacks
         return "trajectory", f"columns {', '.join(sorted(driven))}"
     if find_layout(path, {}, lambda _: ["gps_time"], {}, tum_columns) is not None:
         return "trajectory", "rows of eight numbers, as time, place and quaternion"

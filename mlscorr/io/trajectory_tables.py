@@ -28,12 +28,14 @@ from mlscorr.io.conventions import (
 )
 from mlscorr.io.layout_search import NUMBER, likely_header
 from mlscorr.io.layouts import TableLayout
+from mlscorr.io.positions import check_projected, position_file
 from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.table_rows import read_numbers
 from mlscorr.io.tables import read_layout
 from mlscorr.io.text_files import shown
 from mlscorr.io.time_systems import counting_on
 from mlscorr.io.trj import read_trj
+from mlscorr.survey import SurveyFileError
 
 COLUMNS = ("gps_time", *AXES, *ANGLES)
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
@@ -91,9 +93,14 @@ def read_table(
             place = place if is_named or "x" not in names else ("x", "y", "height")
         return [name for name in ("gps_time", *place, *angles) if name not in names]
 
-    layout = read_layout(
-        path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, tum_columns, HINTS
-    )
+    try:
+        layout = read_layout(
+            path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, tum_columns, HINTS
+        )
+    except ValueError as error:
+        if isinstance(error, SurveyFileError) or not (other := position_file(path)):
+            raise
+        raise ValueError(other) from None
     _check_order(layout, lacking, chosen)
     layout = layout if layout.is_own else _used(layout, _is_quaternion(layout.columns, chosen))
     if section.angles:
@@ -101,6 +108,7 @@ def read_table(
         factors = {name: UNITS[section.angles] for name in angles if name in layout.columns}
         layout = replace(layout, factors=layout.factors | factors)
     table = _place_in_degrees(path, layout, read_numbers(layout).T, section.angles)
+    check_projected(path, table)
     table, unit = _in_seconds(layout, table)
     table = counting_on(table)
     if "qw" in layout.columns:
