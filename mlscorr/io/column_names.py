@@ -60,9 +60,16 @@ WORDS = {  # of the cells in a column of words: ours to those of others, plain
         "board": "",
     },
 }
+ROBOTS_PLACES = ("p", "t", "pos", "position", "poseposition", "prsr")  # of TUM, ROS and EuRoC
+ROBOTS_QUATERNIONS = ("quat", "quaternion", "orientation", "poseorientation", "qrs")
 TRAJECTORY_NAMES = PLACE_NAMES | {
-    "gps_time": "time t sow tow gpssow gpstow secondsofweek gpsseconds zeit gpszeit temps tiempo "
-    "时间 gps时间 周秒",
+    **{
+        name: " ".join([PLACE_NAMES[name], *(word + axis for word in ROBOTS_PLACES)])
+        for name, axis in (("x", "x"), ("y", "y"), ("height", "z"))
+    },
+    **{f"q{axis}": " ".join(word + axis for word in ROBOTS_QUATERNIONS) for axis in "xyzw"},
+    "gps_time": "time timestamp t sow tow gpssow gpstow secondsofweek gpsseconds zeit gpszeit "
+    "temps tiempo 时间 gps时间 周秒",
     "roll": "rollwinkel roulis alabeo 横滚 横滚角 翻滚角",
     "pitch": "nick nickwinkel tangage cabeceo 俯仰 俯仰角",
     "heading": "hdg hdng azimuth azimut cap rumbo kurs 航向 航向角",
@@ -80,6 +87,7 @@ UNITS = {  # to m, deg and s
     **dict.fromkeys(("s", "sec", "seconds", "秒", "deg", "degree", "degrees", "°", "度"), 1.0),
     **{"cm": 0.01, "mm": 0.001, "rad": 57.29577951308232, "gon": 0.9},
     **{"arcmin": 1 / 60, "arcsec": 1 / 3600},
+    **{"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9},
 }
 FOREIGN_UNITS = re.compile(r"(us|s|us-)?(ft|feet|foot)(us)?|in|inch|inches|yd|km|dms|hms")
 

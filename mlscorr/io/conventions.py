@@ -81,18 +81,11 @@ def in_our_conventions(
         Without the crs that is needed.
     """
     table = dict(table)
-    is_geographic = "latitude" in table
     is_true = conventions.heading == "clockwise from true north"
-    if (is_geographic or is_true) and crs is None:
-        what = "latitude and longitude" if is_geographic else "headings from true north"
-        raise ValueError(
-            f"{path} has {what}: set crs in survey.toml to the projected CRS of cloud and control."
-        )
-    if is_geographic:
-        record = {name: np.radians(table.pop(name)) for name in ("latitude", "longitude")}
-        position, convergence = project(crs, record | {"height": table["height"]})
-        table |= dict(zip(AXES, position.T, strict=True))
+    if "latitude" in table:
+        table, convergence = _projected(path, table, crs)
     elif is_true:
+        _check_crs(path, "headings from true north", crs)
         convergence = convergence_at(crs, table["easting"], table["northing"])
     if is_true:
         table["heading"] = table["heading"] - np.degrees(convergence)
@@ -105,8 +98,25 @@ def in_our_conventions(
     return table
 
 
+def _check_crs(path, what, crs):
+    """Refuse what needs the CRS of the map where survey.toml has none."""
+    if crs is None:
+        raise ValueError(
+            f"{path} has {what}: set crs in survey.toml to the projected CRS of cloud and control."
+        )
+
+
+def _projected(path, table, crs):
+    """A table with easting and northing for latitude and longitude; meridian convergence (rad)."""
+    _check_crs(path, "latitude and longitude", crs)
+    record = {name: np.radians(table[name]) for name in ("latitude", "longitude", "height")}
+    position, convergence = project(crs, record | {"height": table["height"]})
+    rest = {name: v for name, v in table.items() if name not in ("latitude", "longitude")}
+    return rest | dict(zip(AXES, position.T, strict=True)), convergence
+
+
 def attitude_of_quaternions(
-    path: Path, table: dict[str, np.ndarray], axes: str | None
+    path: Path, table: dict[str, np.ndarray], axes: str | None, crs: str | None = None
 ) -> tuple[dict[str, np.ndarray], str]:
     """A table with angles in place of quaternions, and the name of its body axes.
 
@@ -117,9 +127,11 @@ def attitude_of_quaternions(
     path : Path
         For messages.
     table : dict
-        With qx, qy, qz, qw from body axes into east, north, up.
+        With qx, qy, qz, qw from body axes into east, north, up; true ones beside a latitude.
     axes : str or None
         One of OUR_AXES.
+    crs : str, optional
+        Needed for latitude and longitude.
 
     Returns
     -------
@@ -134,12 +146,15 @@ def attitude_of_quaternions(
     quaternion = np.column_stack([table[name] for name in QUATERNION])
     if not np.isclose(np.linalg.norm(quaternion, axis=1), 1.0, atol=UNIT_TOLERANCE).all():
         raise ValueError(f"{path} has quaternions whose length is not one: they are no attitudes.")
-    recorded = Rotation.from_quat(quaternion)
+    recorded, convergence = Rotation.from_quat(quaternion), 0.0
+    if "latitude" in table:
+        table, convergence = _projected(path, table, crs)
     position = np.column_stack([table["easting"], table["northing"]])
     tolerance, fitting = np.radians(SETTINGS.course_tolerance), []
     for name, our_axes in OUR_AXES.items():
         attitude = recorded * Rotation.from_matrix(our_axes)
         angles = np.column_stack(angles_from_attitude(attitude))
+        angles[:, 2] -= convergence
         heading, course = heading_and_course(table["gps_time"], position, angles[:, 2])
         is_upright = (attitude.as_matrix()[:, 2, 2] > 0).all()
         is_along = len(course) and median_difference(heading, course) < tolerance

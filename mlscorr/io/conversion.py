@@ -24,8 +24,9 @@ from mlscorr.io.ply_clouds import open_ply
 from mlscorr.io.preparation import looked_points, progress_of, temporary_folder
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import file_state, is_remote
-from mlscorr.io.time_systems import ADJUSTMENT, WEEK
+from mlscorr.io.time_systems import ADJUSTMENT
 from mlscorr.survey import CloudFile, PointCloud
+from mlscorr.survey.clouds import WEEK
 
 OPENERS: dict[str, Callable[[Path], CloudSource]] = {".e57": open_e57, ".ply": open_ply}
 RESOLUTION = 1e-4  # m, of coordinates: a tenth of what scanners resolve, and 214 km in 32 bits

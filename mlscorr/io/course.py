@@ -5,9 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.frames import angles_from_attitude
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.time_systems import DAY, WEEK
+from mlscorr.io.time_systems import DAY
 from mlscorr.survey import Trajectory
+from mlscorr.survey.clouds import WEEK
+
+GON = 0.9  # deg
+SECTOR = np.radians(30.0)  # rad, in which courses are one direction
 
 
 def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
@@ -32,7 +37,7 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
     Warns
     -----
     UserWarning
-        Where epochs are taken as one.
+        Where epochs are taken as one, and as check_heading.
     """
     trajectory = _distinct_epochs(path, trajectory)
     length = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
@@ -52,6 +57,7 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
             f"at {trajectory.gps_time[worst]:.3f} s): an epoch is wrong, or the units are not m "
             "and s. Remove it, or export the trajectory anew."
         )
+    check_heading(path, trajectory)
     return trajectory
 
 
@@ -71,13 +77,8 @@ def _distinct_epochs(path, trajectory):
     return Trajectory.concatenate([trajectory.select(~is_same)])
 
 
-def check_heading(
-    path: Path, gps_time: np.ndarray, position: np.ndarray, angles: np.ndarray
-) -> None:
-    """Compare the heading with the course over ground where the vehicle moves.
-
-    Radians in a column of degrees are refused; a heading that fits the course neither way is
-    warned of only: boats drift and vehicles reverse.
+def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: np.ndarray) -> None:
+    """Refuse radians and gon in columns of degrees, by the course over ground.
 
     Parameters
     ----------
@@ -91,34 +92,126 @@ def check_heading(
     Raises
     ------
     ValueError
-        For radians.
+        For headings that fit the course as radians or gon, and not as degrees.
+    """
+    heading, course = heading_and_course(gps_time, position, angles[:, 2])
+    if len(course) < SETTINGS.course_epochs:
+        return
+    degrees = np.degrees(median_difference(np.radians(heading), course))
+    radians = np.degrees(median_difference(heading, course))
+    tolerance = SETTINGS.course_tolerance
+    if np.abs(angles).max() <= 2 * np.pi and radians < tolerance <= degrees:
+        raise ValueError(
+            f"The angles of {path} seem to be radians where degrees belong: none exceeds 2 pi, "
+            f"and the heading fits the course over ground to {radians:.1f} deg when taken as "
+            f"radians, to {degrees:.1f} deg when taken as degrees. If so, write "
+            'angles = "rad" under [trajectory] in survey.toml.'
+        )
+    beside = _folded(np.radians(heading) - course)  # of a turned POS it scatters as of any
+    scatter = np.degrees(np.median(np.abs(_folded(beside - _middle(beside)))))
+    gon = np.degrees(median_difference(np.radians(GON * heading), course))
+    if (
+        degrees > SETTINGS.course_offset and gon < scatter / 2
+    ):  # a turned POS scatters as a car does
+        raise ValueError(
+            f"The angles of {path} seem to be gon where degrees belong: the heading fits the "
+            f"course over ground to {gon:.1f} deg when taken as gon, to {degrees:.1f} deg when "
+            'taken as degrees (medians). If so, write angles = "gon" under [trajectory] in '
+            "survey.toml."
+        )
+
+
+def check_heading(path: Path, trajectory: Trajectory) -> None:
+    """Warn of a heading that is beside the course over ground all along.
+
+    Vehicles reverse, so a heading may be half a turn from the course for a part of the way. Boats
+    and aircraft head into a current or wind: to one side of the course there, to the other side on
+    the way back, which the mean of opposite courses takes out.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    trajectory : Trajectory
 
     Warns
     -----
     UserWarning
-        Where heading and course differ.
+        States the median difference.
     """
-    heading, course = heading_and_course(gps_time, position, angles[:, 2])
-    if len(course) < 10:
+    angles = angles_from_attitude(trajectory.attitude)
+    heading, course = heading_and_course(trajectory.gps_time, trajectory.position, angles[2])
+    if len(course) < SETTINGS.course_epochs:
         return
-    misfit = median_difference(np.radians(heading), course)
-    tolerance = np.radians(SETTINGS.course_tolerance)
-    if misfit < tolerance:
-        return
-    if np.abs(angles).max() <= 2 * np.pi and median_difference(heading, course) < tolerance:
-        raise ValueError(
-            f"The angles of {path} seem to be radians where degrees belong: none exceeds 2 pi, "
-            f"and the heading fits the course over ground to "
-            f"{np.degrees(median_difference(heading, course)):.1f} deg when taken as radians, "
-            f"to {np.degrees(misfit):.1f} deg when taken as degrees. If so, write "
-            'angles = "rad" under [trajectory] in survey.toml.'
+    beside = np.mod(heading - course + np.pi, 2 * np.pi) - np.pi
+    misfit, folded = np.degrees([np.median(np.abs(x)) for x in (beside, _folded(beside))])
+    forward = np.mean(np.cos(beside) > 0)
+    reverses = folded < SETTINGS.course_tolerance and forward > SETTINGS.forward_share
+    if misfit >= SETTINGS.course_tolerance and not reverses:
+        warnings.warn(
+            f"The heading of {path} differs from the course over ground by {misfit:.0f} "
+            f"deg (median of {len(course)} epochs). Unless the vehicle drifts or reverses, the "
+            "heading may not be clockwise from grid north, or easting and northing may be swapped.",
+            stacklevel=5,
         )
+        return
+    offset, is_paired = _offset(_folded(beside), course)
+    limit = SETTINGS.course_offset if is_paired else SETTINGS.crab
+    if np.abs(np.degrees(offset)) <= limit:
+        return
     warnings.warn(
-        f"The heading of {path} differs from the course over ground by {np.degrees(misfit):.0f} "
-        f"deg (median of {len(course)} epochs). Unless the vehicle drifts or reverses, the heading "
-        "may not be clockwise from grid north, or easting and northing may be swapped.",
-        stacklevel=4,
+        f"The heading of {path} is {np.degrees(offset):+.1f} deg beside the course over ground all "
+        f"along (median of {len(course)} epochs): {_cause(heading, course, is_paired)}. If it is "
+        "wrong, correct it under [trajectory] in survey.toml or export it anew, as trajectory.csv "
+        "keeps it.",
+        stacklevel=5,
     )
+
+
+def _cause(heading, course, is_paired):
+    """Why a heading (rad) may be beside the course (rad)."""
+    gon = np.degrees(median_difference(GON * np.mod(heading, 2 * np.pi), course))
+    if gon < SETTINGS.course_offset:
+        return (
+            f'its angles may be gon, as which it would fit to {gon:.1f} deg (angles = "gon"), or '
+            "the POS is mounted turned about its vertical axis"
+        )
+    cause = (
+        "the POS may be mounted turned about its vertical axis, or headings from true north lack "
+        "the meridian convergence"
+    )
+    return cause if is_paired else f"{cause}, or wind or current sets the vehicle aside"
+
+
+def _folded(angle):
+    """Angles (rad) within a quarter turn, those of a vehicle that reverses too."""
+    return np.mod(angle + np.pi / 2, np.pi) - np.pi / 2
+
+
+def _middle(folded):
+    """Median (rad) of folded angles, wherever they lie."""
+    mean = np.angle(np.mean(np.exp(2j * folded))) / 2
+    return mean + np.median(_folded(folded - mean))
+
+
+def _offset(beside, course):
+    """Heading beside the course (rad), and whether opposite courses were driven to take it from.
+
+    A wind or current from any side moves the vehicle aside by as much to either side of the heading
+    on opposite courses.
+    """
+    means = []
+    for direction in np.arange(0.0, np.pi, SECTOR):
+        ends = []
+        for towards in (direction, direction + np.pi):
+            rows = np.cos(course - towards) > np.cos(SECTOR)
+            if rows.sum() >= SETTINGS.course_epochs:
+                ends.append(_middle(beside[rows]))
+        if len(ends) == 2:
+            means.append(ends[0] + _folded(ends[1] - ends[0]) / 2)
+    if means:
+        return _middle(np.array(means)), True
+    return _middle(beside), False
 
 
 def heading_and_course(

@@ -9,12 +9,15 @@ import numpy as np
 
 from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings, listed
 from mlscorr.io.control_lists import lacking, unnamed_columns
+from mlscorr.io.conventions import QUATERNION
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
 from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
+from mlscorr.io.positions import POSITION_SUFFIX, position_file
 from mlscorr.io.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.time_systems import count_on
 from mlscorr.io.trajectory_tables import COLUMNS, tum_columns
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
@@ -22,7 +25,7 @@ CLOUDS = (".las", ".laz", ".e57")
 MESHES = (".ply",)
 TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
 OTHER_WORKBOOKS = (".xls", ".ods")
-TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx")
+TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx", POSITION_SUFFIX)
 RECORDS = (".out", ".smrmsg", ".bin")
 RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json")
 SIMULATED = "a simulated survey, which is one by itself"
@@ -121,7 +124,9 @@ def _is_timed(path, fields, limit):
     """Whether a file starts with records whose times increase, and whose places are in a limit."""
     values = np.fromfile(path, "<f8", 100 * len(fields))
     table = values[: len(values) // len(fields) * len(fields)].reshape(-1, len(fields))
-    is_timed = len(table) and np.isfinite(table).all() and (np.diff(table[:, 0]) > 0).all()
+    if not len(table) or not np.isfinite(table).all():
+        return False
+    is_timed = (np.diff(count_on(table[:, 0])[0]) > 0).all()
     return bool(is_timed and np.abs(table[:, 1:3]).max() <= limit)
 
 
@@ -129,7 +134,8 @@ def _table(path) -> tuple[Role, str]:
     """Role of a table by the names of its columns, or by numbers without names."""
     header = likely_header(path, TRAJECTORY_NAMES)
     driven = set(find_meanings(header, TRAJECTORY_NAMES))
-    if len(driven & {"roll", "pitch", "heading"}) > 1:
+    is_oriented = len(driven & {"roll", "pitch", "heading"}) > 1 or set(QUATERNION) <= driven
+    if is_oriented or ("gps_time" in driven and position_file(path)):  # its reader says what lacks
         return "trajectory", f"columns {', '.join(sorted(driven))}"
     if find_layout(path, {}, lambda _: ["gps_time"], {}, tum_columns) is not None:
         return "trajectory", "rows of eight numbers, as time, place and quaternion"

@@ -97,7 +97,7 @@ def read_chunks(
     ValueError
         For a file that is cut off or damaged.
     """
-    layout = in_time_order(read_layout(cloud_file.path))
+    layout = in_time_order(read_layout(cloud_file.path), cloud_file.new_week)
     scale, offset = layout.scale, layout.offset
     for whole in read_records(layout, chunk_size, first, end):
         records = whole[cloud_file.rows(whole["point_source_id"])]
@@ -105,7 +105,7 @@ def read_chunks(
         for axis, name in enumerate("XYZ"):
             np.multiply(records[name], scale[axis], out=xyz[:, axis])
         xyz += offset
-        times = records["gps_time"] + cloud_file.time_constant
+        times = cloud_file.trajectory_time(records["gps_time"])
         cloud = PointCloud(xyz, times, records["intensity"].copy())
         is_timed = np.isfinite(times)
         if is_timed.any():

@@ -57,7 +57,8 @@ class CorrectedPart:
         rows = self.file.rows(records["point_source_id"])
         some = records[rows]
         xyz = [some[name] for name in "XYZ"]
-        scaled = layout.scale, layout.offset, some["gps_time"], self.file.time_constant
+        times = self.file.counted(some["gps_time"])
+        scaled = layout.scale, layout.offset, times, self.file.time_constant
         shift = getattr(self.correction, "shift_integers", None)
         try:
             outside = (shift or partial(_shift_integers, self.correction))(xyz, *scaled)
@@ -68,7 +69,7 @@ class CorrectedPart:
         if not isinstance(rows, slice):  # which is a view
             records[rows] = some
         if self.watch is not None and len(some):
-            self.watch(some["gps_time"] + self.file.time_constant)
+            self.watch(times + self.file.time_constant)
         return outside
 
 

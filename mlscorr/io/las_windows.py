@@ -37,12 +37,12 @@ def read_windows(
     ValueError
         Where points of a long file are not in order of time, or can't be decoded.
     """
-    layout = in_time_order(read_layout(file.path))
+    layout = in_time_order(read_layout(file.path), file.new_week)
     if layout.points <= limit:
         yield from read_chunks(file)
         return
     places, records = spread_records(layout)
-    times = records["gps_time"]
+    times = file.counted(records["gps_time"])
     if not (np.diff(times) >= 0).all():
         raise ValueError(
             f"The points of {file.path.name} are not in order of time: where a time stands in it "
@@ -52,19 +52,20 @@ def read_windows(
     for span in np.asarray(spans) - file.time_constant:
         if span[1] < times[0] or span[0] > times[-1]:
             continue
-        first = max(done, _place(layout, places, times, span[0], 0))
-        end = _place(layout, places, times, span[1], 1)
+        first = max(done, _place(layout, file, places, times, span[0], 0))
+        end = _place(layout, file, places, times, span[1], 1)
         surplus = max(0, end - first - limit)
         first, done = first + surplus // 2, end - surplus // 2
         if first < done:
             yield from read_chunks(file, first=first, end=done)
 
 
-def _place(layout: LasLayout, places, times, time, side):
+def _place(layout: LasLayout, file: CloudFile, places, times, time, side):
     """Number of a point before (side 0) or behind (1) those of a time, by bisection."""
     k = int(np.clip(np.searchsorted(times, time), 1, len(times) - 1))
     bounds = [int(places[k - 1]), int(places[k]) + 1]
     while bounds[1] - bounds[0] > SETTINGS.close_places:
         middle = sum(bounds) // 2
-        bounds[int(records_at(layout, [middle])["gps_time"][0] >= time)] = middle
+        time_there = file.counted(records_at(layout, [middle])["gps_time"])[0]
+        bounds[int(time_there >= time)] = middle
     return bounds[side]

@@ -261,5 +261,5 @@ def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
     path = as_path(path)
     encodings = (None,) if path.suffix.lower() == SUFFIX else _encodings(path)
     tables = [rows for encoding in encodings for _, rows in _candidates(path, encoding)]
-    rows = [cells for table in tables for _, cells in table]
+    rows = [_uncommented(cells) for table in tables for _, cells in table]
     return max(rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[])

@@ -15,7 +15,8 @@ from mlscorr.io.leap_seconds import leap_seconds
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.storage import as_path
 from mlscorr.io.tables import check_finite
-from mlscorr.io.time_systems import DAY
+from mlscorr.io.time_systems import DAY, counting_on
+from mlscorr.survey.clouds import WEEK
 
 POF_SUFFIX, POQ_SUFFIX = ".pof", ".poq"
 HEADER = np.dtype(
@@ -91,6 +92,7 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
             )
     constant, layout = _constant(path, header, day)
     record = dict(zip(FIELDS, table.T.astype(float), strict=False))
+    record = counting_on(record, DAY if header["unit"] == 1 else WEEK)
     record["gps_time"] += constant
     angles = {
         name: np.radians(record[name]) for name in FIELDS if name not in ("gps_time", "height")

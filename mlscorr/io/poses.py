@@ -19,6 +19,7 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.io.table_rows import read_numbers
 from mlscorr.io.tables import check_finite, check_increasing, read_header
 from mlscorr.io.text_files import ENCODING
+from mlscorr.io.time_systems import count_on
 from mlscorr.io.trajectory import SBET_SUFFIXES, read_trajectory
 
 POS_COLUMNS = ("time", "latitude", "longitude", "height")  # then sigmas, of a .pos
@@ -93,8 +94,9 @@ def _checked(path, table):
     check_finite(path, table, "epoch")
     if len(table) < 2:
         raise ValueError(f"{path} has {len(table)} epochs; a path needs at least 2 epochs.")
-    check_increasing(path, table[:, 0], "epoch")
-    return Poses(table[:, 0], table[:, 1:])
+    gps_time, _ = count_on(table[:, 0])
+    check_increasing(path, gps_time, "epoch")
+    return Poses(gps_time, table[:, 1:])
 
 
 def _read_pos(path):

@@ -26,8 +26,9 @@ from mlscorr.io.projection import project
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import as_path, file_state
 from mlscorr.io.tables import check_finite
-from mlscorr.io.time_systems import WEEK
+from mlscorr.io.time_systems import DAY, count_on, counting_on
 from mlscorr.survey import Trajectory
+from mlscorr.survey.clouds import WEEK
 
 SBET_FIELDS = (
     "gps_time",
@@ -80,7 +81,7 @@ def read_sbet(path: str | Path, crs: str | None, accuracy: str | Path | None = N
     _check_known(path, crs, "an SBET")
     record = _read_records(path, SBET_FIELDS, "SBET")
     _check_radians(path, record)
-    return _in_map(path, crs, record, accuracy, 0.0)
+    return _in_map(path, crs, counting_on(record), accuracy, 0.0)
 
 
 def read_riegl(
@@ -134,6 +135,7 @@ def _in_map(path, crs, record, accuracy, constant):
             position,
             attitude_from_angles(record["roll"], record["pitch"], heading),
             *(_sigmas(accuracy, record["gps_time"], constant) if accuracy else (None, None)),
+            weeks=record.get("weeks"),
         )
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
@@ -156,8 +158,9 @@ def is_sbet(path: str | Path) -> bool:
         angles = np.abs(table[:, [SBET_FIELDS.index(name) for name in LIMITS]])
         is_within = (angles <= list(LIMITS.values())).all()
         time = table[:, 0]  # letters and digits taken for numbers are far below 1 s, or infinite
+        is_timed = 1.0 < time[0] < time[-1] or count_on(time)[1] is not None
     return bool(
-        is_within and np.isfinite(table).all() and 1.0 < time[0] < time[-1] < SETTINGS.microseconds
+        is_within and np.isfinite(table).all() and is_timed and time[-1] < SETTINGS.microseconds
     )
 
 
@@ -198,14 +201,23 @@ def _cause(accuracy, gps_time):
     return "it belongs to another one"
 
 
+def _counted_on(accuracy, gps_time):
+    """Times of an accuracy file that count on as those of its trajectory do. Units: s."""
+    for period in (WEEK, DAY):  # seconds of the day only where a POF has them
+        times, periods = count_on(accuracy, period)
+        if periods is not None:
+            apart = np.mean(times[[0, -1]]) - np.mean(gps_time[[0, -1]])
+            return times - period * np.round(apart / period)
+    return accuracy
+
+
 def _sigmas(path, gps_time, constant):
     """Sigmas (n, 3) of E, N, H (m) and roll, pitch, heading (rad) at the trajectory's times."""
     if is_poq := as_path(path).suffix.lower() == POQ_SUFFIX:
         record = read_poq(path)
-        record["gps_time"] += constant
     else:
         record = _read_records(path, SMRMSG_FIELDS, "smrmsg")
-    times = record["gps_time"]
+    times = _counted_on(record["gps_time"], gps_time - constant) + constant
     step = np.median(np.diff(times)) if len(times) > 1 else 0.0
     if (np.diff(times) <= 0).any():
         raise ValueError(f"the times of the accuracy file {path} don't increase.")

@@ -54,7 +54,7 @@ def check_belongings(
     ]
     for cloud in clouds if stated else ():
         records = spread_records(read_layout(cloud.path))[1]
-        times = records["gps_time"] + cloud.time_constant
+        times = cloud.trajectory_time(records["gps_time"])
         belongs, inside, names = np.zeros(len(times), bool), np.zeros(len(times), bool), []
         for name, part, ids, own in stated:
             rows = np.isin(records["point_source_id"], ids or records["point_source_id"])

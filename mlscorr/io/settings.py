@@ -46,6 +46,10 @@ class Settings:
     moving: float = 1.0  # m/s, below which the course over ground says nothing of the heading
     baseline: float = 0.5  # s, over which the course is taken, long against noise of positions
     course_tolerance: float = 30.0  # deg, beyond the drift of a boat or the crab of an aircraft
+    course_offset: float = 3.0  # deg, to which a POS that is mounted by eye points ahead
+    crab: float = 15.0  # deg, of an aircraft of 60 m/s in a wind of 15 m/s, on one course
+    course_epochs: int = 10  # of a moving vehicle, from which a median says something
+    forward_share: float = 0.1  # of the way; a vehicle that goes forward so much reverses the rest
     fastest: float = 340.0  # m/s, the speed of sound: no vehicle with a scanner
     same_export: float = 1e-3  # m, to which text files write coordinates
     microseconds: float = 1e13  # a time beyond counts them: as seconds it were 300 000 years

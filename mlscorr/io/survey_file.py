@@ -287,6 +287,8 @@ def cloud_file(
     if crs is not None and (conflict := crs_conflict(layout, crs)):
         warnings.warn(conflict, stacklevel=3)
     constant = match.constant + layout.time_offset
-    file = replace(file, time_constant=constant, time_system=match.cloud_system)
+    file = replace(
+        file, time_constant=constant, time_system=match.cloud_system, new_week=match.new_week
+    )
     taken = f"; written less {ADJUSTMENT + layout.time_offset:.0f} s, as its header states"
     return file, f"gps_time of {path.name}: {match}{taken if layout.time_offset else ''}."

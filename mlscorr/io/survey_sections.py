@@ -61,6 +61,10 @@ class TrajectoryColumns(PlaceColumns):
     roll: Column = None
     pitch: Column = None
     heading: Column = None
+    qx: Column = None
+    qy: Column = None
+    qz: Column = None
+    qw: Column = None
     sigma_easting: Column = None
     sigma_northing: Column = None
     sigma_height: Column = None
@@ -76,7 +80,7 @@ class TrajectorySection(TomlSection):
     accuracy: str | None = None
     time_constant: Annotated[float, Field(allow_inf_nan=False)] = 0.0  # s, added to its times
     columns: TrajectoryColumns = TrajectoryColumns()
-    angles: Literal["deg", "rad"] | None = None
+    angles: Literal["deg", "rad", "gon"] | None = None
     heading: (
         Literal[
             "clockwise from grid north", "clockwise from true north", "counterclockwise from east"

@@ -20,9 +20,10 @@ from mlscorr.io.preparation import looked_points, progress_of, temporary_folder
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.spool import Spool, check_space
 from mlscorr.io.storage import file_state
+from mlscorr.survey.clouds import counted_on
 
 
-def in_time_order(layout: LasLayout) -> LasLayout:
+def in_time_order(layout: LasLayout, new_week: float = -np.inf) -> LasLayout:
     """The layout itself, or that of a copy in order of time where the file is a COPC.
 
     Of equal times, as of the echoes of a pulse, the first return comes first. Times that are not
@@ -31,6 +32,8 @@ def in_time_order(layout: LasLayout) -> LasLayout:
     Parameters
     ----------
     layout : LasLayout
+    new_week : float
+        As of CloudFile. Units: s.
 
     Raises
     ------
@@ -42,11 +45,11 @@ def in_time_order(layout: LasLayout) -> LasLayout:
     limit = looked_points()
     if not layout.is_copc or (limit is not None and layout.points > limit):  # seconds do not do
         return layout
-    return _in_order(layout, file_state(layout.path))
+    return _in_order(layout, new_week, file_state(layout.path))
 
 
 @lru_cache(maxsize=1)
-def _in_order(layout, _state):
+def _in_order(layout, new_week, _state):
     """The LasLayout of a file's points in order of time."""
     path = layout.path
     what = f"to put the points of {path} in order of time. Let TMPDIR name another disk."
@@ -56,20 +59,20 @@ def _in_order(layout, _state):
     head[104] = layout.point_format  # no longer compressed
     target = folder / path.with_suffix(".las").name
     done = progress_of(f"Sorting {path.name} by time", 2 * layout.points)
-    seconds, counts = _count_seconds(layout, done)
+    seconds, counts = _count_seconds(layout, new_week, done)
     group = (np.cumsum(counts) - counts) // SETTINGS.chunk_points
     group = np.unique(group, return_inverse=True)[1]
     with open(target, "w+b") as file:
         file.write(head)
         spool = Spool(file, np.bincount(group, weights=counts), layout.record_length)
         for records in read_records(layout, SETTINGS.chunk_points):
-            rows = np.searchsorted(seconds, _second(records))
+            rows = np.searchsorted(seconds, _second(records, new_week))
             spool.put(records.view(f"V{layout.record_length}"), group[rows])
             done(len(records))
         for number in range(len(spool.counts)):
             records = spool.get(number).view(layout.record)
             returns = records.view(np.uint8).reshape(len(records), -1)[:, 14] & 15  # R15, table 13
-            order = np.lexsort((returns, records["gps_time"]))
+            order = np.lexsort((returns, counted_on(records["gps_time"], new_week)))
             spool.replace(number, records.view(f"V{layout.record_length}")[order])
     size = len(head) + layout.points * layout.record_length
     ordered = replace(layout, path=target, head=bytes(head), size=size, source=layout.cloud)
@@ -77,20 +80,21 @@ def _in_order(layout, _state):
     return ordered
 
 
-def _count_seconds(layout, done):
+def _count_seconds(layout, new_week, done):
     """The whole seconds in which points were measured, in order, and the number of points of each.
 
     Units: s.
     """
     seconds, counts = np.empty(0), np.empty(0, np.int64)
     for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
-        some, number = np.unique(_second(records), return_counts=True)
+        some, number = np.unique(_second(records, new_week), return_counts=True)
         seconds, which = np.unique(np.concatenate([seconds, some]), return_inverse=True)
         counts = np.bincount(which, weights=np.concatenate([counts, number])).astype(np.int64)
         done(len(records))
     return seconds, counts
 
 
-def _second(records):
+def _second(records, new_week):
     """The second of each time; infinite of what is not a number."""
-    return np.floor(np.nan_to_num(records["gps_time"], nan=np.inf, posinf=np.inf, neginf=-np.inf))
+    time = counted_on(records["gps_time"], new_week)
+    return np.floor(np.nan_to_num(time, nan=np.inf, posinf=np.inf, neginf=-np.inf))

@@ -6,7 +6,7 @@ plain GPS seconds are found under either flag.
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, timedelta
 from itertools import product
 
@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from mlscorr.io.leap_seconds import EPOCH, leap_seconds
 from mlscorr.io.settings import SETTINGS
 from mlscorr.survey import Trajectory
+from mlscorr.survey.clouds import WEEK, counted_on
 
 DAY = 86400.0  # s
-WEEK = 7 * DAY
 ADJUSTMENT = 1e9  # s
 SYSTEMS = ("week", "standard", "gps")
 NAMES = {
@@ -30,20 +30,40 @@ NAMES = {
 
 @dataclass(frozen=True)
 class TimeMatch:
-    """trajectory time = cloud time + constant (s), the two systems, and the share inside."""
+    """trajectory time = cloud time + constant (s), the two systems, and the share inside.
+
+    A week more is added to cloud times below new_week (s), where seconds of week start again.
+    """
 
     constant: float
     cloud_system: str
     trajectory_system: str
     inside: float
+    new_week: float = -np.inf
 
     def __str__(self) -> str:
-        if self.constant == 0.0:
-            return f"{NAMES[self.cloud_system]}, as in the trajectory"
-        return (
-            f"{NAMES[self.cloud_system]}; {self.constant:+.0f} s gives the trajectory's "
-            f"{NAMES[self.trajectory_system]}"
-        )
+        text = f"{NAMES[self.cloud_system]}, as in the trajectory"
+        if self.constant != 0.0:
+            text = (
+                f"{NAMES[self.cloud_system]}; {self.constant:+.0f} s gives the trajectory's "
+                f"{NAMES[self.trajectory_system]}"
+            )
+        if self.new_week > -np.inf:
+            text += (
+                f"; the GPS week ends in the file, {WEEK:.0f} s are added where its times start "
+                "again, and they are written as they came"
+            )
+        return text
+
+    def placed(self, times: np.ndarray) -> np.ndarray:
+        """Times (n,) of the cloud in the trajectory's system. Units: s.
+
+        Parameters
+        ----------
+        times : (n,) array
+            In the cloud's own system. Units: s.
+        """
+        return counted_on(times, self.new_week) + self.constant
 
 
 def match_times(
@@ -70,8 +90,7 @@ def match_times(
     Raises
     ------
     ValueError
-        When most of the times lie outside the trajectory under every constant, and when those
-        outside are seconds of the next week or the one before.
+        When most of the times lie outside the trajectory under every constant.
 
     Warns
     -----
@@ -105,17 +124,17 @@ def match_times(
         )
         times = times[times != 0]
     _check_precision(name, times)
-    span = trajectory.gps_time[[0, -1]]
-    flagged = "standard" if is_standard else "week"
-    candidates = _candidates(times, span)
-    if setting == "auto":
-        preferred = _best(candidates, times, trajectory, (flagged,))
-        match = preferred or _best(candidates, times, trajectory, _others(flagged, times))
-    else:
-        match = _best(candidates, times, trajectory, (setting,))
+    match = _match(times, is_standard, trajectory, setting)
+    new_week = _new_week(times)
+    if new_week > -np.inf:
+        counted = _match(counted_on(times, new_week), is_standard, trajectory, setting)
+        is_of_week = counted is not None and counted.cloud_system == "week"
+        if is_of_week and (match is None or counted.inside > match.inside):
+            match = replace(counted, new_week=new_week)
     if match is None:
-        raise ValueError(_nothing_fits(name, times, span, candidates, setting))
+        raise ValueError(_nothing_fits(name, times, trajectory.gps_time[[0, -1]], setting))
     if setting == "auto":
+        flagged = "standard" if is_standard else "week"
         match = _settle_equal(match, times)
         if match.cloud_system != flagged:
             warnings.warn(
@@ -123,8 +142,83 @@ def match_times(
                 f"[{times.min():.1f}, {times.max():.1f}] s fit the trajectory as {match}.",
                 stacklevel=2,
             )
-    _check_week_end(name, times, trajectory, match)
     return match
+
+
+def _match(times, is_standard, trajectory, setting):
+    """The TimeMatch of times under the system that is preferred, or else under others; or None."""
+    candidates = _candidates(times, trajectory.gps_time[[0, -1]])
+    if setting != "auto":
+        return _best(candidates, times, trajectory, (setting,))
+    flagged = "standard" if is_standard else "week"
+    preferred = _best(candidates, times, trajectory, (flagged,))
+    return preferred or _best(candidates, times, trajectory, _others(flagged, times))
+
+
+def count_on(times: ArrayLike, period: float = WEEK) -> tuple[np.ndarray, np.ndarray | None]:
+    """Times of successive epochs that count on where seconds of the week start again.
+
+    They do where times fall by a week, less a pause of up to a day, as no mistake in a file does.
+
+    Parameters
+    ----------
+    times : (n,) array
+        Units: s.
+    period : float
+        After which they start again. Units: s.
+
+    Returns
+    -------
+    times : (n,) array
+    periods : (n,) int array, or None
+        Number of periods that were added; None where times never start again.
+
+    Examples
+    --------
+    >>> count_on([604_799.5, 604_800.0, 0.5, 1.0])[0].tolist()
+    [604799.5, 604800.0, 604800.5, 604801.0]
+    """
+    times = np.asarray(times, dtype=float)
+    is_fallen = np.diff(times) < DAY / WEEK * period - period
+    if not is_fallen.any() or not (times.min() >= 0 and times.max() <= period):
+        return times, None
+    periods = np.append(0, np.cumsum(is_fallen))
+    return times + period * periods, periods
+
+
+def counting_on(record: dict[str, np.ndarray], period: float = WEEK) -> dict[str, np.ndarray]:
+    """Columns of a file whose gps_time counts on; with the weeks that were added, if any.
+
+    Parameters
+    ----------
+    record : dict
+        Name of a column to an (n,) array.
+    period : float
+        As of count_on.
+
+    Returns
+    -------
+    dict
+    """
+    times, periods = count_on(record["gps_time"], period)
+    if periods is None:
+        return record
+    weeks = {"weeks": periods} if period == WEEK else {}
+    return record | {"gps_time": times} | weeks
+
+
+def _new_week(times):
+    """Limit (s) below which seconds of week are of the next one; infinite below zero without it.
+
+    Times at both ends of a week, and none for six days between them, are of a drive over its end.
+    """
+    ordered = np.sort(times)
+    gaps = np.diff(ordered)
+    is_of_week = ordered[0] >= 0 and ordered[-1] <= WEEK
+    if not is_of_week or not len(gaps) or gaps.max() < WEEK - DAY:
+        return -np.inf
+    last = int(np.argmax(gaps))
+    return float((ordered[last] + ordered[last + 1]) / 2)
 
 
 def _check_precision(name, times):
@@ -141,21 +235,6 @@ def _check_precision(name, times):
     if usual_systems(times) != ("week",):
         raise ValueError(sentence)
     warnings.warn(sentence, stacklevel=3)  # drift hardly changes within an eighth of a second
-
-
-def _check_week_end(name, times, trajectory, match):
-    """Refuse seconds of week that start again where the trajectory's run on."""
-    placed, span = times + match.constant, trajectory.gps_time[[0, -1]]
-    outside = placed[(placed < span[0]) | (placed > span[1])]
-    for week in (-WEEK, WEEK) if match.cloud_system == "week" and len(outside) else ():
-        if share := _inside(outside, trajectory.passes, week):
-            raise ValueError(
-                f"The GPS week ends within {name}: {share * len(outside):.0f} of {len(times)} "
-                f"sampled times [{times.min():.3f}, {times.max():.3f}] s lie inside the trajectory "
-                f"[{span[0]:.3f}, {span[1]:.3f}] s with {week:+.0f} s only, the others without. "
-                "Export it in adjusted standard GPS time, or cut it into two files where its times "
-                "start again."
-            )
 
 
 def _candidates(times, span):
@@ -239,7 +318,7 @@ def _settle_equal(match, times):
     usual = usual_systems(times)
     if match.constant != 0.0 or match.cloud_system in usual:
         return match
-    return TimeMatch(0.0, usual[0], usual[0], match.inside)
+    return replace(match, cloud_system=usual[0], trajectory_system=usual[0])
 
 
 def _other_systems(lag, earlier):
@@ -251,8 +330,9 @@ def _other_systems(lag, earlier):
     return [(sign * s, system) for s, system in differences.items() for sign in (1, -1)]
 
 
-def _nothing_fits(name, times, span, candidates, setting):
+def _nothing_fits(name, times, span, setting):
     """A sentence with both spans, the likely cause and the way out."""
+    candidates = _candidates(times, span)
     shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
     largest = max(inside for inside, cloud in shares if setting in ("auto", cloud))
     spans = (

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.course import check_heading, checked_motion
+from mlscorr.io.course import check_units, checked_motion
 from mlscorr.io.opening import open_file
 from mlscorr.io.output import output_file
 from mlscorr.io.pof import POF_SUFFIX
@@ -153,8 +153,8 @@ def _read_geographic(path, crs, accuracy, section, is_pof):
 def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
     """Write a trajectory with its sigmas, if any: 1e-6 s, 1e-5 m, 1e-7 deg, heading from 0 to 360.
 
-    A column session follows where steps alone don't part the sessions of the POS. The file appears
-    whole or not at all.
+    A column session follows where steps alone don't part the sessions of the POS. Seconds of week
+    start again where those of the input do. The file appears whole or not at all.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
         When the disk refuses.
     """
     angles = np.degrees(np.column_stack(angles_from_attitude(trajectory.attitude)))
-    blocks = [trajectory.gps_time[:, None], trajectory.position, angles]
+    blocks = [trajectory.file_time[:, None], trajectory.position, angles]
     names, formats = COLUMNS, ["%.6f"] + ["%.5f"] * 3 + ["%.7f"] * 3
     if trajectory.position_sigma is not None:
         blocks.append(trajectory.position_sigma)
@@ -191,7 +191,7 @@ def _trajectory_of(path, table):
     _check_values(path, table)
     angles = np.column_stack([table[name] for name in COLUMNS[4:]])
     position = np.column_stack([table[name] for name in COLUMNS[1:4]])
-    check_heading(path, table["gps_time"], position, angles)
+    check_units(path, table["gps_time"], position, angles)
 
     def sigmas(names):
         return np.column_stack([table[name] for name in names]) if names[0] in table else None
@@ -205,6 +205,7 @@ def _trajectory_of(path, table):
             sigmas(POSITION_SIGMAS),
             None if attitude_sigma is None else np.radians(attitude_sigma),
             table[SESSION[0]].astype(int) if SESSION[0] in table else None,
+            weeks=table.get("weeks"),
         )
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None

@@ -69,7 +69,7 @@ def export_trajectory(path: str | Path, trajectory: Trajectory, crs: str | None)
     """
     path = Path(path)
     if path.suffix.lower() == SUFFIXES[-1]:
-        table = trajectory.gps_time, trajectory.position, trajectory.attitude.as_quat()
+        table = trajectory.file_time, trajectory.position, trajectory.attitude.as_quat()
         with output_file(path) as part:
             np.savetxt(part, np.column_stack(table), fmt=["%.6f"] + ["%.5f"] * 3 + ["%.10f"] * 4)
         return [path.name]
@@ -77,14 +77,14 @@ def export_trajectory(path: str | Path, trajectory: Trajectory, crs: str | None)
     roll, pitch, heading = angles_from_attitude(trajectory.attitude)
     true_heading = np.mod(heading + convergence, 2 * np.pi)
     angles = dict(zip(("roll", "pitch", "heading"), (roll, pitch, true_heading), strict=True))
-    _write_records(path, SBET_FIELDS, {"gps_time": trajectory.gps_time, **place, **angles})
+    _write_records(path, SBET_FIELDS, {"gps_time": trajectory.file_time, **place, **angles})
     if trajectory.position_sigma is None or trajectory.attitude_sigma is None:
         return [path.name]
     sigmas = np.hstack([trajectory.position_sigma, np.degrees(trajectory.attitude_sigma) * 60])
     names = ("east", "north", "down", "roll", "pitch", "heading")  # m, arc-minutes
     columns = dict(zip(names, sigmas.T, strict=True))
     companion = path.with_name(f"smrmsg_{path.stem}.out")
-    _write_records(companion, SMRMSG_FIELDS, {"gps_time": trajectory.gps_time, **columns})
+    _write_records(companion, SMRMSG_FIELDS, {"gps_time": trajectory.file_time, **columns})
     return [path.name, companion.name]
 
 

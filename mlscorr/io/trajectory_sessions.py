@@ -11,6 +11,7 @@ from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.time_systems import NAMES, usual_systems
 from mlscorr.io.trajectory import read_trajectory_file
 from mlscorr.survey import Pos, Trajectory
+from mlscorr.survey.clouds import WEEK
 
 KINDS = ("position", "attitude")
 
@@ -89,9 +90,11 @@ def read_sessions(
     joined, notes = parts[0], []
     if len(parts) > 1:
         check_systems(names, parts)
+        parts = across_week_end(parts)
         parts, notes = with_sigmas(names, parts, pos)
         joined, joints = join_sessions(names, parts, pos or Pos())
         notes = [_summary(names, parts, joined), *joints, *notes]
+    notes += _week_ends(names, parts)
     notes += [
         f"{file.section.time_constant:+g} s (trajectory.time_constant) were added to the times of "
         f"{name}: trajectories that are written have them, too."
@@ -137,6 +140,49 @@ def check_systems(names: Sequence[str], parts: Sequence[Trajectory]) -> None:
                 f"size, those of {name} {_span(part)} {NAMES[system[0]]}: the trajectories of a "
                 "survey need one time system. Export them in the same one."
             )
+
+
+def across_week_end(parts: Sequence[Trajectory]) -> list[Trajectory]:
+    """Trajectories whose seconds of week count on from the end of a week into the next one.
+
+    A week is added to the first of a week where all together are then shorter, and last less than
+    half a week: a drive from Saturday to Sunday, and not the week between Sunday and Saturday.
+
+    Parameters
+    ----------
+    parts : sequence of Trajectory
+        Of one time system.
+    """
+    starts, ends = np.array([part.gps_time[[0, -1]] for part in parts]).T
+    if starts.min() < 0 or usual_systems(ends) != ("week",):
+        return list(parts)
+    lengths = {}
+    for first in np.unique(starts):
+        shift = WEEK * (starts < first)
+        lengths[first] = (ends + shift).max() - (starts + shift).min()
+    first = min(lengths, key=lambda start: lengths[start])
+    if lengths[first] >= min(WEEK / 2, lengths[starts.min()]):
+        return list(parts)
+    return [_week_later(part) if part.gps_time[0] < first else part for part in parts]
+
+
+def _week_later(part):
+    """A trajectory with a week added to its times, which files have as they came."""
+    weeks = np.zeros(len(part), int) if part.weeks is None else part.weeks
+    return replace(part, gps_time=part.gps_time + WEEK, weeks=weeks + 1)
+
+
+def _week_ends(names, parts):
+    """A sentence on each trajectory to whose times weeks were added."""
+    for name, part in zip(names, parts, strict=True):
+        if part.weeks is None:
+            continue
+        first = part.file_time[np.argmax(part.weeks > 0)]
+        yield (
+            f"The GPS week ends before epoch {np.argmax(part.weeks > 0) + 1} of {name} "
+            f"({first:.3f} s): {WEEK:.0f} s are added from there on, so that times count on. "
+            "Trajectories are written with seconds of week as they came."
+        )
 
 
 def with_sigmas(
@@ -207,6 +253,7 @@ def join_sessions(
     ValueError
         Where two are at different places at the same time.
     """
+    parts = _with_weeks(parts)
     order = sorted(range(len(parts)), key=lambda i: (parts[i].gps_time[0], -len(parts[i])))
     sessions, kept, notes = [_numbers(part) for part in parts], [], []
     largest, bases = 1 + max(session.max() for session in sessions), {}
@@ -230,6 +277,16 @@ def join_sessions(
     parted = Trajectory.concatenate(kept)
     whole = replace(parted, session=None)
     return whole if np.array_equal(whole.gaps, parted.gaps) else parted, notes
+
+
+def _with_weeks(parts):
+    """All parts with the weeks that were added to their times, where that was done to one."""
+    if all(part.weeks is None for part in parts):
+        return parts
+    return [
+        replace(part, weeks=np.zeros(len(part), int)) if part.weeks is None else part
+        for part in parts
+    ]
 
 
 def _numbers(part):

@@ -1,15 +1,24 @@
 """Trajectories in tables: our own columns, those of Inertial Explorer and others, and TUM's.
 
-TUM's rows are `time x y z qx qy qz qw` without a header, parted by blanks.
+TUM's rows are `time x y z qx qy qz qw` without a header, parted by blanks. With a header its names
+say which column is what: other programs write qw first.
 """
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.column_names import ANGLES, AXES, TRAJECTORY_NAMES, UNITS, plain
+from mlscorr.io.column_names import (
+    ANGLES,
+    AXES,
+    TRAJECTORY_NAMES,
+    UNITS,
+    find_meanings,
+    plain,
+)
 from mlscorr.io.conventions import (
     QUATERNION,
     UNIT_TOLERANCE,
@@ -17,12 +26,16 @@ from mlscorr.io.conventions import (
     attitude_of_quaternions,
     in_our_conventions,
 )
-from mlscorr.io.layout_search import NUMBER
+from mlscorr.io.layout_search import NUMBER, likely_header
 from mlscorr.io.layouts import TableLayout
+from mlscorr.io.positions import check_projected, position_file
 from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.table_rows import read_numbers
 from mlscorr.io.tables import read_layout
+from mlscorr.io.text_files import shown
+from mlscorr.io.time_systems import counting_on
 from mlscorr.io.trj import read_trj
+from mlscorr.survey import SurveyFileError
 
 COLUMNS = ("gps_time", *AXES, *ANGLES)
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
@@ -30,6 +43,10 @@ ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
 SESSION = ("session",)  # of the POS, in a trajectory that was joined of several
 GRID, TRUE = "clockwise from grid north", "clockwise from true north"
 TUM = ("gps_time", *AXES, *QUATERNION)
+ORDER = re.compile(r"q.{0,3}|.*(quat|orient|rot).*|w")  # plain names of a quaternion's columns
+TIME_UNITS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}  # s
+EARLIEST = 1e8  # s since 1970: 1973
+LATEST = 1e11  # s since 1970: 5138; a thousand times more, so that sizes of units don't overlap
 TRUE_NORTH_USUAL = {"hell", "hdngsd", "eastsd"}  # columns of Inertial Explorer and POSPac alone
 HINTS = {
     ("easting", "x"): " Say under [trajectory.columns] in survey.toml which of X and Y is easting, "
@@ -64,38 +81,51 @@ def read_table(
     ValueError
         For missing columns, cells that are no numbers, and conventions that are not known.
     """
+    groups, chosen = (POSITION_SIGMAS, ATTITUDE_SIGMAS, SESSION), section.columns.chosen
 
     def lacking(names: Collection[str]) -> list[str]:
         is_projected = "latitude" not in names or {"easting", "northing"} <= set(names)
         place = AXES if is_projected else ("latitude", "longitude", "height")
         angles = ("roll", "pitch", "yaw" if section.heading and "yaw" in names else "heading")
+        if _is_quaternion(names, chosen):
+            angles = QUATERNION
+            is_named = {"easting", "northing"} & set(names) or not is_projected
+            place = place if is_named or "x" not in names else ("x", "y", "height")
         return [name for name in ("gps_time", *place, *angles) if name not in names]
 
-    groups, chosen = (POSITION_SIGMAS, ATTITUDE_SIGMAS, SESSION), section.columns.chosen
-    layout = read_layout(
-        path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, tum_columns, HINTS
-    )
-    layout = layout if layout.is_own else _used(layout)
+    try:
+        layout = read_layout(
+            path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, tum_columns, HINTS
+        )
+    except ValueError as error:
+        if isinstance(error, SurveyFileError) or not (other := position_file(path)):
+            raise
+        raise ValueError(other) from None
+    _check_order(layout, lacking, chosen)
+    layout = layout if layout.is_own else _used(layout, _is_quaternion(layout.columns, chosen))
     if section.angles:
         angles = (*ANGLES, "yaw", *ATTITUDE_SIGMAS)
         factors = {name: UNITS[section.angles] for name in angles if name in layout.columns}
         layout = replace(layout, factors=layout.factors | factors)
     table = _place_in_degrees(path, layout, read_numbers(layout).T, section.angles)
+    check_projected(path, table)
+    table, unit = _in_seconds(layout, table)
+    table = counting_on(table)
     if "qw" in layout.columns:
-        table, axes = attitude_of_quaternions(path, table, section.axes)
-        return table, f"{layout}; body axes {axes}{layout.not_used}."
+        table, axes = attitude_of_quaternions(path, table, section.axes, crs)
+        return table, f"{layout}{unit}; body axes {axes}{layout.not_used}."
     if "yaw" in table:
         table["heading"] = table.pop("yaw")
     conventions = Conventions.of(section, _usual_heading(layout, section))
     given = section.model_fields_set & {"angles", "heading", "pitch", "roll"}
     if layout.is_own and not given:
-        return table, None
+        return table, f"{layout}{unit}." if unit else None
     table = in_our_conventions(path, table, conventions, crs)
     degrees = "" if "roll" in layout.factors else ", angles in degrees"
     where = (
         f"; latitude and longitude in the datum of {crs}" if "latitude" in layout.columns else ""
     )
-    return table, f"{layout}{where}; {conventions}{degrees}{layout.not_used}."
+    return table, f"{layout}{unit}{where}; {conventions}{degrees}{layout.not_used}."
 
 
 def read_terrascan(
@@ -114,7 +144,7 @@ def read_terrascan(
     layout : str
     """
     conventions = Conventions.of(section, GRID)
-    table = in_our_conventions(path, read_trj(path), conventions, crs)
+    table = in_our_conventions(path, counting_on(read_trj(path)), conventions, crs)
     return table, f"{path.name} was read as a TerraScan trajectory; {conventions}."
 
 
@@ -137,10 +167,54 @@ def tum_columns(cells: Sequence[str]) -> Mapping[str, int]:
     return dict(zip(TUM, range(len(TUM)), strict=True)) if is_attitude else {}
 
 
-def _used(layout: TableLayout) -> TableLayout:
-    """The layout with the columns that are used: one kind of place, sigmas of all axes or none."""
+def _is_quaternion(names, chosen):
+    """Whether a quaternion gives the attitude: it was chosen, or there are no angles beside it."""
+    is_there = not set(QUATERNION).isdisjoint(names)
+    has_angles = {"roll", "pitch"} <= set(names) and not {"heading", "yaw"}.isdisjoint(names)
+    return is_there and (not has_angles or not set(QUATERNION).isdisjoint(chosen))
+
+
+def _check_order(layout, lacking, chosen):
+    """Refuse a quaternion by place where a header names its columns, in words that aren't known."""
+    if layout.header or "qw" not in layout.columns or chosen:
+        return
+    header = likely_header(layout.path, TRAJECTORY_NAMES)
+    if len(header) == len(TUM) and any(ORDER.fullmatch(plain(cell)) for cell in header):
+        known = find_meanings(header, TRAJECTORY_NAMES)
+        missing = lacking({*known, "qw"}) + ["qw"] * ("qw" not in known)
+        raise ValueError(
+            f"{layout.path} names its columns {', '.join(map(shown, header))}, which leaves open "
+            f"{', '.join(missing)}: number all under [trajectory.columns] in survey.toml, as "
+            "gps_time = 1, easting = 2, northing = 3, height = 4, qx = 5, qy = 6, qz = 7, qw = 8."
+        )
+
+
+def _in_seconds(layout, table):
+    """The table with times in seconds, and words on the unit where their size tells it."""
+    known = np.abs(table["gps_time"][np.isfinite(table["gps_time"])])
+    if "gps_time" in layout.factors or not len(known):
+        return table, ""
+    size = float(np.median(known))
+    for unit, factor in TIME_UNITS.items():
+        if EARLIEST <= size * factor < LATEST <= size:
+            seconds = table | {"gps_time": table["gps_time"] * factor}
+            return seconds, f"; times in {unit} by their size"
+    return table, ""
+
+
+def _used(layout: TableLayout, is_quaternion: bool) -> TableLayout:
+    """The layout with the columns that are used: one kind of place, sigmas of all axes or none.
+
+    With a quaternion x is east and y north: turned about a height, no others are right-handed.
+    """
     columns = layout.columns
-    needless = {"x", "y"}
+    if is_quaternion and "easting" not in columns and "latitude" not in columns:
+        horizontal = {"x": "easting", "y": "northing"}
+        columns = {horizontal.get(name, name): place for name, place in columns.items()}
+        factors = {horizontal.get(name, name): factor for name, factor in layout.factors.items()}
+        layout = replace(layout, factors=factors)
+    needless = {"x", "y", *(ANGLES if is_quaternion else QUATERNION)}
+    needless |= {"yaw"} if is_quaternion else set()
     needless |= {"latitude", "longitude"} if "easting" in columns else set()
     needless |= {"yaw"} if "heading" in columns else set()
     for group in (POSITION_SIGMAS, ATTITUDE_SIGMAS):

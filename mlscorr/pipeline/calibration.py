@@ -177,7 +177,7 @@ def warn_of_scanners(survey: Survey) -> None:
     """
     spans = []
     for file in survey.clouds:
-        times = sample_gps_times(file.path)[2] + file.time_constant
+        times = file.trajectory_time(sample_gps_times(file.path)[2])
         spans.append((times.min(), times.max(), file.path.name))
     spans.sort()
     for (start, end, name), (first, last, other) in pairwise(spans):

@@ -166,7 +166,8 @@ def _placed_times(survey) -> tuple[int, list[str]]:
     passes, outside = 0, []
     for file in survey.clouds:
         records = spread_records(read_layout(file.path))[1]
-        times = records["gps_time"][file.rows(records["point_source_id"])] + file.time_constant
+        own = records["gps_time"][file.rows(records["point_source_id"])]
+        times = file.trajectory_time(own)
         if not len(times):
             continue
         segment = survey.trajectory.segment(times)

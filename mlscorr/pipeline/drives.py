@@ -19,6 +19,7 @@ from mlscorr.io.time_systems import TimeMatch, match_times
 from mlscorr.io.trajectory_sessions import (
     SessionFile,
     Sessions,
+    across_week_end,
     check_systems,
     join_sessions,
     read_sessions,
@@ -60,10 +61,13 @@ class Cloud:
         ids = self.records["point_source_id"][np.argsort(self.times, kind="stable")]
         return bool(np.count_nonzero(np.diff(ids)) > 2 * (len(np.unique(ids)) - 1))
 
-    def file(self, constant: float = 0.0) -> CloudFile:
-        """Its CloudFile, with what makes its times those of the trajectory (s)."""
-        constant += self.layout.time_offset
-        return CloudFile(self.layout.cloud, self.layout.points, constant, "")
+    def file(self, match: TimeMatch | None = None) -> CloudFile:
+        """Its CloudFile, with what makes its times those of the trajectory."""
+        file = CloudFile(self.layout.cloud, self.layout.points, self.layout.time_offset, "")
+        if match is None:
+            return file
+        constant = match.constant + self.layout.time_offset
+        return replace(file, time_constant=constant, new_week=match.new_week)
 
     def match(self, trajectory: Trajectory, setting: str = "auto") -> TimeMatch:
         """How its times become those of a trajectory; as match_times."""
@@ -195,11 +199,16 @@ def join_drives(drives: list[Drive], clouds: list[Cloud]) -> Iterator[Drive]:
         if any(first.span[1] >= second.span[0] for first, second in pairwise(group)):
             continue
         try:
-            whole = _joined(group).recorded.trajectory
-            time = np.concatenate([c.times + c.match(whole).constant for c in clouds])
+            recorded = _joined(group).recorded
+            whole = recorded.trajectory
+            time = np.concatenate([c.match(whole).placed(c.times) for c in clouds])
         except ValueError:  # of several time systems, or all together cover the clouds in part
             continue
-        used = [d for d in group if ((time >= d.span[0]) & (time <= d.span[1])).any()]
+        used = [
+            drive
+            for drive, part in zip(group, recorded.parts, strict=True)
+            if ((time >= part.gps_time[0]) & (time <= part.gps_time[-1])).any()
+        ]
         if len(used) > 1:
             yield _joined(used)
 
@@ -209,6 +218,7 @@ def _joined(drives):
     names = [drive.name for drive in drives]
     parts = [drive.recorded.trajectory for drive in drives]
     check_systems(names, parts)
+    parts = across_week_end(parts)
     whole = join_sessions(names, parts, Pos())[0]
     recorded = replace(drives[0].recorded, trajectory=whole, parts=tuple(parts))
     return replace(drives[0], paths=tuple(d.paths[0] for d in drives), recorded=recorded)

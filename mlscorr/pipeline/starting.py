@@ -233,7 +233,7 @@ def _put_clouds(text, path, clouds, trajectory):
     spans, passes, systems = [], 0, Counter()
     for cloud in clouds:
         match = cloud.match(trajectory, text.given.get("cloud.gps_time", "auto"))
-        times = cloud.times[np.isfinite(cloud.times)] + match.constant
+        times = match.placed(cloud.times[np.isfinite(cloud.times)])
         segment = trajectory.segment(times)
         passes += len(set(segment[segment >= 0].tolist()))
         spans.append((times.min(), times.max()))
@@ -274,8 +274,7 @@ def _targets(points):
 
 def _rate(cloud: Cloud, trajectory: Trajectory) -> float | None:
     """Lines a second of a cloud, None where they are not seen."""
-    constant, points = cloud.match(trajectory).constant, cloud.layout.points
-    file = cloud.file(constant)
+    file, points = cloud.file(cloud.match(trajectory)), cloud.layout.points
     first = max(0, points - SETTINGS.rated_points) // 2
     run = read_chunks(file, first=first, end=min(points, first + SETTINGS.rated_points))
     return line_rate(PointCloud.concatenate(list(run)), trajectory)

@@ -8,6 +8,8 @@ import numpy as np
 
 from mlscorr.survey.columns import Columns
 
+WEEK = 604_800.0  # s
+
 
 @dataclass(frozen=True, repr=False)
 class PointCloud(Columns):
@@ -48,6 +50,9 @@ class CloudFile:
     time_system : str
     point_source_ids : tuple of int, optional
         Of the points; without it all of the file.
+    new_week : float
+        Times of the file below it are of the week after that of the others, as its seconds of
+        week start again. Units: s.
     """
 
     path: Path
@@ -55,6 +60,7 @@ class CloudFile:
     time_constant: float
     time_system: str
     point_source_ids: tuple[int, ...] | None = None
+    new_week: float = -np.inf
 
     @property
     def name(self) -> str:
@@ -74,3 +80,38 @@ class CloudFile:
         if self.point_source_ids is None:
             return slice(None)
         return np.isin(point_source_id, self.point_source_ids)
+
+    def counted(self, gps_time: np.ndarray) -> np.ndarray:
+        """Times (n,) of the file that count on where its seconds of week start again. Units: s.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            As the file has them. Units: s.
+        """
+        return counted_on(gps_time, self.new_week)
+
+    def trajectory_time(self, gps_time: np.ndarray) -> np.ndarray:
+        """Times (n,) in the trajectory's time system. Units: s.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            As the file has them. Units: s.
+        """
+        return self.counted(gps_time) + self.time_constant
+
+
+def counted_on(gps_time: np.ndarray, new_week: float) -> np.ndarray:
+    """Times (n,) to which a week is added where they lie below a limit. Units: s.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    new_week : float
+        Infinite below zero where no week ends. Units: s.
+    """
+    if new_week == -np.inf:
+        return gps_time
+    return gps_time + WEEK * (gps_time < new_week)

@@ -19,7 +19,7 @@ class Summary:
     >>> seconds, still = np.arange(413200.0, 413210.0), np.zeros(10)
     >>> Trajectory(seconds, np.zeros((10, 3)), attitude_from_angles(still, still, still))
     Trajectory(gps_time=array (10,), position=array (10, 3), attitude=Rotation, \
-position_sigma=None, attitude_sigma=None, session=None, scanned=None)
+position_sigma=None, attitude_sigma=None, session=None, scanned=None, weeks=None)
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
 
+from mlscorr.survey.clouds import WEEK
 from mlscorr.survey.columns import check_lengths
 from mlscorr.survey.summary import Summary
 
@@ -35,6 +36,8 @@ class Trajectory(Summary):
         Number of the session of the POS of each epoch, where steps alone don't part sessions.
     scanned : (n,) bool array, optional
         Which epochs have points of the clouds about them, where somebody looked.
+    weeks : (n,) int array, optional
+        Weeks that were added to the times of the file, whose seconds of week start again.
 
     Raises
     ------
@@ -50,6 +53,7 @@ class Trajectory(Summary):
     attitude_sigma: np.ndarray | None = None
     session: np.ndarray | None = None
     scanned: np.ndarray | None = None
+    weeks: np.ndarray | None = None
 
     def __post_init__(self):
         check_lengths(self)
@@ -68,11 +72,16 @@ class Trajectory(Summary):
                 f"The trajectory's gps_time must increase: {int((steps == 0).sum())} epochs are "
                 f"duplicates and {int((steps < 0).sum())} go back in time (first after "
                 f"{self.gps_time[np.argmax(steps <= 0)]:.3f} s). Sort the file and remove repeated "
-                "epochs; where seconds of week start again, cut it into two [[trajectory]]."
+                "epochs."
             )
 
     def __len__(self) -> int:
         return len(self.gps_time)
+
+    @property
+    def file_time(self) -> np.ndarray:
+        """Times (n,) as a file has them, whose seconds of week start again. Units: s."""
+        return self.gps_time if self.weeks is None else self.gps_time - WEEK * self.weeks
 
     @cached_property
     def gaps(self) -> np.ndarray:
@@ -213,6 +222,7 @@ class Trajectory(Summary):
 
         before = np.searchsorted(self.gps_time, gps_time, side="right") - 1
         session = None if self.session is None else self.session[before]
+        weeks = None if self.weeks is None else self.weeks[before]
         near = np.zeros(len(self), dtype=bool)
         near[before] = True
         near[1:] |= near[:-1]
@@ -224,6 +234,7 @@ class Trajectory(Summary):
             linear(self.position_sigma),
             linear(self.attitude_sigma),
             session,
+            weeks=weeks,
         )
 
 

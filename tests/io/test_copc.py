@@ -105,6 +105,22 @@ def test_echoes_of_a_pulse_come_in_their_order(tmp_path):
     assert np.array_equal(first.xyz, second.xyz)
 
 
+def test_a_copc_over_the_end_of_a_week_counts_on(tmp_path):
+    "Seconds of week start again within it: points come as in the LAZ, the old week's first"
+    laz = write_street(tmp_path / "in.laz", 6, points=4_000, evlrs=False)
+    las = laspy.read(laz)
+    counted = np.linspace(604_790.0, 604_810.0, 4_000)
+    las.gps_time = counted % 604_800.0
+    las.write(laz)
+    copc = write_copc(laz, tmp_path / "in.copc.laz")
+    files = [CloudFile(path, 4_000, 0.0, "week", new_week=302_400.0) for path in (laz, copc)]
+    first, second = (PointCloud.concatenate(list(read_chunks(file))) for file in files)
+    assert np.array_equal(first.xyz, second.xyz)
+    assert np.abs(second.gps_time - counted).max() < 1e-9
+    windows = read_windows(files[1], np.array([[604_799.0, 604_801.0]]), limit=500)
+    assert PointCloud.concatenate(list(windows)).gps_time == pytest.approx(604_800.0, abs=1.3)
+
+
 def test_any_point_of_unlike_chunks_is_found(pair):
     "Each place of the file is sought as if all before it was read: chunks begin anywhere"
     layout = read_layout(pair[1])

@@ -132,19 +132,28 @@ def test_utc_is_not_taken_for_gps_time():
         match_times("a.laz", OF_WEEK[:26] - 18.0, False, trajectory(OF_WEEK[0], OF_WEEK[25]))
 
 
-def test_a_week_that_ends_within_a_cloud_is_refused():
-    "Half of the times start again at 0 while the trajectory's run on: cut there, each half fits"
-    running = np.linspace(604_770.3, 604_829.3, 60)  # s
-    covering, times = trajectory(604_765.0, 604_835.0), running % 604_800.0
-    sentence = r"GPS week ends within a.laz: 30 of 60.*with \+604800 s only.*cut it into two files"
-    with pytest.raises(ValueError, match=sentence):
-        match_times("a.laz", times, False, covering)
-    with pytest.raises(ValueError, match="15 of 45 sampled times"):
-        match_times("a.laz", times[:45], False, covering, "week")
-    with pytest.raises(ValueError, match=r"15 of 45 sampled times.*with -604800 s only"):
-        match_times("a.laz", times[15:], False, trajectory(-35.0, 35.0))
-    for part, constant in ((times[:30], 0.0), (times[30:], 604_800.0)):
-        assert match_times("a.laz", part, False, covering).constant == constant
+@pytest.mark.parametrize("rows", [slice(None), slice(0, 45), slice(15, None), slice(27, 34)])
+def test_a_week_that_ends_within_a_cloud_counts_on(rows):
+    "Seconds of week that start again are placed to the microsecond where the trajectory's run on"
+    running = np.linspace(604_770.3, 604_829.3, 60)[rows]  # s
+    times = running % 604_800.0
+    for system, start in (("week", 0.0), ("week", -604_800.0), ("gps", 604_800.0 * WEEK_NUMBER)):
+        covering = trajectory(604_765.0 + start, 604_835.0 + start)
+        match = match_times("a.laz", times, False, covering)
+        assert np.abs(match.placed(times) - start - running).max() < 1e-6
+        assert match.inside == 1.0
+        assert match.trajectory_system == system
+        assert "604800 s are added where its times start again" in str(match)
+    with pytest.raises(ValueError, match="None of"):
+        match_times("a.laz", times, False, trajectory(100_000.0, 100_100.0))
+
+
+def test_a_cloud_of_both_ends_of_one_week_is_as_it_is():
+    "A tile with points of Sunday and of the Saturday after it needs no week more"
+    days = [trajectory(100.0, 200.0), trajectory(604_600.0, 604_700.0)]
+    times = np.concatenate([np.linspace(110.0, 190.0, 30), np.linspace(604_610.0, 604_690.0, 30)])
+    match = match_times("a.laz", times, False, Trajectory.concatenate(days))
+    assert np.array_equal(match.placed(times), times)
 
 
 def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():

@@ -207,7 +207,7 @@ def test_trajectories_of_two_time_systems_are_refused(folder):
 
 
 def test_seconds_of_week_may_start_again_between_two(folder):
-    "Saturday night and Sunday morning: clouds in standard time find each its own run"
+    "Saturday night, then Sunday morning, a week later: each cloud finds its run, and all is said"
     late, early = 604_000.0 - START, 100.0 - START - 20.0  # s, added to each run
     week = 604_800.0 * 2300 - 1e9
     for number, start, added, weeks in ((1, 0.0, late, 0), (2, 20.0, early, 1)):
@@ -219,9 +219,17 @@ def test_seconds_of_week_may_start_again_between_two(folder):
         write_las(folder / f"pass-{number}.las", times, is_standard=True)
     survey = read_survey(folder)
     assert len(survey.trajectory.passes) == 2
-    for cloud, run in zip(survey.clouds, (1, 0), strict=True):
+    for cloud, run in zip(survey.clouds, (0, 1), strict=True):
         chunk = next(read_chunks(cloud))
         assert (survey.trajectory.segment(chunk.gps_time) == run).all()
+    assert survey.trajectory.gps_time[-1] == pytest.approx(604_800.0 + 114.95, abs=1e-6)
+    assert any(
+        "The GPS week ends before epoch 1 of run-2.csv (100.000 s)" in n for n in survey.notes
+    )
+    write_trajectory_csv(folder / "again.csv", survey.trajectory)
+    own = np.loadtxt(folder / "again.csv", delimiter=",", skiprows=1)[:, 0]
+    assert own[[0, -1]] == pytest.approx([604_000.0, 114.95], abs=1e-6)
+    assert np.array_equal(read_trajectory(folder / "again.csv").weeks, survey.trajectory.weeks)
 
 
 def test_sigmas_that_one_lacks_are_those_of_pos_or_asked_for(folder):

@@ -378,8 +378,8 @@ AMBIGUOUS = {
         ],
     ),
     "a time by another name": (
-        write("trajectory.csv", HEADER.replace("gps_time", "timestamp") + trajectory()),
-        ["--set 'trajectory.columns.gps_time = \"timestamp\"'"],
+        write("trajectory.csv", HEADER.replace("gps_time", "gps_timestamp") + trajectory()),
+        ["--set 'trajectory.columns.gps_time = \"gps_timestamp\"'"],
     ),
     "a yaw": (
         write("trajectory.csv", HEADER.replace("heading", "yaw") + trajectory()),

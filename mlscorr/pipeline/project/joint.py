@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mlscorr.io.task_store import digest
-from mlscorr.io.time_systems import WEEK
 from mlscorr.io.trajectory_sessions import join_sessions, with_sigmas
 from mlscorr.pipeline.finding import Finding
 from mlscorr.survey import (
@@ -18,6 +17,7 @@ from mlscorr.survey import (
     TieFeatures,
     Trajectory,
 )
+from mlscorr.survey.clouds import WEEK
 from mlscorr.ties import SETTINGS as TIES
 from mlscorr.ties import join_features
 
