@@ -138,12 +138,12 @@ def _text(folder, path, given, roles):
     """The text, and the roles with those that are not taken."""
     _validate(given)
     clouds = _clouds(folder, given, roles)
-    copies = find_copies(cloud.layout.cloud for cloud in clouds)
-    clouds = [cloud for cloud in clouds if cloud.layout.cloud not in copies]
     drive, late = choose_trajectory(
         _roles(folder, given, "trajectory", roles), clouds, given.get("trajectory", {})
     )
     crs, why_crs = choose_crs(clouds, drive, given.get("crs"))
+    copies = find_copies(cloud.layout.cloud for cloud in sorted(clouds, key=_preference))
+    clouds = [cloud for cloud in clouds if cloud.layout.cloud not in copies]
     accuracy = choose_accuracy([r for r in roles if r.role == "accuracy"], drive, crs)
     trajectory = drive.read(crs, accuracy)
     control, points, apart = choose_control(
@@ -151,7 +151,8 @@ def _text(folder, path, given, roles):
     )
     refusals = late | apart
     refusals |= {
-        copy: f"a copy of {first.name}, and would count twice" for copy, first in copies.items()
+        copy: f"the same points as {first.name}, which would count twice"
+        for copy, first in copies.items()
     }
     roles = [replace(role, role="none", reason=refusals[role.path]) if role.path in refusals
              else role for role in roles]  # fmt: skip
@@ -213,6 +214,12 @@ def _clouds(folder, given, roles):
     reasons += [f"{folder} holds no cloud of its own, and {role.path} is {SIMULATED}: give that "
                 "folder." for role in roles if role.reason == SIMULATED]  # fmt: skip
     return clouds or _no_cloud(folder, reasons)
+
+
+def _preference(cloud):
+    """Rank of a cloud among copies: a LAS or LAZ in order of time is read soonest."""
+    is_in_order = (np.diff(cloud.times) >= 0).all()
+    return is_foreign(cloud.layout.cloud), not is_in_order, str(cloud.layout.cloud)
 
 
 def _no_cloud(folder, reasons=()):

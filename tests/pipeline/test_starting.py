@@ -266,12 +266,27 @@ def test_a_copy_of_a_cloud_is_left_out_and_refused(folder):
     (folder / "copy.las").write_bytes((folder / "pass-1.las").read_bytes())
     started = mlscorr.init(folder)
     reasons = {role.path.name: role.reason for role in started.roles if role.role == "none"}
-    assert reasons == {"pass-1.las": "a copy of copy.las, and would count twice"}
+    assert reasons == {"pass-1.las": "the same points as copy.las, which would count twice"}
     assert tomllib.loads(started.text)["cloud"]["files"] == ["copy.las", "pass-2.las"]
     path = started.write()
     path.write_text(started.text.replace('"copy.las"', '"*.las"').replace(', "pass-2.las"', ""))
     (fault,) = mlscorr.check(path).faults
-    assert "pass-1.las, which is a copy of" in fault.sentence and "copy.las:" in fault.sentence
+    assert re.search(r"pass-1.las, which is a copy of .*copy.las\. Remove it", fault.sentence)
+
+
+def test_a_las_beside_its_laz_is_one_pass(folder):
+    "init takes one of the two and says why; check and correct refuse both and say what to remove"
+    laspy.read(folder / "pass-1.las").write(folder / "pass-1.laz")
+    started = mlscorr.init(folder)
+    assert tomllib.loads(started.text)["cloud"]["files"] == ["pass-1.las", "pass-2.las"]
+    reasons = {role.path.name: role.reason for role in started.roles if role.role == "none"}
+    assert reasons == {"pass-1.laz": "the same points as pass-1.las, which would count twice"}
+    path = started.write()
+    path.write_text(started.text.replace('"pass-1.las"', '"pass-1.las", "pass-1.laz"'))
+    for command in (["check", str(path)], ["correct", str(path), "-o", str(folder / "out")]):
+        result = CliRunner().invoke(app, command)
+        assert result.exit_code == 2, result.stderr
+        assert re.search(r"pass-1.laz, which is a copy of .*pass-1.las. Remove it", result.stderr)
 
 
 # ---- folders that do not
