@@ -36,7 +36,10 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
         warn(counted(sum(fault.number for fault in checked.faults), "fault"))
         raise typer.Exit(CODES[checked.faults[0].where])
     following = f"mlscorr correct {quote(str(survey))} -o OUT"
-    say(f"No fault, {counted(len(checked.warnings), 'warning')}. Next: {following}")
+    scope = (
+        "" if checked.is_searched else " in what was checked, and no control point was looked for"
+    )
+    say(f"No fault{scope}, {counted(len(checked.warnings), 'warning')}. Next: {following}")
 
 
 def _list(title: str, lines: Sequence[str]) -> None:

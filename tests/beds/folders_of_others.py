@@ -24,6 +24,7 @@ from mlscorr.io.trajectory import read_trajectory, write_trajectory_csv
 from mlscorr.io.trajectory_exports import export_trajectory
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import Trajectory
+from tests.beds.checked import verdicts
 from tests.beds.foreign_clouds import points_of, write_e57, write_ply
 from tests.beds.las_crs import add_crs
 from tests.beds.pof import geographic, pof_bytes, poq_bytes
@@ -80,7 +81,8 @@ class OthersFolder:
     """How a folder is made, and what is true of it.
 
     ``sentence``: what init says, None where it needs nothing; ``given`` and ``mend``: what that
-    sentence asks for; ``clouds``: names of what is corrected; ``control`` points that are used.
+    sentence asks for; ``clouds``: names of what is corrected; ``control`` points that are used;
+    ``fault``: what check finds and correct refuses alike, None where both pass.
     """
 
     name: str
@@ -91,6 +93,7 @@ class OthersFolder:
     clouds: tuple[str, ...] = ("pass-1.las", "pass-2.las")
     control: int = 4
     check: int = 1
+    fault: str | None = None
 
 
 # ---- parts of folders
@@ -383,6 +386,19 @@ def uppercase(folder, bed):
         path.rename(folder / path.name.upper())
 
 
+def surveyed_twice(folder, bed):
+    "By two epochs of GNSS, as P1 and P1.1"
+    again = [(f"{name}.1", *rest) for name, *rest in bed.points]
+    control_csv(folder, bed, points=[*bed.points, *again])
+
+
+def in_two_encodings(folder, bed):
+    "LAS beside LAZ"
+    las(folder, bed)
+    for path in bed.clouds:
+        laspy.read(path).write(folder / f"{path.stem}.laz")
+
+
 def remove(name):
     return lambda folder, _: (folder / name).unlink()
 
@@ -479,6 +495,11 @@ FOLDERS = (
         "control in feet", others(las, trajectory_csv, in_feet), "feet", mend=control_csv
     ),
     OthersFolder(
+        "each point surveyed twice", others(las, trajectory_csv, surveyed_twice),
+        fault="Is each point named twice",
+    ),
+    OthersFolder("LAS beside LAZ", others(in_two_encodings, trajectory_csv, control_csv)),
+    OthersFolder(
         "uppercase endings", uppercase, clouds=("PASS-1.LAS", "PASS-2.LAS")
     ),
 )  # fmt: skip
@@ -524,16 +545,28 @@ def check_result(case, survey, out):
     assert seen == (case.control, case.check), seen
 
 
+def check_verdicts(case, survey, out):
+    "That check passes what correct corrects, and finds the fault that correct refuses"
+    if case.fault is None:
+        with warnings.catch_warnings(action="ignore"):
+            checked = mlscorr.check(survey)
+        assert checked.is_searched and not checked.faults, checked
+        check_result(case, survey, out)
+        return
+    said = verdicts(survey)
+    assert len(said.faults) == 1 and re.search(case.fault, said.faults[0]), said
+    assert said.refusal == said.faults[0], said
+
+
 def outcome(case, place):
     "What comes out of a folder: a result, a sentence and then a result, or what is wrong"
     try:
         survey = started(case, place / case.name)
-        with warnings.catch_warnings(action="ignore"):
-            faults = mlscorr.check(survey).faults
-        assert not faults, faults
-        check_result(case, survey, place / f"{case.name} out")
+        check_verdicts(case, survey, place / f"{case.name} out")
     except (AssertionError, ValueError, OSError) as error:
         return f"{type(error).__name__}: {error}"
+    if case.fault is not None:
+        return "fault of both"
     return "result" if case.sentence is None else "sentence, result"
 
 
@@ -545,5 +578,5 @@ if __name__ == "__main__":
         for case in chosen:
             outcomes.append(outcome(case, Path(place)))
             print(f"{case.name:40} {outcomes[-1]}", flush=True)
-    right = sum(outcome in ("result", "sentence, result") for outcome in outcomes)
+    right = sum(outcome in ("result", "sentence, result", "fault of both") for outcome in outcomes)
     print(f"{right} of {len(outcomes)} give a result, or the right sentence and then a result")
