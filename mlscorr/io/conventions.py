@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from mlscorr.frames import angles_from_attitude
 from mlscorr.io.column_names import ANGLES, AXES
 from mlscorr.io.course import heading_and_course, median_difference
+from mlscorr.io.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion
 from mlscorr.io.projection import convergence_at, project
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_sections import TrajectorySection
@@ -85,8 +86,9 @@ def in_our_conventions(
     is_true = conventions.heading == "clockwise from true north"
     if (is_geographic or is_true) and crs is None:
         what = "latitude and longitude" if is_geographic else "headings from true north"
-        raise ValueError(
-            f"{path} has {what}: set crs in survey.toml to the projected CRS of cloud and control."
+        raise OpenQuestion(
+            f"{path} has {what}: set crs in survey.toml to the projected CRS of cloud and control.",
+            [PLACE_OF_CRS],
         )
     if is_geographic:
         record = {name: np.radians(table.pop(name)) for name in ("latitude", "longitude")}
@@ -146,9 +148,10 @@ def attitude_of_quaternions(
         if name == axes or (axes is None and is_upright and is_along):
             fitting.append((name, angles))
     if len(fitting) != 1:
-        raise ValueError(
+        raise OpenQuestion(
             f"{path} has quaternions whose body axes the course over ground does not tell: name "
-            f"them under [trajectory] in survey.toml, as axes = one of {', '.join(OUR_AXES)}."
+            f"them under [trajectory] in survey.toml, as axes = one of {', '.join(OUR_AXES)}.",
+            [OpenPlace(("trajectory", "axes"), tuple(OUR_AXES), "body axes of the quaternions")],
         )
     name, angles = fitting[0]
     rest = {key: values for key, values in table.items() if key not in QUATERNION}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.io.open_places import OpenPlace, OpenQuestion
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_systems import DAY, WEEK
 from mlscorr.survey import Trajectory
@@ -106,12 +107,13 @@ def check_heading(
     if misfit < tolerance:
         return
     if np.abs(angles).max() <= 2 * np.pi and median_difference(heading, course) < tolerance:
-        raise ValueError(
+        raise OpenQuestion(
             f"The angles of {path} seem to be radians where degrees belong: none exceeds 2 pi, "
             f"and the heading fits the course over ground to "
             f"{np.degrees(median_difference(heading, course)):.1f} deg when taken as radians, "
             f"to {np.degrees(misfit):.1f} deg when taken as degrees. If so, write "
-            'angles = "rad" under [trajectory] in survey.toml.'
+            'angles = "rad" under [trajectory] in survey.toml.',
+            [OpenPlace(("trajectory", "angles"), ("rad", "deg"), "unit of the angles")],
         )
     warnings.warn(
         f"The heading of {path} differs from the course over ground by {np.degrees(misfit):.0f} "
