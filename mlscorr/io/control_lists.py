@@ -145,13 +145,15 @@ def _unstated(layout, rows, missing, meanings):
         seeming["kind"] = header[column]
         words = {same_word(cell): cell for cell in _cells(rows, column)}
         sentence += (
-            f" The column {shown(header[column])} holds {_few(list(words.values()))}: name it as "
-            "columns.kind, and give each word its meaning under [control] words."
+            f" The column {shown(header[column])} holds {_first_words(list(words.values()))}: name "
+            "it as columns.kind, and give each word its meaning under [control] words."
         )
         places = word_places({("kind", cell): None for cell in words.values()})
     elif "kind" in layout.columns:  # whose words are not known either
         places = word_places(unknown_words(layout, rows, meanings))
-    are_sized = bool(places) and all("0" in place.examples[0] for place in places)
+    examples = [OfficeWord.of(place.examples[0]) for place in places]
+    sizes = [word.size for word in examples if word.column == "kind"]
+    are_sized = bool(sizes) and None not in sizes
     for name in missing:
         if name in seeming:
             key = ("control", "columns", name)
@@ -163,16 +165,16 @@ def _unstated(layout, rows, missing, meanings):
 
 def _likely_kinds(layout, rows):
     """Position of the one column that isn't used and holds few words, in all rows; else None."""
-    likely = []
+    candidates = []
     for i in layout.unused if layout.header else ():
         words = {same_word(row[i]) if i < len(row) else "" for row in rows}
         are_words = all(any(c.isalpha() for c in word) for word in words)
         if are_words and 2 * len(words) <= len(rows):
-            likely.append(i)
-    return likely[0] if len(likely) == 1 else None
+            candidates.append(i)
+    return candidates[0] if len(candidates) == 1 else None
 
 
-def _few(words):
+def _first_words(words):
     """The first of some words, as a message can show them."""
     limit = SETTINGS.named_faults
     more = [f"and {len(words) - limit} more"] if len(words) > limit else []
@@ -219,15 +221,15 @@ def word_places(words: Iterable[tuple[str, str]]) -> list[OpenPlace]:
 
 def _likely_meanings(name, word):
     """Meanings that a word may have, the likeliest first."""
-    ours = list(WORDS[name])
+    kinds = list(WORDS[name])
     if name != "kind":
-        return tuple(ours)
+        return tuple(kinds)
     number = re.search(r"\d+(?:[.,]\d+)?", word)
     size = float(number[0].replace(",", ".")) if number else 0.0
     smallest, largest = SETTINGS.target_size
-    said = f" {size:g}" if smallest <= size <= largest else ""
-    likely = [kind for kind in ours if any(meant("kind", part) == kind for part in word.split())]
-    return tuple(f"{kind}{said}" for kind in dict.fromkeys([*likely, *ours]))
+    text = f" {size:g}" if smallest <= size <= largest else ""
+    named = [kind for kind in kinds if any(meant("kind", part) == kind for part in word.split())]
+    return tuple(f"{kind}{text}" for kind in dict.fromkeys([*named, *kinds]))
 
 
 def check_unused(

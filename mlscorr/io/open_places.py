@@ -113,10 +113,10 @@ def _open_keys(value, keys):
     if value == MARK:
         return [keys]
     if isinstance(value, Mapping):
-        return [found for key, part in value.items() for found in _open_keys(part, (*keys, key))]
+        return [path for key, part in value.items() for path in _open_keys(part, (*keys, key))]
     if isinstance(value, list):
         numbered = enumerate(value, start=1)
-        return [found for n, part in numbered for found in _open_keys(part, (*keys, str(n)))]
+        return [path for n, part in numbered for path in _open_keys(part, (*keys, str(n)))]
     return []
 
 

@@ -152,9 +152,9 @@ def read_layout(
             for (name, other), place in (hint_places or {}).items()
             if name in missing and other in meanings
         ]
-        likely = [] if places or ways_out else _likely_places(header, missing, used, names)
+        columns = [] if places or ways_out else _likely_places(header, missing, used, names)
         sentence = missing_sentence(path, header, missing, used, names) + ways_out
-        raise OpenQuestion(sentence, [*places, *likely])
+        raise OpenQuestion(sentence, [*places, *columns])
     return layout
 
 

@@ -218,8 +218,10 @@ def _looked(
     elif needs_control and len(survey.control) and probe.refusal:
         if is_beside:
             faults.add("data", probe.refusal)
-        elif found := faults.of("data", find_control, survey):
-            points, matched = survey.surveyed, found[0] + found[1]
+        else:
+            parts = faults.of("data", find_control, survey)
+            if parts is not None:
+                points, matched = survey.surveyed, parts[0] + parts[1]
     elif probe.doubt:
         faults.warn(probe.doubt)
     control = matched[np.isin(matched.name, survey.control.name)]
@@ -234,10 +236,10 @@ def _found_notes(
     survey: Survey, points: ControlPoints, matched: Matched
 ) -> tuple[list[str], tuple[str, ...]]:
     """Sentences on surveyed points that were found, and on those that were not looked at."""
-    found = set(matched.name)
-    lost = [name for name in points.name if name not in found]
+    names = set(matched.name)
+    lost = [name for name in points.name if name not in names]
     missing = f", not {', '.join(lost)}" if lost else ""
-    notes = [f"{len(found)} of {len(points)} targets that were looked at are found{missing}."]
+    notes = [f"{len(names)} of {len(points)} targets that were looked at are found{missing}."]
     if len(matched):
         middle = ", ".join(
             f"{axis} {value:+.3f}"
