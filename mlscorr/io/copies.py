@@ -7,7 +7,7 @@ as in a COPC beside a LAZ.
 
 import struct
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,32 +67,25 @@ def _announced_points(path: Path) -> int:
 
 def _copies(paths: list[Path]) -> dict[Path, Path]:
     """Copies among files with one number of points."""
-    copies: dict[Path, Path] = {}
-    firsts: list[_Points] = []
+    points = []
     for path in paths:
         with suppress(OSError, ValueError):
-            if read_in_part(path):
-                continue
-            points = _Points(read_layout(path))
-            first = next((first for first in _within_bounds(points, firsts)
-                          if points.are_those_of(first)), None)  # fmt: skip
-            if first is None:
-                firsts.append(points)
-            else:
-                copies[path] = first.layout.cloud
+            if not read_in_part(path):
+                points.append(_Points(path, read_layout(path)))
+    boxes = np.array([cloud_box(each.layout) for each in points])
+    steps = np.array([each.layout.scale for each in points])
+    is_first = np.zeros(len(points), bool)
+    copies: dict[Path, Path] = {}
+    for number, each in enumerate(points):
+        limit = (steps + steps[number])[:, None, :]  # both bounds are rounded to their steps
+        is_same = np.isclose(boxes, boxes[number], rtol=0.0, atol=limit, equal_nan=True)
+        alike = np.flatnonzero(is_first & is_same.all(axis=(1, 2)))
+        first = next((points[i] for i in alike if each.are_those_of(points[i])), None)
+        if first is None:
+            is_first[number] = True
+        else:
+            copies[each.path] = first.path
     return copies
-
-
-def _within_bounds(points: "_Points", others: list["_Points"]) -> Iterator["_Points"]:
-    """Those of others whose header states the same bounds, to a step of the coordinates."""
-    if not others:
-        return
-    boxes = np.array([cloud_box(other.layout) for other in others])
-    steps = np.array([other.layout.scale for other in others]) + points.layout.scale
-    box = cloud_box(points.layout)
-    is_same = np.isclose(boxes, box, rtol=0.0, atol=steps[:, None, :], equal_nan=True)
-    for number in np.flatnonzero(is_same.all(axis=(1, 2))):
-        yield others[number]
 
 
 @dataclass
@@ -101,14 +94,23 @@ class _Points:
 
     Parameters
     ----------
+    path : Path
     layout : LasLayout
     """
 
+    path: Path
     layout: LasLayout
     _moments: np.ndarray | None = None
 
     def are_those_of(self, other: "_Points") -> bool:
-        """Whether both clouds hold the same times, in one order or another."""
+        """Whether both clouds hold the same times, in one order or another; not if undecodable."""
+        if self.layout.points != other.layout.points:  # some of an E57 are invalid
+            return False
+        with suppress(OSError, ValueError):
+            return self._have_times_of(other)
+        return False
+
+    def _have_times_of(self, other):
         places = np.linspace(0, self.layout.points - 1, SETTINGS.sampled_points).astype(np.int64)
         own, others = (
             records_at(points.layout, places)["gps_time"] + points.layout.time_offset
