@@ -36,7 +36,11 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
         warn(counted(sum(fault.number for fault in checked.faults), "fault"))
         raise typer.Exit(CODES[checked.faults[0].where])
     following = f"mlscorr correct {quote(str(survey))} -o OUT"
-    say(f"No fault, {counted(len(checked.warnings), 'warning')}. Next: {following}")
+    number = counted(len(checked.warnings), "warning")
+    if checked.is_searched:
+        say(f"No fault, {number}. Next: {following}")
+    else:
+        say(f"No fault in what was checked, {number}; no control point was found, see Not checked.")
 
 
 def _list(title: str, lines: Sequence[str]) -> None:

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Exit, Quiet, exit_code, say
+from mlscorr.cli.terminal import Exit, Quiet, exit_code, say, warn
+from mlscorr.survey.summary import counted
 
 NAMES = {"none": "not used", "table": "not used", "reference": "mesh"}
 
@@ -25,7 +26,10 @@ def init(
     ] = (),
     quiet: Quiet = False,
 ) -> None:
-    """Write a survey.toml for the files in a folder, and say which is which and why."""
+    """Write a survey.toml for the files in a folder, and say which is which and why.
+
+    What only you know is marked in it, all at once, and the exit code is 4.
+    """
     with exit_code(Exit.USAGE):
         started = mlscorr.init(folder, out, _document(given))
         started.write()
@@ -33,7 +37,17 @@ def init(
         say(f"{NAMES.get(role.role, role.role)}: {role.path.relative_to(folder)} ({role.reason})")
     for note in started.notes:
         say(note)
-    say(f"Written: {started.path}. Next: mlscorr check {quote(str(started.path))}")
+    check = f"mlscorr check {quote(str(started.path))}"
+    if not started.places:
+        say(f"Written: {started.path}. Next: {check}")
+        return
+    for question in started.questions:
+        warn(f"Question: {question}")
+    for place in started.places:
+        warn(f"Open: {place.key} ({place})")
+    number = counted(len(started.places), "open place")
+    warn(f'Written: {started.path}, with {number}. Fill in each "?" in it, then: {check}')
+    raise typer.Exit(Exit.IN_PART)
 
 
 def _document(given):

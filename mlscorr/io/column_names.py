@@ -7,9 +7,12 @@ surveying offices (Punkt, Rechtswert, Hochwert, Hoehe); text exports of NovAtel 
 other surveys X points north.
 """
 
+from __future__ import annotations
+
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from mlscorr.io.text_files import shown
 from mlscorr.survey import data_frame
@@ -53,7 +56,7 @@ WORDS = {  # of the cells in a column of words: ours to those of others, plain
         "检查点",
     },
     "kind": {
-        "circle": "disc disk kreis kreisscheibe",
+        "circle": "disc disk kreis kreisscheibe scheibe",
         "square": "quadrat",
         "hole": "loch",
         "checkerboard": "chessboard schachbrett",
@@ -131,7 +134,67 @@ def listed(cells: Sequence[str]) -> str:
     return ", ".join([*map(shown, cells[:limit]), *more])
 
 
-def meant(column: str, cell: str) -> str:
+class OfficeWord(NamedTuple):
+    """Meaning of an office's own word for its points.
+
+    Parameters
+    ----------
+    column : str
+        One of WORDS.
+    value : str
+        Our word.
+    size : float or None
+        Of a target. Units: m.
+    """
+
+    column: str
+    value: str
+    size: float | None = None
+
+    @classmethod
+    def of(cls, text: str) -> OfficeWord:
+        """The meaning that survey.toml gives a word: a role, a kind, or a kind and its size.
+
+        Parameters
+        ----------
+        text : str
+
+        Raises
+        ------
+        ValueError
+            For another text.
+
+        Examples
+        --------
+        >>> OfficeWord.of("circle 0.6"), OfficeWord.of("check").column
+        (OfficeWord(column='kind', value='circle', size=0.6), 'role')
+        """
+        word, _, size = text.strip().partition(" ")
+        column = next((column for column in WORDS if meant(column, word) in WORDS[column]), None)
+        try:
+            number = float(size) if size else None
+        except ValueError:
+            column = None
+        if column is None or (size and column != "kind"):
+            kinds, roles = ", ".join(WORDS["kind"]), " or ".join(WORDS["role"])
+            raise ValueError(
+                f"'{shown(text)}' is no meaning of a word: give a kind ({kinds}) and its size in "
+                f'm, as "circle 0.6", or a role ({roles})'
+            )
+        return cls(column, meant(column, word), number)
+
+
+def same_word(cell: str) -> str:
+    """A word of an office without case, width and surplus blanks.
+
+    Parameters
+    ----------
+    cell : str
+    """
+    return " ".join(unicodedata.normalize("NFKC", cell).casefold().split())
+
+
+def meant(column: str, cell: str, words: Mapping[str, OfficeWord] | None = None) -> str:
     """Our word for the one in a cell of roles or kinds; the cell in small letters without one.
 
     Parameters
@@ -139,14 +202,18 @@ def meant(column: str, cell: str) -> str:
     column : str
         One of WORDS.
     cell : str
+    words : mapping, optional
+        An office's own words, as same_word gives them, to their meanings.
 
     Examples
     --------
     >>> meant("role", "Check Point"), meant("role", "Kontrollpunkt"), meant("kind", "Kugel")
     ('check', 'check', 'kugel')
     """
-    words = WORDS[column].items()
-    known = (our for our, others in words if plain(cell) in (our, *others.split()))
+    own = (words or {}).get(same_word(cell))
+    if own is not None and own.column == column:
+        return own.value
+    known = (our for our, others in WORDS[column].items() if plain(cell) in (our, *others.split()))
     return next(known, cell.casefold())
 
 

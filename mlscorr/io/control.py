@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mlscorr.io.column_names import AXES, CONTROL_NAMES, WORDS, meant
+from mlscorr.io.column_names import AXES, CONTROL_NAMES, WORDS, meant, same_word
 from mlscorr.io.control_faults import doubled_names, refuse, row_doubts, row_faults
 from mlscorr.io.control_lists import (
     HINTS,
@@ -20,8 +20,10 @@ from mlscorr.io.control_lists import (
     placed,
     role_doubts,
     sentence_on,
+    unknown_words,
     unnamed_columns,
     with_check_points,
+    word_places,
 )
 from mlscorr.io.nearness import check_together
 from mlscorr.io.opening import open_file
@@ -93,17 +95,22 @@ def read_control(
     lines = list(read_rows(layout, exact=True))
     if not lines:
         raise ValueError(f"{path} has a header but no points.")
-    rows, faults = _values(layout, lines)
-    rows = [row | given for row in rows]
+    meanings = section.meanings
+    rows, faults = _values(layout, lines, meanings)
+    rows = [given | row for row in rows]  # of a word's own size before that of all points
     refuse(path, [*faults, *doubled_names(path, rows)])
     if not layout.is_own:
-        check_unused(layout, [cells for _, cells in lines], given)
+        check_unused(layout, [cells for _, cells in lines], given, meanings)
         for doubt in () if section.check else role_doubts(layout, [cells for _, cells in lines]):
             warnings.warn(doubt, stacklevel=2)
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
     points = [(f"{shown(row['name'])} of {path}", row) for row in rows]
-    refuse(path, [(who, fault) for who, row in points for fault in row_faults(row)])
+    faults = [(who, fault) for who, row in points for fault in row_faults(row)]
+    unknown = unknown_words(layout, [cells for _, cells in lines], meanings)
+    others = [row | {"kind": next(iter(WORDS["kind"])), "role": ROLES[0]} for row in rows]
+    is_mended = not any(fault for row in others for fault in row_faults(row))
+    refuse(path, faults, word_places(unknown) if is_mended else ())
     for doubt in row_doubts(path, rows):
         warnings.warn(doubt, stacklevel=2)
     control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
@@ -200,24 +207,31 @@ def holds_points(path: str | Path) -> bool:
     return len(first) > 1 or any(len(re.findall(r"\d+[.,]\d", line)) > 1 for _, line in first)
 
 
-def _values(layout, lines):
+def _values(layout, lines, meanings):
     """Rows of values by column, and pairs (line, what is wrong) of each cell that holds none."""
     rows, faults = [], []
     for line, cells in lines:
         row = {}
         for name, i in layout.columns.items():
             try:
-                row[name] = _value(layout, name, cells[i])
+                row[name] = _value(layout, name, cells[i], meanings)
             except ValueError as fault:
                 faults.append((line, str(fault)))
+        kind = layout.columns.get("kind")
+        word = None if kind is None else meanings.get(same_word(cells[kind]))
+        if word is not None and word.size is not None:
+            size = row.setdefault("size", word.size)
+            if size != word.size:
+                what = f"has the size {size:g} m, and the word for its kind means {word.size:g} m."
+                faults.append((line, what))
         rows.append(row)
     return rows, faults
 
 
-def _value(layout, name, cell):
+def _value(layout, name, cell, meanings):
     """Value of a cell: text, or the number of a column that holds numbers."""
     if name in WORDS:
-        return meant(name, cell)
+        return meant(name, cell, meanings)
     if name == "name":
         if not cell:
             raise ValueError("has no name.")

@@ -10,27 +10,33 @@ from scipy.spatial import cKDTree
 
 from mlscorr.io.column_names import AXES, WORDS
 from mlscorr.io.control_lists import NORMAL, SIGMAS
+from mlscorr.io.open_places import OpenPlace, OpenQuestion
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.text_files import nearest, shown
 
+OWN_WORDS = "Say under [control] words in survey.toml what an office's own words mean."
 AMBIGUOUS = {"cp": " It is short for control point and for check point alike: write gcp or check."}
 
 
-class ListError(ValueError):
-    """What is wrong with the rows of a file, and how many faults that are.
+class ListError(OpenQuestion):
+    """Faults in the rows of a file, and their number.
 
     Parameters
     ----------
     sentence : str
     number : int
+    places : sequence of OpenPlace
+        What survey.toml must say, where that mends all of them.
     """
 
-    def __init__(self, sentence: str, number: int):
-        super().__init__(sentence)
+    def __init__(self, sentence: str, number: int, places: Sequence[OpenPlace] = ()):
+        super().__init__(sentence, places)
         self.number = number
 
 
-def refuse(path: str | Path, faults: Iterable[tuple[object, str]]) -> None:
+def refuse(
+    path: str | Path, faults: Iterable[tuple[object, str]], places: Sequence[OpenPlace] = ()
+) -> None:
     """Raise all that is wrong with the rows of a file at once, what is wrong alike as one.
 
     Parameters
@@ -38,6 +44,8 @@ def refuse(path: str | Path, faults: Iterable[tuple[object, str]]) -> None:
     path : path
     faults : iterable of (str, str)
         Who has it, and what is wrong: words that begin with has.
+    places : sequence of OpenPlace
+        As of ListError.
 
     Raises
     ------
@@ -55,8 +63,10 @@ def refuse(path: str | Path, faults: Iterable[tuple[object, str]]) -> None:
     if number > 1:
         more = [f"And {number - limit} more like these."] if number > limit else []
         sentences = [f"{path} has {number} faults.", *sentences[:limit], *more]
+    if places:
+        sentences.append(OWN_WORDS)
     if sentences:
-        raise ListError(" ".join(sentences), number)
+        raise ListError(" ".join(sentences), number, places)
 
 
 def doubled_names(path: str | Path, rows: Sequence[dict[str, Any]]) -> Iterator[tuple[object, str]]:

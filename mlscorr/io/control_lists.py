@@ -1,6 +1,7 @@
 """Control lists of others: what they lack, which axis is which, and what was understood."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -8,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.column_names import AXES, CONTROL_NAMES, WORDS, meant
+from mlscorr.io.column_names import AXES, CONTROL_NAMES, WORDS, OfficeWord, meant, same_word
 from mlscorr.io.layout_search import NUMBER
 from mlscorr.io.layouts import TableLayout
 from mlscorr.io.nearness import distance_of
+from mlscorr.io.open_places import OpenPlace, OpenQuestion
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.table_rows import read_rows
@@ -26,7 +28,19 @@ EXAMPLES = {
     **dict.fromkeys(SIGMAS, "sigma = [0.003, 0.004] (horizontal, vertical)"),
     **{"kind": 'kind = "circle"', "size": "size = 0.6"},
 }
+PLACES = {
+    **dict.fromkeys(
+        SIGMAS,
+        OpenPlace(("control", "sigma"), ([0.003, 0.004],), "m, one sigma: E and N each, height"),
+    ),
+    "kind": OpenPlace(("control", "kind"), tuple(WORDS["kind"]), "shape of all targets"),
+    "size": OpenPlace(("control", "size"), (0.6,), "m, diameter or edge of all targets"),
+}
 UNNAMED_AXES = ("x", "y")  # either may point east
+
+
+class AxesError(OpenQuestion):
+    """The trajectory does not tell which of X and Y is easting."""
 
 
 def lacking(names: Collection[str]) -> list[str]:
@@ -83,7 +97,7 @@ def complete(
     ValueError
         For what neither gives.
     """
-    columns, header = layout.columns, layout.header
+    columns = layout.columns
     needless = set() if set(group) <= set(columns) else set(group)
     if {"easting", "northing"} <= set(columns):
         needless.update(UNNAMED_AXES)
@@ -96,23 +110,132 @@ def complete(
     given = {name: value for name, value in given.items() if name not in present}
     missing = [name for name, value in given.items() if value is None]
     if missing:
-        used = {header[i] for i in columns.values()} if header else set()
+        layout = replace(layout, columns=columns)
         rows = [cells for _, cells in read_rows(layout)]
-        seeming = {
-            name: header[i] for name, i in _columns_of_words(layout, rows) if name in missing
-        }
-        sentence = missing_sentence(layout.path, header, missing, used, CONTROL_NAMES, seeming)
-        values = ", ".join(dict.fromkeys(EXAMPLES[name] for name in missing))
-        raise ValueError(
-            f"{sentence} A value for all points may stand under [control] in survey.toml, lengths "
-            f"in m: {values}."
-        )
+        if "size" in missing and _are_sized(layout, rows, section.meanings):
+            missing.remove("size")
+            del given["size"]
+    if missing:
+        raise _unstated(layout, rows, missing, section.meanings)
     return replace(layout, columns=columns), given
 
 
+def _are_sized(layout, rows, meanings):
+    """Whether the words in the column of kinds give each point its size."""
+    if "kind" not in layout.columns:
+        return False
+    words = (meanings.get(same_word(cell)) for cell in _cells(rows, layout.columns["kind"]))
+    return all(word is not None and word.size is not None for word in words)
+
+
+def _unstated(layout, rows, missing, meanings):
+    """The error on what neither a list nor survey.toml says of its points."""
+    header = layout.header
+    used = {header[i] for i in layout.columns.values()} if header else set()
+    seeming = {
+        name: header[i] for name, i in _columns_of_words(layout, rows, meanings) if name in missing
+    }
+    sentence = missing_sentence(layout.path, header, missing, used, CONTROL_NAMES, seeming)
+    values = ", ".join(dict.fromkeys(EXAMPLES[name] for name in missing))
+    sentence += (
+        f" A value for all points may stand under [control] in survey.toml, lengths in m: {values}."
+    )
+    places = []
+    if "kind" in missing and "kind" not in seeming and (column := _likely_kinds(layout, rows)):
+        seeming["kind"] = header[column]
+        words = {same_word(cell): cell for cell in _cells(rows, column)}
+        sentence += (
+            f" The column {shown(header[column])} holds {_first_words(list(words.values()))}: name "
+            "it as columns.kind, and give each word its meaning under [control] words."
+        )
+        places = word_places({("kind", cell): None for cell in words.values()})
+    elif "kind" in layout.columns:  # whose words are not known either
+        places = word_places(unknown_words(layout, rows, meanings))
+    examples = [OfficeWord.of(place.examples[0]) for place in places]
+    sizes = [word.size for word in examples if word.column == "kind"]
+    are_sized = bool(sizes) and None not in sizes
+    for name in missing:
+        if name in seeming:
+            key = ("control", "columns", name)
+            places.insert(0, OpenPlace(key, (seeming[name],), f"column of the {name}"))
+        elif not (name == "size" and are_sized) and PLACES[name] not in places:
+            places.append(PLACES[name])
+    return OpenQuestion(sentence, places)
+
+
+def _likely_kinds(layout, rows):
+    """Position of the one column that isn't used and holds few words, in all rows; else None."""
+    candidates = []
+    for i in layout.unused if layout.header else ():
+        words = {same_word(row[i]) if i < len(row) else "" for row in rows}
+        are_words = all(any(c.isalpha() for c in word) for word in words)
+        if are_words and 2 * len(words) <= len(rows):
+            candidates.append(i)
+    return candidates[0] if len(candidates) == 1 else None
+
+
+def _first_words(words):
+    """The first of some words, as a message can show them."""
+    limit = SETTINGS.named_faults
+    more = [f"and {len(words) - limit} more"] if len(words) > limit else []
+    return ", ".join([*map(shown, words[:limit]), *more])
+
+
+def unknown_words(
+    layout: TableLayout, rows: Sequence[Sequence[str]], meanings: Mapping[str, OfficeWord]
+) -> dict[tuple[str, str], None]:
+    """Pairs (column, word) of a list's roles and kinds that are not known, each once, in order.
+
+    Parameters
+    ----------
+    layout : TableLayout
+    rows : sequence of sequences of str
+        All cells.
+    meanings : mapping
+        As of ControlSection.
+    """
+    unknown: dict[tuple[str, str], str] = {}
+    for name, words in WORDS.items():
+        if name not in layout.columns:
+            continue
+        for row in rows:
+            cell = row[layout.columns[name]]
+            if meant(name, cell, meanings) not in words:
+                unknown.setdefault((name, same_word(cell)), cell)
+    return {(name, cell): None for (name, _), cell in unknown.items()}
+
+
+def word_places(words: Iterable[tuple[str, str]]) -> list[OpenPlace]:
+    """Places of survey.toml that give words of an office their meanings.
+
+    Parameters
+    ----------
+    words : iterable of (column, word)
+    """
+    places = []
+    for name, word in words:
+        examples = _likely_meanings(name, word)
+        places.append(OpenPlace(("control", "words", word), examples, f"{name} of such points"))
+    return places
+
+
+def _likely_meanings(name, word):
+    """Meanings that a word may have, the likeliest first."""
+    kinds = list(WORDS[name])
+    if name != "kind":
+        return tuple(kinds)
+    number = re.search(r"\d+(?:[.,]\d+)?", word)
+    size = float(number[0].replace(",", ".")) if number else 0.0
+    smallest, largest = SETTINGS.target_size
+    text = f" {size:g}" if smallest <= size <= largest else ""
+    named = [kind for kind in kinds if any(meant("kind", part) == kind for part in word.split())]
+    return tuple(f"{kind}{text}" for kind in dict.fromkeys([*named, *kinds]))
+
+
 def check_unused(
-    layout: TableLayout, rows: Sequence[Sequence[str]], given: Mapping[str, Any]
-) -> None:
+    layout: TableLayout, rows: Sequence[Sequence[str]], given: Mapping[str, Any],
+    meanings: Mapping[str, OfficeWord],
+) -> None:  # fmt: skip
     """Refuse a column that isn't used but holds roles or kinds, and others than are given.
 
     Parameters
@@ -122,20 +245,24 @@ def check_unused(
         All cells.
     given : mapping
         Name of a column to the value of all points.
+    meanings : mapping
+        As of ControlSection.
 
     Raises
     ------
-    ValueError
+    OpenQuestion
         Names column and name.
     """
-    for name, i in _columns_of_words(layout, rows):
+    for name, i in _columns_of_words(layout, rows, meanings):
         cells = {cell.casefold() for cell in _cells(rows, i)}
-        if {meant(name, cell) for cell in cells} != {given.get(name)}:
+        if {meant(name, cell, meanings) for cell in cells} != {given.get(name)}:
             column = shown(layout.header[i])
-            raise ValueError(
+            key = ("control", "columns", name)
+            raise OpenQuestion(
                 f"The column {column} of {layout.path} seems to be the {name}, for it holds "
                 f"{', '.join(sorted(cells))}: name it {name}, or say so under [control] in "
-                f"survey.toml, as columns.{name} = '{column}'."
+                f"survey.toml, as columns.{name} = '{column}'.",
+                [OpenPlace(key, (layout.header[i],), f"column of the {name}")],
             )
 
 
@@ -161,11 +288,11 @@ def role_doubts(layout: TableLayout, rows: Sequence[Sequence[str]]) -> Iterator[
             )
 
 
-def _columns_of_words(layout, rows):
+def _columns_of_words(layout, rows, meanings):
     """Pairs (role or kind, position of a column that isn't used and holds nothing but these)."""
     for name in (name for name in WORDS if name not in layout.columns):
         for i in layout.unused:
-            words = {meant(name, cell) for cell in _cells(rows, i)}
+            words = {meant(name, cell, meanings) for cell in _cells(rows, i)}
             if words and words <= set(WORDS[name]):
                 yield name, i
 
@@ -242,11 +369,14 @@ def _axes_east_and_north(layout, rows, trajectory):
     if near[0] != near[1]:
         return UNNAMED_AXES if near[0] else UNNAMED_AXES[::-1]
     x, y = (layout.name_of(axis) for axis in UNNAMED_AXES)
-    raise ValueError(
+    named = [OpenPlace(("control", "columns", our), (x, y), f"column of the {our}")
+             for our in AXES[:2]]  # fmt: skip
+    raise AxesError(
         f"{layout.path} does not say which of {x} and {y} is easting, for X points east here and "
         f"north there, and {'both orders lie' if near[0] else 'neither order lies'} within "
         f"{SETTINGS.near / 1e3:g} km of the trajectory. Name them easting and northing, or say "
-        "which is which under [control.columns] in survey.toml."
+        "which is which under [control.columns] in survey.toml.",
+        named if layout.header and near[0] else (),
     )
 
 

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from mlscorr.frames import angles_from_attitude
 from mlscorr.io.column_names import ANGLES, AXES
 from mlscorr.io.course import heading_and_course, median_difference
+from mlscorr.io.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion
 from mlscorr.io.projection import convergence_at, project
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_sections import TrajectorySection
@@ -101,8 +102,9 @@ def in_our_conventions(
 def _check_crs(path, what, crs):
     """Refuse what needs the CRS of the map where survey.toml has none."""
     if crs is None:
-        raise ValueError(
-            f"{path} has {what}: set crs in survey.toml to the projected CRS of cloud and control."
+        raise OpenQuestion(
+            f"{path} has {what}: set crs in survey.toml to the projected CRS of cloud and control.",
+            [PLACE_OF_CRS],
         )
 
 
@@ -161,9 +163,10 @@ def attitude_of_quaternions(
         if name == axes or (axes is None and is_upright and is_along):
             fitting.append((name, angles))
     if len(fitting) != 1:
-        raise ValueError(
+        raise OpenQuestion(
             f"{path} has quaternions whose body axes the course over ground does not tell: name "
-            f"them under [trajectory] in survey.toml, as axes = one of {', '.join(OUR_AXES)}."
+            f"them under [trajectory] in survey.toml, as axes = one of {', '.join(OUR_AXES)}.",
+            [OpenPlace(("trajectory", "axes"), tuple(OUR_AXES), "body axes of the quaternions")],
         )
     name, angles = fitting[0]
     rest = {key: values for key, values in table.items() if key not in QUATERNION}

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import angles_from_attitude
+from mlscorr.io.open_places import OpenPlace, OpenQuestion
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_systems import DAY
 from mlscorr.survey import Trajectory
@@ -101,11 +102,12 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
     radians = np.degrees(median_difference(heading, course))
     tolerance = SETTINGS.course_tolerance
     if np.abs(angles).max() <= 2 * np.pi and radians < tolerance <= degrees:
-        raise ValueError(
+        raise OpenQuestion(
             f"The angles of {path} seem to be radians where degrees belong: none exceeds 2 pi, "
             f"and the heading fits the course over ground to {radians:.1f} deg when taken as "
             f"radians, to {degrees:.1f} deg when taken as degrees. If so, write "
-            'angles = "rad" under [trajectory] in survey.toml.'
+            'angles = "rad" under [trajectory] in survey.toml.',
+            [OpenPlace(("trajectory", "angles"), ("rad", "deg"), "unit of the angles")],
         )
     beside = _folded(np.radians(heading) - course)  # of a turned POS it scatters as of any
     scatter = np.degrees(np.median(np.abs(_folded(beside - _middle(beside)))))
@@ -113,11 +115,12 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
     if (
         degrees > SETTINGS.course_offset and gon < scatter / 2
     ):  # a turned POS scatters as a car does
-        raise ValueError(
+        raise OpenQuestion(
             f"The angles of {path} seem to be gon where degrees belong: the heading fits the "
             f"course over ground to {gon:.1f} deg when taken as gon, to {degrees:.1f} deg when "
             'taken as degrees (medians). If so, write angles = "gon" under [trajectory] in '
-            "survey.toml."
+            "survey.toml.",
+            [OpenPlace(("trajectory", "angles"), ("gon", "deg"), "unit of the angles")],
         )
 
 

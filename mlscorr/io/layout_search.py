@@ -11,6 +11,7 @@ from pathlib import Path
 
 from mlscorr.io import layouts
 from mlscorr.io.column_names import UNITS, find_meanings, is_foreign, section_of, unit_of
+from mlscorr.io.open_places import OpenPlace, OpenQuestion
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX, read_sheets
@@ -165,9 +166,12 @@ def _check_doubled(layout, meanings, rows, section):
             way_out = f'choose, as {name} = "{doubled[0]}"'
             if len(set(doubled)) < len(doubled):
                 way_out = f"number all that are needed, as {name} = {positions[0] + 1},"
-            raise ValueError(
+            is_named = len(set(doubled)) == len(doubled)
+            place = OpenPlace((section, "columns", name), tuple(doubled), f"column of the {name}")
+            raise OpenQuestion(
                 f"{layout.path} has {len(doubled)} columns that may be the {name} "
-                f"({', '.join(doubled)}): {way_out} under [{section}.columns] in survey.toml."
+                f"({', '.join(doubled)}): {way_out} under [{section}.columns] in survey.toml.",
+                [place] if is_named else [],
             )
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import attitude_from_angles
+from mlscorr.io.open_places import PLACE_OF_CRS, OpenQuestion
 from mlscorr.io.opening import read_doubles
 from mlscorr.io.pof import POQ_SUFFIX, read_pof, read_poq
 from mlscorr.io.projection import project
@@ -119,9 +120,10 @@ def read_riegl(
 def _check_known(path, crs, kind):
     """Refuse geographic positions for which no CRS is given."""
     if crs is None:
-        raise ValueError(
+        raise OpenQuestion(
             f"{path} is {kind} with latitude and longitude: set crs in survey.toml "
-            'to the projected CRS of cloud and control, e.g. crs = "EPSG:32650".'
+            'to the projected CRS of cloud and control, e.g. crs = "EPSG:32650".',
+            [PLACE_OF_CRS],
         )
 
 

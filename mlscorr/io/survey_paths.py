@@ -11,11 +11,13 @@ from pathlib import Path
 from mlscorr.io.conversion import written_name
 from mlscorr.io.copies import find_copies
 from mlscorr.io.folder_roles import RESULTS
+from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import beside, files_like, is_folder, is_remote, is_there, resolved
 from mlscorr.io.survey_sections import PlannedSurveyFile, TrajectorySection
 from mlscorr.io.text_files import nearest
 from mlscorr.io.trajectory_sessions import SessionFile
 from mlscorr.survey import CloudFile, SurveyFileError
+from mlscorr.survey.summary import counted
 
 
 @dataclass(frozen=True)
@@ -246,20 +248,31 @@ def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> 
     ------
     ValueError
     """
+    places = [str(resolved(cloud)) for cloud in clouds]
+    place, count = Counter(places).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{key} of {path} names the file {place} ({count} times). Name it once.")
+    if copies := find_copies(clouds):
+        raise ValueError(_copies_sentence(path, key, copies))
     written = [written_name(cloud).casefold() for cloud in clouds]
-    kinds = {
-        "names the file": [str(resolved(cloud)) for cloud in clouds],
-        "has files whose results would have the same name:": written,
-    }
-    places = kinds["names the file"]
-    for kind, values in kinds.items():
-        value, count = Counter(values).most_common(1)[0]
-        if count > 1:
-            homonyms = {place for place, own in zip(places, values, strict=True) if own == value}
-            named = ": " * (value not in homonyms) + ", ".join(sorted(homonyms - {value})[:4])
-            raise ValueError(f"{key} of {path} {kind} {value} ({count} times){named}. Rename one.")
-    for copy, first in find_copies(clouds).items():
+    name, count = Counter(written).most_common(1)[0]
+    if count > 1:
+        homonyms = {place for place, own in zip(places, written, strict=True) if own == name}
         raise ValueError(
-            f"{key} of {path} names {copy}, which is a copy of {first}: all of its points "
-            "would count twice, as a pass of its own. Leave out one of the two."
+            f"{key} of {path} has files whose results would have the same name: {name} ({count} "
+            f"times): {', '.join(sorted(homonyms)[:4])}. Rename one."
         )
+
+
+def _copies_sentence(path: Path, key: str, copies: dict[Path, Path]) -> str:
+    """The sentence on clouds that hold the points of others, and on what to remove."""
+    limit = SETTINGS.named_faults
+    pairs = [f"{copy}, which is a copy of {first}" for copy, first in list(copies.items())[:limit]]
+    surplus = len(copies) - len(pairs)
+    more = f"; and {surplus} more" if surplus else ""
+    pronoun = "it" if len(copies) == 1 else "them"
+    return (
+        f"{key} of {path} names {counted(len(copies), 'copy')} of other clouds (the same number, "
+        f"bounds and times of points): {'; '.join(pairs)}{more}. Remove {pronoun} from {key}: each "
+        "point would count twice, as a pass of its own."
+    )

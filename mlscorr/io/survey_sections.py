@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 from scipy.spatial.transform import Rotation
 
+from mlscorr.io.column_names import OfficeWord, same_word
 from mlscorr.io.toml_file import TomlSection
 from mlscorr.survey import SEARCH_RADIUS, Mounting, Pos, Scanner
 
@@ -163,6 +164,7 @@ class ControlSection(TomlSection):
     size: Positive | None = None  # m
     sigma: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None  # m: E/N, H
     check: list[str] = Field(default_factory=list)  # names of check points, or patterns
+    words: dict[str, str] = Field(default_factory=dict)  # of an office: to "circle 0.6", "check"
     columns: ControlColumns = ControlColumns()
     # By what eastings and northings are multiplied; "ground": by the map's own factor there
     scale_factor: Annotated[float, Field(ge=0.99, le=1.01)] | Literal["ground"] | None = None
@@ -173,6 +175,16 @@ class ControlSection(TomlSection):
         if self.scale_origin is not None and self.scale_factor is None:
             raise ValueError('scale_origin needs a scale_factor: a number, or "ground"')
         return self
+
+    @model_validator(mode="after")
+    def _are_words_known(self) -> Self:
+        _ = self.meanings
+        return self
+
+    @property
+    def meanings(self) -> dict[str, OfficeWord]:
+        """Words of the office, without case and surplus blanks, with their meanings."""
+        return {same_word(word): OfficeWord.of(text) for word, text in self.words.items()}
 
 
 class ScannerSection(TomlSection):

@@ -8,6 +8,7 @@ import numpy as np
 from mlscorr.io.column_names import find_meanings, listed, plain, section_of
 from mlscorr.io.layout_search import NUMBER, check_chosen, find_layout, likely_header
 from mlscorr.io.layouts import TableLayout, head, not_text
+from mlscorr.io.open_places import OpenPlace, OpenQuestion
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.sheets import SUFFIX
@@ -97,6 +98,7 @@ def read_layout(
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
     hints: Mapping[tuple[str, str], str] | None = None,
+    hint_places: Mapping[tuple[str, str], OpenPlace] | None = None,
 ) -> TableLayout:  # fmt: skip
     """The layout of a table in our own columns, or of one as others write them.
 
@@ -110,6 +112,8 @@ def read_layout(
         See find_layout.
     hints : mapping, optional
         Name that is missing and one that is there to the sentence that says the way out.
+    hint_places : mapping, optional
+        The same to the place of survey.toml that is the way out.
 
     Returns
     -------
@@ -141,8 +145,16 @@ def read_layout(
             for (name, other), way_out in (hints or {}).items()
             if name in missing and other in meanings
         )
-        refusal = None if meanings else refusal  # names that are known are those of a table
-        raise refusal or ValueError(missing_sentence(path, header, missing, used, names) + ways_out)
+        if refusal and not meanings:  # names that are known are those of a table
+            raise refusal
+        places = [
+            place
+            for (name, other), place in (hint_places or {}).items()
+            if name in missing and other in meanings
+        ]
+        columns = [] if places or ways_out else _likely_places(header, missing, used, names)
+        sentence = missing_sentence(path, header, missing, used, names) + ways_out
+        raise OpenQuestion(sentence, [*places, *columns])
     return layout
 
 
@@ -194,6 +206,26 @@ def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
         )
 
 
+def _near_columns(others, missing, names):
+    """Our names with the column of others whose name is spelt like each."""
+    known = {name: our for our, words in names.items() for name in (plain(our), *words.split())}
+    near = {known.get(nearest(plain(cell), known) or ""): cell for cell in others}
+    near |= {name: cell for name in missing if (cell := nearest(name, others))}
+    if in_utc := [cell for cell in others if "utc" in cell.casefold()]:
+        near["gps_time"] = in_utc[0]
+    return near
+
+
+def _likely_places(header, missing, used, names):
+    """Places that name columns, where one of the header is spelt like each that is missing."""
+    others = [cell for cell in header if cell and cell not in used]
+    near = _near_columns(others, missing, names)
+    if not set(missing) <= set(near) or len({near[name] for name in missing}) < len(missing):
+        return []
+    keys = [(section_of(names), "columns", name) for name in missing]
+    return [OpenPlace(key, (near[key[-1]],), f"column of the {key[-1]}") for key in keys]
+
+
 def missing_sentence(
     path: str | Path, header: Sequence[str], missing: Sequence[str], used: Collection[str],
     names: Mapping[str, str], seeming: Mapping[str, str] | None = None,
@@ -214,12 +246,7 @@ def missing_sentence(
         Our name to the column whose cells are like it.
     """
     others = [cell for cell in header if cell and cell not in used]
-    known = {name: our for our, words in names.items() for name in (plain(our), *words.split())}
-    near = {known.get(nearest(plain(cell), known) or ""): cell for cell in others}
-    near |= {name: cell for name in missing if (cell := nearest(name, others))}
-    if in_utc := [cell for cell in others if "utc" in cell.casefold()]:
-        near["gps_time"] = in_utc[0]
-    near |= dict(seeming or {})
+    near = _near_columns(others, missing, names) | dict(seeming or {})
     candidates = [name for name in missing if name in near]
     hint, section = "", section_of(names)
     numbers = sum(NUMBER.fullmatch(cell) is not None for cell in header)

@@ -7,6 +7,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from mlscorr.io.open_places import check_answered
 from mlscorr.io.opening import read_bytes
 from mlscorr.io.storage import as_path, is_folder, is_there
 from mlscorr.io.text_files import ENCODING, nearest, shown, warn_of_cut
@@ -66,6 +67,7 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
         raise ValueError(
             f"{path} can't be read: brackets are nested too deep, or a number has too many digits."
         ) from None
+    check_answered(path, document)
     validated = validate(str(path), document, model)
     warn_of_cut(path)
     return validated

@@ -29,6 +29,7 @@ from mlscorr.io.conventions import (
 from mlscorr.io.layout_search import NUMBER, likely_header
 from mlscorr.io.layouts import TableLayout
 from mlscorr.io.positions import check_projected, position_file
+from mlscorr.io.open_places import OpenPlace, OpenQuestion
 from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.table_rows import read_numbers
 from mlscorr.io.tables import read_layout
@@ -42,6 +43,7 @@ POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
 ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
 SESSION = ("session",)  # of the POS, in a trajectory that was joined of several
 GRID, TRUE = "clockwise from grid north", "clockwise from true north"
+FROM_EAST = "counterclockwise from east"
 TUM = ("gps_time", *AXES, *QUATERNION)
 ORDER = re.compile(r"q.{0,3}|.*(quat|orient|rot).*|w")  # plain names of a quaternion's columns
 TIME_UNITS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}  # s
@@ -53,7 +55,12 @@ HINTS = {
     "or longitude where they are angles.",
     ("heading", "yaw"): (
         " Its yaw is a heading by convention only: say under [trajectory] in survey.toml how "
-        f'it counts, as heading = "counterclockwise from east" or "{GRID}".'
+        f'it counts, as heading = "{FROM_EAST}" or "{GRID}".'
+    ),
+}
+HINT_PLACES = {
+    ("heading", "yaw"): OpenPlace(
+        ("trajectory", "heading"), (FROM_EAST, GRID), "direction in which the yaw counts"
     ),
 }
 
@@ -95,7 +102,15 @@ def read_table(
 
     try:
         layout = read_layout(
-            path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, tum_columns, HINTS
+            path,
+            COLUMNS,
+            groups,
+            TRAJECTORY_NAMES,
+            lacking,
+            chosen,
+            tum_columns,
+            HINTS,
+            HINT_PLACES,
         )
     except ValueError as error:
         if isinstance(error, SurveyFileError) or not (other := position_file(path)):
@@ -229,10 +244,11 @@ def _place_in_degrees(path, layout, values, angles):
     if not place or not all(np.abs(degrees).max() <= np.pi for degrees in place.values()):
         return table  # within 3.14 deg of 0, 0 there is no land
     if angles != "rad":
-        raise ValueError(
+        raise OpenQuestion(
             f"{path} has latitudes and longitudes that seem to be radians: none exceeds pi. If so, "
             'write angles = "rad" under [trajectory] in survey.toml, or the unit behind the names '
-            "of these columns alone, as Lat [rad]."
+            "of these columns alone, as Lat [rad].",
+            [OpenPlace(("trajectory", "angles"), ("rad",), "unit of the angles")],
         )
     return table | {name: np.degrees(radians) for name, radians in place.items()}
 
@@ -242,9 +258,10 @@ def _usual_heading(layout, section):
     if "latitude" in layout.columns:
         return TRUE
     if not section.heading and set(map(plain, layout.header)) & TRUE_NORTH_USUAL:
-        raise ValueError(
+        raise OpenQuestion(
             f"{layout.path} was exported by Inertial Explorer, or by POSPac, whose headings count "
             "from true north unless the export takes the convergence off. Say which under "
-            f'[trajectory] in survey.toml: heading = "{TRUE}" or "{GRID}".'
+            f'[trajectory] in survey.toml: heading = "{TRUE}" or "{GRID}".',
+            [OpenPlace(("trajectory", "heading"), (TRUE, GRID), "direction of headings")],
         )
     return GRID

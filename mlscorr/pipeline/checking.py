@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.estimate import few_targets
+from mlscorr.estimate import SETTINGS, few_targets
+from mlscorr.estimate.inputs import checked_inputs
 from mlscorr.evaluate.beams import outside_warnings
 from mlscorr.evaluate.datum import DatumDifference, datum_differences
 from mlscorr.io.conversion import read_in_part
@@ -19,9 +20,10 @@ from mlscorr.io.projection import crs_code, crs_name
 from mlscorr.io.survey_file import read_survey
 from mlscorr.pipeline import needs
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
-from mlscorr.pipeline.near_points import check_control, no_control, reuse_warnings
+from mlscorr.pipeline.finding import find_control
+from mlscorr.pipeline.near_points import check_control, reuse_warnings
 from mlscorr.pipeline.quick_look import QuickLook, look_near_control
-from mlscorr.survey import Survey
+from mlscorr.survey import ControlPoints, Matched, Survey
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,8 @@ class CheckedSurvey:
         What was worked out, and what was looked at.
     unchecked : tuple of str
         What was not checked, and why.
+    is_searched : bool
+        Whether a control point was found and matched, as a correction needs one.
     read, written, needed : tuple of Amount
         Of a correction. Empty where a fault hides the survey.
     datum : tuple of DatumDifference
@@ -49,6 +53,7 @@ class CheckedSurvey:
     warnings: tuple[str, ...]
     notes: tuple[str, ...] = ()
     unchecked: tuple[str, ...] = ()
+    is_searched: bool = False
     read: tuple[needs.Amount, ...] = ()
     written: tuple[needs.Amount, ...] = ()
     needed: tuple[needs.Amount, ...] = ()
@@ -58,7 +63,8 @@ class CheckedSurvey:
 def check(path: str | Path) -> CheckedSurvey:
     """Check a survey in seconds: all of its faults at once, without correcting it.
 
-    Clouds are read by their headers, by times spread over them, and near some surveyed points.
+    Clouds are read by their headers, by times spread over them, and near some surveyed points. If
+    no control point is found there, they are read as a correction reads them.
 
     Parameters
     ----------
@@ -125,16 +131,19 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
             faults.warn(sentence)
     sample = faults.of("data", needs.sample_clouds, survey)
     faults.warn(*(sample.warnings if sample else ()))
-    probe, notes, unchecked = _looked(survey, faults, needs_control, is_beside)
+    probe, matched, is_searched, notes, unchecked = _looked(
+        survey, faults, needs_control, is_beside
+    )
     datum: tuple[DatumDifference, ...] = ()
-    if probe is not None:
-        datum = datum_differences(probe.matched, survey.trajectory, survey.pos, survey.crs)
+    if matched is not None:
+        datum = datum_differences(matched, survey.trajectory, survey.pos, survey.crs)
     faults.warn(*(difference.sentence for difference in datum))
     return CheckedSurvey(
         faults=tuple(faults.faults),
         warnings=tuple(faults.warnings),
         notes=(*survey.notes, *notes),
         unchecked=unchecked,
+        is_searched=is_searched,
         read=needs.amounts_read(survey, passes),
         written=needs.amounts_written(survey),
         needed=needs.amounts_needed(survey, sample, probe) if sample else (),
@@ -194,40 +203,60 @@ def _uncovered(survey, layouts) -> tuple[list[str], bool]:
 
 def _looked(
     survey: Survey, faults: Faults, needs_control: bool, is_beside: bool
-) -> tuple[QuickLook | None, list[str], tuple[str, ...]]:
-    """What a look at some targets shows, sentences on it, and on what was not looked at."""
+) -> tuple[QuickLook | None, Matched | None, bool, list[str], tuple[str, ...]]:
+    """Look for some targets.
+
+    Gives what that shows, whether a control point was found, and sentences on what was found and
+    on what was not looked at.
+    """
     if needs_control:
         faults.of("data", check_control, survey)
         faults.warn(*few_targets(len(survey.control)))
     faults.warn(*reuse_warnings(survey))
     if not len(survey.surveyed):
-        return None, [], ("Targets in the cloud: the survey has no control.",)
+        return None, None, False, [], ("Targets in the cloud: the survey has no control.",)
     if parts := [file.path.name for file in survey.clouds if read_in_part(file.path)]:
         reason = f"Targets in the cloud: {', '.join(parts)} was read by its first points only."
-        return None, [], (reason,)
+        return None, None, False, [], (reason,)
     problems = Faults()
     probe = problems.of("data", look_near_control, survey)
     if probe is None:
         reasons = tuple(f"Targets in the cloud: {fault.sentence}" for fault in problems.faults)
-        return None, [], reasons
-    matched = probe.matched
-    is_whole = len(probe.points) == len(survey.surveyed)
-    is_found = not set(survey.control.name).isdisjoint(matched.name)
-    is_none = needs_control and len(survey.control) and not is_found and (is_whole or is_beside)
-    if probe.fault or is_none:
-        words = no_control(survey, len(matched)) if len(matched) else probe.doubt
-        faults.add("data", probe.fault or words)
+        return None, None, False, [], reasons
+    faults.warn(*problems.warnings)
+    points, matched = probe.points, probe.matched
+    if probe.fault:
+        faults.add("data", probe.fault)
+    elif needs_control and len(survey.control) and probe.refusal:
+        if is_beside:
+            faults.add("data", probe.refusal)
+        else:
+            parts = faults.of("data", find_control, survey)
+            if parts is not None:
+                points, matched = survey.surveyed, parts[0] + parts[1]
     elif probe.doubt:
         faults.warn(probe.doubt)
-    faults.warn(*problems.warnings)
-    names, targets = probe.points.name, set(matched.name)
-    missing = f", not {', '.join(lost)}" if (lost := [n for n in names if n not in targets]) else ""
-    notes = [f"{len(targets)} of {len(names)} targets that were looked at are found{missing}."]
+    control = matched[np.isin(matched.name, survey.control.name)]
+    if len(control):
+        faults.of("data", checked_inputs, survey.trajectory, control, survey.pos, SETTINGS.order)
+    notes, unchecked = _found_notes(survey, points, matched)
+    return probe, matched, len(control) > 0, notes, unchecked
+
+
+def _found_notes(
+    survey: Survey, points: ControlPoints, matched: Matched
+) -> tuple[list[str], tuple[str, ...]]:
+    """Sentences on surveyed points that were found, and on those that were not looked at."""
+    names = set(matched.name)
+    lost = [name for name in points.name if name not in names]
+    missing = f", not {', '.join(lost)}" if lost else ""
+    notes = [f"{len(names)} of {len(points)} targets that were looked at are found{missing}."]
     if len(matched):
         middle = ", ".join(
             f"{axis} {value:+.3f}"
             for axis, value in zip("ENH", np.median(matched.misclosure, axis=0), strict=True)
         )
-        notes.append(f"In the median they are surveyed {middle} m beside the cloud.")
-    rest = f"Targets: {len(probe.points)} of {len(survey.surveyed)} were looked at."
-    return probe, notes, () if is_whole else (rest,)
+        notes.append(f"Median misclosure at these targets: {middle} m.")
+    if len(points) == len(survey.surveyed):
+        return notes, ()
+    return notes, (f"Targets: {len(points)} of {len(survey.surveyed)} were looked at.",)

@@ -9,6 +9,7 @@ from mlscorr.io.crs_checks import check_area
 from mlscorr.io.folder_roles import FileRole
 from mlscorr.io.las_crs import cloud_box, crs_conflict, stated_crs
 from mlscorr.io.nearness import check_together, far_cloud
+from mlscorr.io.open_places import PLACE_OF_CRS, OpenQuestion
 from mlscorr.io.projection import check_crs, crs_code, crs_name
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.pipeline.drives import Cloud, Drive, ambiguous
@@ -16,7 +17,7 @@ from mlscorr.survey import Trajectory
 
 
 def choose_control(
-    roles: list[FileRole], trajectory: Trajectory, given: Mapping
+    roles: list[FileRole], trajectory: Trajectory | None, given: Mapping
 ) -> tuple[Path | None, ControlList | None, dict[Path, str]]:
     """The control list near the trajectory, if there is one, and why others are not taken.
 
@@ -24,7 +25,8 @@ def choose_control(
     ----------
     roles : list of FileRole
         Of lists of points, and of tables that are nothing else.
-    trajectory : Trajectory
+    trajectory : Trajectory or None
+        None where it isn't known: then no list is far from it.
     given : mapping
         What is said under [control].
 
@@ -40,21 +42,26 @@ def choose_control(
             with warnings.catch_warnings(action="ignore"):
                 read = read_control(path, section, trajectory)
         except ValueError as error:
-            problems[path] = str(error)
+            problems[path] = error
             continue
         try:
-            check_together(path, read.control + read.check, trajectory)
+            if trajectory is not None:
+                check_together(path, read.control + read.check, trajectory)
             points[path] = read
         except ValueError as error:
             apart[path] = str(error)
     if len(points) + len(problems) > 1:
-        sentence = ambiguous("control", dict.fromkeys(points, "can be used") | problems)
-        raise ValueError(f"{sentence} Join those that belong together, with a column role.")
+        states = {path: str(error) for path, error in problems.items()}
+        question = ambiguous("control", dict.fromkeys(points, "can be used") | states)
+        sentence = f"{question} Join those that belong together, with a column role."
+        raise OpenQuestion(sentence, question.places)
     if points:
         path, read = next(iter(points.items()))
         return path, read, apart
+    if problems and not apart:
+        raise next(iter(problems.values()))
     if problems or apart:
-        raise ValueError(" ".join((*problems.values(), *apart.values())))
+        raise ValueError(" ".join((*map(str, problems.values()), *apart.values())))
     tables = [role for role in roles if role.role == "table"]
     if tables:
         raise ValueError(
@@ -89,7 +96,7 @@ def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[st
     elif drive.is_geographic:
         crs, reason = drive.zone, f"UTM zone of {drive.name}; no cloud states a CRS"
     elif drive.lack:
-        raise ValueError(drive.lack)
+        raise OpenQuestion(drive.lack, [PLACE_OF_CRS])
     else:
         _check_clouds(clouds, drive.recorded.trajectory, "map coordinates", "no file states a CRS")
         return None, "no file states it"

@@ -13,6 +13,7 @@ from pyproj import Transformer
 from mlscorr.io.folder_roles import FileRole
 from mlscorr.io.las import spread_records
 from mlscorr.io.las_layout import LasLayout
+from mlscorr.io.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion, places_of
 from mlscorr.io.poses import utm_zone
 from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.time_systems import TimeMatch, match_times
@@ -148,6 +149,7 @@ def choose_trajectory(
         Where none can be read and covers the clouds, and where several do.
     """
     drives, readable, refusals = {}, {}, {}
+    places: list[OpenPlace] = []
     for path in [role.path for role in roles if role.role == "trajectory"]:
         try:
             with warnings.catch_warnings(action="ignore"):  # said when the survey is read
@@ -157,15 +159,17 @@ def choose_trajectory(
             drives[path] = readable[path]
         except ValueError as error:
             refusals[path] = str(error)
+            places += places_of(error)
     joined = [*join_drives(list(readable.values()), clouds)]
     if len(joined) == 1:
         return joined[0], {p: why for p, why in refusals.items() if p not in joined[0].paths}
     if len(drives) == 1:
         return next(iter(drives.values())), refusals
     if drives:
-        raise ValueError(ambiguous("trajectory", dict.fromkeys(drives, ""), clouds))
+        raise ambiguous("trajectory", dict.fromkeys(drives, ""), clouds)
     overlap = _overlaps(list(readable.values()))
-    raise ValueError(" ".join((*overlap, *refusals.values())) or _no_trajectory(roles))
+    sentence = " ".join((*overlap, *refusals.values())) or _no_trajectory(roles)
+    raise OpenQuestion(sentence, places if len(refusals) == 1 else ())
 
 
 def _overlaps(drives):
@@ -243,17 +247,19 @@ def _read_drive(path, given):
     section = TrajectorySection.model_validate({**given, "file": path.name})
     try:
         return Drive((path,), section, read_sessions([SessionFile(path, None, section)]))
-    except ValueError as first:
-        lack = str(first)
-    if "crs" not in lack:
-        raise ValueError(lack)
+    except OpenQuestion as question:
+        if PLACE_OF_CRS not in question.places:
+            raise
+        lack = str(question)
     files = [read_sessions([SessionFile(path, None, section)], crs) for crs in WORLD]
     places = [file.trajectory.position[:, :2] for file in files]
     return Drive((path,), section, files[0], lack, not np.array_equal(*places))
 
 
-def ambiguous(what: str, candidates: Mapping[Path, str], clouds: Sequence[Cloud] = ()) -> str:
-    """A sentence on several files of one role.
+def ambiguous(
+    what: str, candidates: Mapping[Path, str], clouds: Sequence[Cloud] = ()
+) -> OpenQuestion:
+    """The question which of several files is meant.
 
     Parameters
     ----------
@@ -266,10 +272,11 @@ def ambiguous(what: str, candidates: Mapping[Path, str], clouds: Sequence[Cloud]
     """
     fit = f", which cover the {len(clouds)} cloud files alike" if clouds else ""
     listed = "; ".join(f"{path.name}{': ' * bool(why)}{why}" for path, why in candidates.items())
-    first, key = next(iter(candidates)).name, what if "." in what else f"{what}.file"
-    return (
-        f"{len(candidates)} files may be the {what}{fit} ({listed.rstrip('.')}). Say which, as "
-        f"--set '{key} = \"{first}\"', or move the others out of the folder."
+    keys = tuple(what.split(".")) if "." in what else (what, "file")
+    return OpenQuestion(
+        f"{len(candidates)} files may be the {what}{fit} ({listed.rstrip('.')}). Say which, or "
+        "move the others out of the folder.",
+        [OpenPlace(keys, tuple(map(str, candidates)), "file that is meant")],
     )
 
 
@@ -298,6 +305,6 @@ def choose_accuracy(roles: Iterable[FileRole], drive: Drive, crs: str | None) ->
             except ValueError:
                 continue
         if len(fitting) > 1:
-            raise ValueError(ambiguous("trajectory.accuracy", fitting))
+            raise ambiguous("trajectory.accuracy", fitting)
         chosen |= dict.fromkeys([path] if fitting else [], next(iter(fitting), None))
     return chosen

@@ -2,12 +2,14 @@
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from mlscorr.io.control import holds_points, read_control
 from mlscorr.io.control_faults import ListError
+from mlscorr.io.control_lists import AxesError
 from mlscorr.io.crs_checks import crs_notes
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import crs_conflict
@@ -169,15 +171,17 @@ def _control(path, section, trajectory: Trajectory | None, faults):
     if path is None or not faults.of("data", holds_points, path):
         return
     if trajectory is None:  # which tells X from Y in a list that does not
-        problems = Faults()
-        problems.of("data", read_control, path, section)
-        for fault in problems.faults:
-            if "km of the trajectory" not in fault.sentence:
-                faults.add(fault.where, fault.sentence, fault.number)
+        faults.of("data", _read_alone, path, section)
         return
     points = faults.of("data", read_control, path, section, trajectory)
     if points is not None:
         faults.of("data", check_together, path, points.control + points.check, trajectory)
+
+
+def _read_alone(path, section):
+    """Read the control without a trajectory, which would tell which of X and Y is easting."""
+    with suppress(AxesError):
+        read_control(path, section)
 
 
 def _cloud(path, trajectory, settings, crs, faults):

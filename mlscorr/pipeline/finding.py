@@ -96,6 +96,28 @@ def _checked(survey, targets, candidates, near):
     uncovered, sentences = tuple(near.beams.outside()), tuple(near.beams.warnings())
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=4)
+    finding = matched_finding(survey, targets, candidates, near)
+    names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
+    return replace(finding, scanned=names, warnings=sentences, uncovered=uncovered)
+
+
+def matched_finding(
+    survey: Survey, targets: list[PassTarget], candidates: Candidates, near: NearPoints
+) -> Finding:
+    """Match what fit_while_reading gives; this decides for ``check`` and ``correct`` alike.
+
+    Parameters
+    ----------
+    survey : Survey
+        With all of its surveyed points, also where only some were looked at.
+    targets, candidates, near
+        As fit_while_reading gives them.
+
+    Raises
+    ------
+    ValueError
+        When no target is found, or none of those found matches.
+    """
     if len(targets) == 0:
         raise ValueError(nothing_found(survey, candidates, near))
     finding = match_targets(targets, candidates, survey)
@@ -108,8 +130,7 @@ def _checked(survey, targets, candidates, near):
             f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
             f"were found ({near.intensity_range} there). {reasons} {questions[is_twice]}"
         )
-    names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
-    return replace(finding, scanned=names, warnings=sentences, uncovered=uncovered)
+    return finding
 
 
 def fit_while_reading(
@@ -233,10 +254,26 @@ def find_control(
     """
     check_control(survey)
     finding = find_targets(survey, rng, progress, read)
+    return *matched_by_role(survey, finding), finding
+
+
+def matched_by_role(survey: Survey, finding: Finding) -> tuple[Matched, Matched]:
+    """The matched control points, without which nothing is corrected, and the check points.
+
+    Parameters
+    ----------
+    survey : Survey
+    finding : Finding
+
+    Raises
+    ------
+    ValueError
+        Where no control point is matched.
+    """
     control, check = finding.matches.by_role(survey)
     if len(control) == 0:
         raise ValueError(no_control(survey, len(check)))
-    return control, check, finding
+    return control, check
 
 
 def find_or_compare_surfaces(

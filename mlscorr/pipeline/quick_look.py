@@ -8,11 +8,16 @@ import numpy as np
 
 from mlscorr.io.las_windows import read_windows
 from mlscorr.io.nearness import nearest_epochs
-from mlscorr.pipeline.finding import fit_while_reading, match_targets
+from mlscorr.pipeline.finding import (
+    fit_while_reading,
+    match_targets,
+    matched_by_role,
+    matched_finding,
+)
 from mlscorr.pipeline.near_points import NearPoints, nothing_found
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import ControlPoints, Matched, PointCloud, Survey
-from mlscorr.targets import Candidates, search_radius
+from mlscorr.targets import Candidates, PassTarget, search_radius
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,8 @@ class QuickLook:
         Those that were found.
     fault : str
         A sentence where another size or height finds them, empty otherwise.
+    refusal : str
+        The sentence with which a correction would end that saw no more than this; empty otherwise.
     doubt : str
         A sentence where few were found and nothing says why.
     seconds : float
@@ -36,6 +43,7 @@ class QuickLook:
     points: ControlPoints
     matched: Matched
     fault: str
+    refusal: str
     doubt: str
     seconds: float
 
@@ -43,8 +51,9 @@ class QuickLook:
 def look_near_control(survey: Survey) -> QuickLook:
     """Look for some targets of a survey where the vehicle passed them.
 
-    Where they are not found they are looked for with sizes doubled (radii may stand for diameters)
-    and with heights of the cloud.
+    What is found is matched with all surveyed points, as in a correction. Where targets are not
+    found they are looked for with sizes doubled (radii may stand for diameters) and with heights of
+    the cloud.
 
     Parameters
     ----------
@@ -56,19 +65,36 @@ def look_near_control(survey: Survey) -> QuickLook:
     ValueError
         Where the files are not in order of time, so that a look takes as long as reading them.
     """
+    whole = survey
     survey = replace(survey, control=spread_points(survey), check=survey.surveyed[[]])
     windows = {file: list(_near(survey, file)) for file in survey.clouds}
     survey = replace(survey, control=_affordable(survey, windows))
     start = perf_counter()
-    matched, candidates, near = _find(survey, windows)
+    fitted = _fit(survey, windows)
     seconds = (perf_counter() - start) / len(survey.control)
+    matched, refusal = _decided(whole, fitted)
+    matched = matched[np.isin(matched.name, survey.control.name)]
     fault = doubt = ""
     if 2 * len(set(matched.name)) < len(survey.control):
         fault = _with_sizes_doubled(survey, windows, matched) or _with_other_heights(
             survey, windows, matched
         )
-        doubt = "" if fault else _doubt(survey, matched, candidates, near)
-    return QuickLook(survey.control, matched, fault, doubt, seconds)
+        doubt = "" if fault else _doubt(survey, matched, *fitted[1:])
+    return QuickLook(survey.control, matched, fault, refusal, doubt, seconds)
+
+
+def _decided(survey, fitted):
+    """What of all surveyed points is matched, and the sentence where a correction refuses that."""
+    try:
+        finding = matched_finding(survey, *fitted)
+    except ValueError as error:
+        return Matched.none(), str(error)
+    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
+    try:
+        matched_by_role(survey, finding)
+    except ValueError as error:
+        return matched, str(error)
+    return matched, ""
 
 
 def spread_points(survey: Survey) -> ControlPoints:
@@ -89,7 +115,7 @@ def _affordable(survey, windows):
     single = replace(survey, control=points[len(points) // 2 :][:1])
     for _ in range(2):  # the first fit may have to be compiled
         start = perf_counter()
-        _find(single, windows)
+        _fit(single, windows)
         seconds = perf_counter() - start
         if seconds <= share:
             return points
@@ -121,18 +147,23 @@ def _spans(survey):
     return np.column_stack([trajectory.gps_time[starts], trajectory.gps_time[ends]])
 
 
-def _find(survey, windows) -> tuple[Matched, Candidates, NearPoints]:
-    """The surveyed points that are found in what was read."""
-    targets, candidates, near = fit_while_reading(survey, lambda file: iter(windows[file]))
+def _fit(survey, windows) -> tuple[list[PassTarget], Candidates, NearPoints]:
+    """Targets near surveyed points, fitted in what was read."""
+    return fit_while_reading(survey, lambda file: iter(windows[file]))
+
+
+def _find(survey, windows) -> Matched:
+    """Surveyed targets that are found in what was read."""
+    targets, candidates, _ = _fit(survey, windows)
     matches = match_targets(targets, candidates, survey).matches
-    return Matched.by_name(matches.matched, survey.control), candidates, near
+    return Matched.by_name(matches.matched, survey.control)
 
 
 def _with_sizes_doubled(survey, windows, matched):
     """A sentence where sizes are radii."""
     points = survey.control
     doubled = replace(points, size=2 * points.size)
-    refit = _find(replace(survey, control=doubled), windows)[0]
+    refit = _find(replace(survey, control=doubled), windows)
     if not _is_better(refit, matched, points):
         return ""
     return (
@@ -149,7 +180,7 @@ def _with_other_heights(survey, windows, matched):
     if not np.isfinite(above) or abs(above) < survey.search_radius / 2:
         return ""
     lowered = replace(points, position=points.position - [0.0, 0.0, above])
-    refit = _find(replace(survey, control=lowered), windows)[0]
+    refit = _find(replace(survey, control=lowered), windows)
     if not _is_better(refit, matched, points):
         return ""
     shift = above + refit.misclosure[:, 2]

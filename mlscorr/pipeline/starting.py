@@ -1,7 +1,10 @@
-"""``init``: a survey.toml of what lies in a folder; what is ambiguous is named, never guessed."""
+"""``init``: a survey.toml of what lies in a folder; what is ambiguous is named, never guessed.
+
+Each question is answered by an example for the time being, so that reading goes on to the next: all
+of them are asked at once, and their places in survey.toml are left open.
+"""
 
 import os
-import re
 import warnings
 from collections import Counter
 from collections.abc import Mapping
@@ -11,15 +14,23 @@ from typing import Any
 
 import numpy as np
 
+from mlscorr.io.control import holds_points, read_control
+from mlscorr.io.control_lists import AxesError
 from mlscorr.io.conversion import is_foreign, recorded_points
 from mlscorr.io.copies import find_copies
 from mlscorr.io.folder_roles import SIMULATED, FileRole, sort_files
 from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
+from mlscorr.io.open_places import (
+    PLACE_OF_CRS,
+    OpenPlace,
+    OpenQuestion,
+    places_of,
+)
 from mlscorr.io.output import output_file
 from mlscorr.io.preparation import glance
 from mlscorr.io.survey_file import FILE_NAME, read_survey
-from mlscorr.io.survey_sections import PlannedSurveyFile
+from mlscorr.io.survey_sections import ControlSection, PlannedSurveyFile
 from mlscorr.io.toml_file import validate
 from mlscorr.pipeline.choice import choose_control, choose_crs
 from mlscorr.pipeline.drives import Cloud, choose_accuracy, choose_trajectory
@@ -29,13 +40,10 @@ from mlscorr.pipeline.survey_text import SurveyText
 from mlscorr.survey import PointCloud, Trajectory
 from mlscorr.survey.summary import counted
 
-SECTION = re.compile(rf"(?<!\[)\[({'|'.join(PlannedSurveyFile.model_fields)})(\.columns)?\]")
-VALUE = re.compile(r"""(?<![\w.])([\w.]+) = ("[^"]+"|'[^']+'|\[[^]]+\]|\d+(?:\.\d+)?)""")
-
 
 @dataclass(frozen=True)
 class StartedSurvey:
-    """A survey.toml that can be read, and what each file of the folder is.
+    """A survey.toml that can be read once its open places are filled in, and the role of each file.
 
     Parameters
     ----------
@@ -46,12 +54,18 @@ class StartedSurvey:
         ``none`` and ``table`` are not used.
     notes : tuple of str
         What reading it says.
+    questions : tuple of str
+        A sentence on all that only the user knows.
+    places : tuple of OpenPlace
+        Where text is still open: what answers the questions.
     """
 
     path: Path
     text: str
     roles: tuple[FileRole, ...]
     notes: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
+    places: tuple[OpenPlace, ...] = ()
 
     def write(self) -> Path:
         """Write survey.toml, whole or not at all; returns its path.
@@ -90,8 +104,7 @@ def init(
     Raises
     ------
     ValueError
-        Where survey.toml is there, where files are missing, ambiguous or do not fit, with what is
-        to be added.
+        Where survey.toml is there, where files are missing or do not fit, with what is to be added.
     OSError
         Where the folder of out is not there.
 
@@ -110,63 +123,155 @@ def init(
     _check_free(path)
     if not path.parent.is_dir():
         raise OSError(f"{path.parent} is no folder, so {path.name} can't be written there.")
-    try:
-        with glance():
-            text, roles = _text(folder, path, given, sort_files(folder))
-            return StartedSurvey(path, text, tuple(roles), _read_notes(path, text))
-    except ValueError as error:
-        raise ValueError(f"{error}{_hint(str(error))} Nothing was written.") from None
+    _validate(given)
+    answers = _Answers(folder, given)
+    with glance():
+        roles = sort_files(folder)
+        while True:
+            try:
+                _ask_of_control(folder, answers, roles)
+                text, used = _text(folder, path, answers, roles)
+                notes = () if answers.is_crs_open else _read_notes(path, text.render(False))
+                break
+            except ValueError as error:
+                answers.add(error)
+    notes = () if answers.places else notes  # on examples
+    return StartedSurvey(
+        path, str(text), tuple(used), notes, tuple(answers.questions), answers.places
+    )
+
+
+class _Answers:
+    """What the user says, and an example in place of all that only the user knows.
+
+    Parameters
+    ----------
+    folder : Path
+    given : mapping
+    """
+
+    def __init__(self, folder, given):
+        self.folder, self.given = folder, _copied(given)
+        self.questions: list[str] = []
+        self.open: dict[str, OpenPlace] = {}
+
+    @property
+    def places(self):
+        """Open places, in the order in which they were met."""
+        return tuple(self.open.values())
+
+    @property
+    def is_crs_open(self):
+        """Whether no example can be given of the CRS: what lies in it is not compared then."""
+        return PLACE_OF_CRS.key in self.open
+
+    def add(self, error):
+        """Take a question and its examples; raises ValueError where it can't be answered so."""
+        places = [self._in_folder(place) for place in places_of(error)]
+        if not places or any(place.key in self.open for place in places):
+            raise ValueError(self._refusal(error)) from None
+        self.questions.append(str(error))
+        for place in places:
+            self.open[place.key] = place
+            if place.examples:
+                _put_nested(self.given, place.keys, place.examples[0])
+
+    def _refusal(self, error):
+        """The sentence on a fault that nothing in survey.toml mends, after the questions."""
+        if not self.questions:
+            return f"{error} Nothing was written."
+        options = " ".join(place.option for place in self.places)
+        others = " ".join(self.questions)
+        return f"{error} To be said besides: {others} {options} Nothing was written."
+
+    def _in_folder(self, place):
+        """A place whose examples are files, named from the folder."""
+        if place.keys[-1] not in ("file", "accuracy"):
+            return place
+        names = [Path(os.path.relpath(name, self.folder)).as_posix() for name in place.examples]
+        return replace(place, examples=tuple(names))
+
+
+def _copied(given):
+    """Nested tables that can be changed."""
+    return {key: _copied(v) if isinstance(v, Mapping) else v for key, v in given.items()}
+
+
+def _put_nested(document, keys, value):
+    """Put a value into nested tables."""
+    for key in keys[:-1]:
+        document = document.setdefault(key, {})
+    document[keys[-1]] = value
 
 
 def _check_free(path):
     if path.exists():
-        raise ValueError(f"{path} is there already; move it, or write another with -o FILE.")
+        raise ValueError(
+            f"{path} is there already. Fill in what is open in it, move it, or write another with "
+            "-o FILE."
+        )
 
 
-def _hint(sentence):
-    """How what a sentence wants in a survey.toml, which is not there yet, is said to init."""
-    section, value = SECTION.findall(sentence), VALUE.findall(sentence)
-    if "survey.toml" not in sentence or "--set" in sentence or not (section or value):
-        return ""
-    key, example = value[-1] if value else ("KEY", "VALUE")
-    where = f"{''.join(section[-1])}." if section else ""
-    example = example.replace("'", '"')
-    return f" survey.toml is not there yet: say it here, as --set '{where}{key} = {example}'."
+def _ask_of_control(folder, answers, roles):
+    """Meet the questions of the one list of control points, whatever the trajectory is."""
+    lists = _roles(folder, answers.given, "control", roles)
+    lists = [role.path for role in lists if role.role == "control" and holds_points(role.path)]
+    if len(lists) != 1:
+        return
+    section = ControlSection.model_validate(
+        {**answers.given.get("control", {}), "file": lists[0].name}
+    )
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            read_control(lists[0], section)
+    except AxesError:
+        return  # the trajectory may tell
+    except OpenQuestion as question:
+        if question.places:
+            raise
 
 
-def _text(folder, path, given, roles):
-    """The text, and the roles with those that are not taken."""
-    _validate(given)
+def _text(folder, path, answers, roles):
+    """The SurveyText, and the roles with those that are not taken."""
+    given = answers.given
     clouds = _clouds(folder, given, roles)
-    copies = find_copies(cloud.layout.cloud for cloud in clouds)
-    clouds = [cloud for cloud in clouds if cloud.layout.cloud not in copies]
     drive, late = choose_trajectory(
         _roles(folder, given, "trajectory", roles), clouds, given.get("trajectory", {})
     )
-    crs, why_crs = choose_crs(clouds, drive, given.get("crs"))
-    accuracy = choose_accuracy([r for r in roles if r.role == "accuracy"], drive, crs)
-    trajectory = drive.read(crs, accuracy)
+    crs, why_crs = None, "to be given"
+    if not answers.is_crs_open:
+        crs, why_crs = choose_crs(clouds, drive, given.get("crs"))
+    copies = find_copies(cloud.layout.cloud for cloud in sorted(clouds, key=_preference))
+    clouds = [cloud for cloud in clouds if cloud.layout.cloud not in copies]
+    if answers.is_crs_open:
+        accuracy, trajectory, near = {}, drive.recorded.trajectory, None
+    else:
+        accuracy = choose_accuracy([r for r in roles if r.role == "accuracy"], drive, crs)
+        trajectory = near = drive.read(crs, accuracy)
     control, points, apart = choose_control(
-        _roles(folder, given, "control", roles), trajectory, given.get("control", {})
+        _roles(folder, given, "control", roles), near, given.get("control", {})
     )
     refusals = late | apart
     refusals |= {
-        copy: f"a copy of {first.name}, and would count twice" for copy, first in copies.items()
+        copy: f"the same points as {first.name}, which would count twice"
+        for copy, first in copies.items()
     }
     roles = [replace(role, role="none", reason=refusals[role.path]) if role.path in refusals
              else role for role in roles]  # fmt: skip
-    text = SurveyText(given)
+    text = SurveyText(given, answers.places)
     text.put("", "name", folder.resolve().name, "of the folder")
-    if crs is not None:
-        text.put("", "crs", crs, why_crs)
+    if crs is not None or answers.is_crs_open:
+        text.put("", "crs", crs or "", why_crs)
     else:
         text.note("", f'crs = "EPSG:..."  of cloud and control: {why_crs}')
     _put_clouds(text, path, clouds, trajectory)
     _note_sources(text, clouds)
     _put_sessions(text, path, drive, accuracy)
     if control is not None:
-        text.put("control", "file", _name(path, control), _targets(points))
-    rate = _rate(clouds[0], trajectory)
+        is_known = not any(place.keys[0] == "control" for place in answers.places)
+        number = counted(len(points.control + points.check), "point")
+        text.put("control", "file", _name(path, control), _targets(points) if is_known else number)
+    rate = None if near is None else _rate(clouds[0], trajectory)
     if rate is not None:
         text.put("scanner", "lines_per_second", round(rate, 1), f"gps_time of {clouds[0].name}")
     meshes = [role.path for role in roles if role.role == "reference"]
@@ -174,7 +279,7 @@ def _text(folder, path, given, roles):
         text.put("scene", "reference", _name(path, meshes[0]), "the only mesh")
     elif meshes:
         text.note("scene", f"One of {', '.join(mesh.name for mesh in meshes)}:")
-    return str(text), roles
+    return text, roles
 
 
 def _validate(given):
@@ -213,6 +318,12 @@ def _clouds(folder, given, roles):
     reasons += [f"{folder} holds no cloud of its own, and {role.path} is {SIMULATED}: give that "
                 "folder." for role in roles if role.reason == SIMULATED]  # fmt: skip
     return clouds or _no_cloud(folder, reasons)
+
+
+def _preference(cloud):
+    """Rank of a cloud among copies: a LAS or LAZ in order of time is read soonest."""
+    is_in_order = (np.diff(cloud.times) >= 0).all()
+    return is_foreign(cloud.layout.cloud), not is_in_order, str(cloud.layout.cloud)
 
 
 def _no_cloud(folder, reasons=()):

@@ -1,12 +1,17 @@
 """The text of a survey.toml: what is known with why, what is not known as comments."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import tomlkit
 
+from mlscorr.io.open_places import MARK, OpenPlace
+
 COLUMN = 40  # characters, behind which comments start
 HEAD = "# Made by mlscorr init. Lines behind # are not known, or need not be: docs/survey.md."
+OPEN = f'# Replace each "{MARK}" with its value: until then check and correct refuse this file.'
+TABLES = ("control.words",)  # keys whose value is a table, not a section
 OPTIONAL = {
     "trajectory": ['# accuracy = "smrmsg.out"       # of an SBET, or a POQ of a POF'],
     "control": [
@@ -34,6 +39,32 @@ OPTIONAL = {
 }
 
 
+@dataclass(frozen=True)
+class _Line:
+    """A key with its value, why, and the open places in its value."""
+
+    key: str
+    value: Any
+    reason: str
+    places: tuple[OpenPlace, ...] = ()
+
+    def text(self, is_marked):
+        """The line as survey.toml has it, its open places marked or with an example."""
+        value, reason = self.value, self.reason
+        if is_marked and self.places:
+            reason = "; ".join(dict.fromkeys(map(str, self.places)))
+            value = MARK
+            if isinstance(self.value, Mapping):
+                marks = {place.keys[-1]: MARK for place in self.places}
+                value = dict(self.value) | marks
+        item = tomlkit.item(value)
+        if isinstance(value, Mapping):
+            item = tomlkit.inline_table()
+            item.update(value)
+        line = f"{self.key} = {item.as_string()}"
+        return f"{line:<{COLUMN - 1}} # {_shown(reason)}"
+
+
 class SurveyText:
     """Lines of a survey.toml by section, in the order of docs/survey.md.
 
@@ -41,12 +72,15 @@ class SurveyText:
     ----------
     given : mapping
         What the user says: goes before all that is put, and is written though nothing is put.
+    places : sequence of OpenPlace
+        Those of given that the user has still to say: given holds an example of each.
     """
 
-    def __init__(self, given: Mapping[str, Any]):
+    def __init__(self, given: Mapping[str, Any], places: Sequence[OpenPlace] = ()):
         self.given = _flat(given)
+        self.places = tuple(places)
         names = ("", "cloud", *OPTIONAL)
-        self.lines: dict[str, list[str]] = {name: [] for name in names}
+        self.lines: dict[str, list[str | _Line]] = {name: [] for name in names}
         self.keys: dict[str, set[str]] = {name: set() for name in names}
         self.entries: dict[str, int] = {}
 
@@ -82,8 +116,9 @@ class SurveyText:
         if dotted in self.given:
             value, reason = self.given.pop(dotted), "as given"
         self.keys.setdefault(section, set()).add(key)
-        line = f"{key} = {tomlkit.item(value).as_string()}"
-        self.lines.setdefault(section, []).append(f"{line:<{COLUMN - 1}} # {_shown(reason)}")
+        keys = (*section.split(" ")[:1], *key.split(".")) if section else tuple(key.split("."))
+        places = tuple(place for place in self.places if place.keys[: len(keys)] == keys)
+        self.lines.setdefault(section, []).append(_Line(key, value, reason, places))
 
     def note(self, section: str, sentence: str) -> None:
         """Write a comment.
@@ -95,16 +130,30 @@ class SurveyText:
         self.lines[section].append(f"# {_shown(sentence)}")
 
     def __str__(self) -> str:
+        return self.render(is_marked=True)
+
+    def render(self, is_marked: bool) -> str:
+        """The whole text.
+
+        Parameters
+        ----------
+        is_marked : bool
+            Whether open places are marked; else they hold their examples, so that it can be read.
+        """
         for section in self.entries:  # said of each entry
             self.given = {k: v for k, v in self.given.items() if not k.startswith(f"{section}.")}
         for dotted in list(self.given):
             section, _, key = dotted.partition(".") if "." in dotted else ("", "", dotted)
             self.put(section, key, self.given[dotted], "")
-        parts = [HEAD, *self.lines.pop("")]
-        for section, lines in self.lines.items():
+        texts = {
+            section: [line if isinstance(line, str) else line.text(is_marked) for line in lines]
+            for section, lines in self.lines.items()
+        }
+        parts = [HEAD, *[OPEN] * bool(is_marked and self.places), *texts.pop("")]
+        for section, lines in texts.items():
             keys, count = self.keys.get(section, set()), self.entries.get(section, 0)
             for number in range(count):
-                parts += ["", f"[[{section}]]", *self.lines[f"{section} {number}"]]
+                parts += ["", f"[[{section}]]", *texts[f"{section} {number}"]]
             if count or section.partition(" ")[0] in self.entries:
                 continue
             unknown = [
@@ -119,7 +168,8 @@ def _flat(given, prefix=""):
     flat = {}
     for key, value in given.items():
         dotted = f"{prefix}{key}"
-        flat |= _flat(value, f"{dotted}.") if isinstance(value, Mapping) else {dotted: value}
+        is_section = isinstance(value, Mapping) and dotted not in TABLES
+        flat |= _flat(value, f"{dotted}.") if is_section else {dotted: value}
     return flat
 
 

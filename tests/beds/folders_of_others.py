@@ -24,6 +24,7 @@ from mlscorr.io.trajectory import read_trajectory, write_trajectory_csv
 from mlscorr.io.trajectory_exports import export_trajectory
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import Trajectory
+from tests.beds.checked import verdicts
 from tests.beds.foreign_clouds import points_of, write_e57, write_ply
 from tests.beds.las_crs import add_crs
 from tests.beds.pof import geographic, pof_bytes, poq_bytes
@@ -80,7 +81,8 @@ class OthersFolder:
     """How a folder is made, and what is true of it.
 
     ``sentence``: what init says, None where it needs nothing; ``given`` and ``mend``: what that
-    sentence asks for; ``clouds``: names of what is corrected; ``control`` points that are used.
+    sentence asks for; ``clouds``: names of what is corrected; ``control`` points that are used;
+    ``fault``: what check finds and correct refuses alike, None where both pass.
     """
 
     name: str
@@ -91,6 +93,7 @@ class OthersFolder:
     clouds: tuple[str, ...] = ("pass-1.las", "pass-2.las")
     control: int = 4
     check: int = 1
+    fault: str | None = None
 
 
 # ---- parts of folders
@@ -203,6 +206,15 @@ def german(folder, bed):
     poses(folder / "Trajektorie.txt", names, bed, separator=";", decimal=",", encoding="cp1252")
     names = ["Punkt-Nr.", "Rechtswert", "Hochwert", "Höhe"]
     places(folder / "Passpunkte.csv", names, bed, separator=";", decimal=",", encoding="cp1252")
+
+
+def office(folder, bed):
+    "Kinds with their sizes, and roles, in words of an office"
+    rows = [(*point[:4], "Scheibe 0,6", "Kontrolle" if point[4] == "check" else "Pass")
+            for point in bed.points]  # fmt: skip
+    names = ["Punkt", "Rechtswert", "Hochwert", "Höhe", "Bemerkung", "Rolle"]
+    form = ["{}", *["{:.4f}"] * 3, "{}", "{}"]
+    table(folder / "Passpunkte.csv", names, rows, form, ";", ",", "cp1252")
 
 
 def french(folder, bed):
@@ -383,6 +395,19 @@ def uppercase(folder, bed):
         path.rename(folder / path.name.upper())
 
 
+def surveyed_twice(folder, bed):
+    "By two epochs of GNSS, as P1 and P1.1"
+    again = [(f"{name}.1", *rest) for name, *rest in bed.points]
+    control_csv(folder, bed, points=[*bed.points, *again])
+
+
+def in_two_encodings(folder, bed):
+    "LAS beside LAZ"
+    las(folder, bed)
+    for path in bed.clouds:
+        laspy.read(path).write(folder / f"{path.stem}.laz")
+
+
 def remove(name):
     return lambda folder, _: (folder / name).unlink()
 
@@ -410,6 +435,12 @@ FOLDERS = (
             ("Spanish", (spanish,)),
             ("Chinese", (chinese,)),
         )
+    ),
+    OthersFolder(
+        "words of an office", others(las, trajectory_csv, office),
+        'Bemerkung holds Scheibe 0,6: .*control.words.Kontrolle = ',
+        {"control.columns.kind": "Bemerkung", "control.sigma": [0.003, 0.004],
+         "control.words": {"Scheibe 0,6": "circle 0.6", "Pass": "control", "Kontrolle": "check"}},
     ),
     OthersFolder("workbook", others(las, trajectory_csv, workbook), NAMED, SIZE),
     OthersFolder(
@@ -479,6 +510,11 @@ FOLDERS = (
         "control in feet", others(las, trajectory_csv, in_feet), "feet", mend=control_csv
     ),
     OthersFolder(
+        "each point surveyed twice", others(las, trajectory_csv, surveyed_twice),
+        fault="Is each point named twice",
+    ),
+    OthersFolder("LAS beside LAZ", others(in_two_encodings, trajectory_csv, control_csv)),
+    OthersFolder(
         "uppercase endings", uppercase, clouds=("PASS-1.LAS", "PASS-2.LAS")
     ),
 )  # fmt: skip
@@ -488,9 +524,21 @@ def nested_tables(given):
     "Tables of dotted keys"
     document = {}
     for key, value in given.items():
-        section, _, name = key.rpartition(".")
-        (document.setdefault(section, {}) if section else document)[name] = value
+        *sections, name = key.split(".")
+        table = document
+        for section in sections:
+            table = table.setdefault(section, {})
+        table[name] = value
     return document
+
+
+def asked(folder):
+    "Questions of init and the options that answer them, or what it refuses a folder by"
+    try:
+        begun = mlscorr.init(folder)
+    except ValueError as error:
+        return str(error)
+    return " ".join([*begun.questions, *(place.option for place in begun.places)])
 
 
 def started(case, folder):
@@ -502,12 +550,8 @@ def started(case, folder):
     case.make(folder, bed())
     with warnings.catch_warnings(action="ignore"):
         if case.sentence is not None:
-            try:
-                mlscorr.init(folder)
-            except ValueError as error:
-                assert re.search(case.sentence, str(error)), str(error)
-            else:
-                raise AssertionError("init says nothing")
+            said = asked(folder)
+            assert re.search(case.sentence, said), said or "init says nothing"
         if case.mend is not None:
             case.mend(folder, bed())
         return mlscorr.init(folder, given=nested_tables(case.given)).write()
@@ -524,16 +568,28 @@ def check_result(case, survey, out):
     assert seen == (case.control, case.check), seen
 
 
+def check_verdicts(case, survey, out):
+    "That check passes what correct corrects, and finds the fault that correct refuses"
+    if case.fault is None:
+        with warnings.catch_warnings(action="ignore"):
+            checked = mlscorr.check(survey)
+        assert checked.is_searched and not checked.faults, checked
+        check_result(case, survey, out)
+        return
+    said = verdicts(survey)
+    assert len(said.faults) == 1 and re.search(case.fault, said.faults[0]), said
+    assert said.refusal == said.faults[0], said
+
+
 def outcome(case, place):
     "What comes out of a folder: a result, a sentence and then a result, or what is wrong"
     try:
         survey = started(case, place / case.name)
-        with warnings.catch_warnings(action="ignore"):
-            faults = mlscorr.check(survey).faults
-        assert not faults, faults
-        check_result(case, survey, place / f"{case.name} out")
+        check_verdicts(case, survey, place / f"{case.name} out")
     except (AssertionError, ValueError, OSError) as error:
         return f"{type(error).__name__}: {error}"
+    if case.fault is not None:
+        return "fault of both"
     return "result" if case.sentence is None else "sentence, result"
 
 
@@ -545,5 +601,5 @@ if __name__ == "__main__":
         for case in chosen:
             outcomes.append(outcome(case, Path(place)))
             print(f"{case.name:40} {outcomes[-1]}", flush=True)
-    right = sum(outcome in ("result", "sentence, result") for outcome in outcomes)
+    right = sum(outcome in ("result", "sentence, result", "fault of both") for outcome in outcomes)
     print(f"{right} of {len(outcomes)} give a result, or the right sentence and then a result")

@@ -10,6 +10,7 @@ from mlscorr.frames import attitude_from_angles
 from mlscorr.io.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, WORDS, plain
 from mlscorr.io.control import COLUMNS, holds_points, read_control
 from mlscorr.io.control_faults import ListError
+from mlscorr.io.open_places import OpenQuestion
 from mlscorr.io.survey_sections import ControlSection
 from mlscorr.io.toml_file import read_toml
 from mlscorr.survey import KINDS, Trajectory
@@ -176,7 +177,7 @@ def test_words_of_the_field_are_roles_and_kinds(drive, tmp_path):
     [
         (
             "Kontrolpunkt",
-            r"unknown role 'kontrolpunkt'; known are control .*kontrollpunkt.*检查点.\.$",
+            r"unknown role 'kontrolpunkt'; known are control .*kontrollpunkt.*检查点.\. Say under",
         ),
         (
             "CP",
@@ -384,3 +385,52 @@ def test_letters_that_come_late_are_read_too(encoding, tmp_path):
     content = "\n".join(["name,easting,northing,height", *lines, ""])
     points = read(tmp_path, content, None, encoding)[0]
     assert len(points) == 400 and points.name[299] == name
+
+
+# ---- words of an office
+
+OFFICE = {"Scheibe 0,6": "circle 0.6", "Tafel": "square 0.5", "Kontr.": "check"}
+PLACE = "532012.5;3373991;44.5"
+
+
+def office(**given):
+    "What survey.toml says of all points"
+    return ControlSection(file="", sigma=[0.003, 0.004], words=OFFICE, **given)
+
+
+def read_office(tmp_path, drive, text, **given):
+    path = tmp_path / "office.csv"
+    path.write_text(text)
+    return read_control(path, office(**given), drive)
+
+
+def test_words_of_an_office_give_kinds_sizes_and_roles(drive, tmp_path):
+    "In any case, width and number of blanks; other words keep the meanings that they always have"
+    rows = f"P1;{PLACE};SCHEIBE  0,6;GCP\nP2;{PLACE};tafel;kontr.\n"
+    points = read_office(tmp_path, drive, f"Punkt;E;N;H;Art;Rolle\n{rows}")
+    assert (points.control.kind, points.check.kind) == (("circle",), ("square",))
+    assert (points.control.size, points.check.size) == ([0.6], [0.5])
+
+
+def test_a_size_in_a_word_goes_before_that_of_all_points(drive, tmp_path):
+    "And a column of sizes that says another one is a fault with both numbers"
+    points = read_office(tmp_path, drive, f"Punkt;E;N;H;Art\nP1;{PLACE};Tafel\n", size=0.4)
+    assert points.control.size == [0.5]
+    with pytest.raises(ValueError, match=r"size 0\.6 m, and the word .* 0\.5 m"):
+        read_office(tmp_path, drive, f"Punkt;E;N;H;Art;size\nP1;{PLACE};Tafel;0.6\n")
+
+
+@pytest.mark.parametrize("meaning", ["ball 0.6", "circle big", "check 0.6", ""])
+def test_a_meaning_that_is_none_is_refused(meaning):
+    "A kind with its size or a role; all of them are named"
+    with pytest.raises(ValueError, match=r"is no meaning of a word: give a kind \(circle"):
+        ControlSection(file="", words={"Ball": meaning})
+
+
+def test_an_unknown_word_is_a_question_with_its_place(drive, tmp_path):
+    "The key under [control] words, with a likely meaning by what stands in the word"
+    with pytest.raises(OpenQuestion, match="unknown kind 'kreuz 0,3'") as error:
+        text = f"Punkt;E;N;H;Art\nP1;{PLACE};Tafel\nP2;{PLACE};Kreuz 0,3\n"
+        read_office(tmp_path, drive, text, size=0.4)
+    (place,) = error.value.places
+    assert place.key == 'control.words."Kreuz 0,3"' and place.examples[0] == "circle 0.3"

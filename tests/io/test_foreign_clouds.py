@@ -319,15 +319,18 @@ def test_what_cannot_be_used_is_refused(write, message, tmp_path, request):
 
 
 @pytest.mark.long
-def test_a_cloud_and_its_copy_in_another_format_are_named(street, tmp_path):
-    "Both would be written as pass-1.laz: init names them and takes none"
+def test_of_a_cloud_and_its_copy_in_another_format_the_laz_is_taken(street, tmp_path):
+    "A PLY of the same points: init leaves it out, and a survey.toml that names both is refused"
     folder = shutil.copytree(street, tmp_path / "survey")
     (folder / FILE_NAME).unlink()
     write_ply(folder / "pass-1.ply", points_of(folder / "pass-1.laz"))
-    with pytest.raises(ValueError, match=r"results would have the same name: pass-1\.laz"):
-        mlscorr.init(folder)
-    document = mlscorr.init(folder, given={"cloud": {"files": ["*.laz"]}})
-    assert '"*.laz"' in document.text
+    started = mlscorr.init(folder)
+    reasons = {role.path.name: role.reason for role in started.roles if role.role == "none"}
+    assert "the same points as pass-1.laz" in reasons["pass-1.ply"]
+    path = started.write()
+    path.write_text(started.text.replace('"pass-1.laz"', '"pass-1.laz", "pass-1.ply"'))
+    with pytest.raises(ValueError, match=r"pass-1\.ply, which is a copy of .*pass-1\.laz\. Remove"):
+        mlscorr.read_survey(path)
 
 
 @pytest.mark.parametrize(("largest", "expected"), [(255, 65_535), (65_535, 65_535)])

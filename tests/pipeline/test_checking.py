@@ -291,3 +291,32 @@ def test_a_fault_is_kept_once_and_where_it_is(tmp_path):
     assert [fault.where for fault in faults.faults] == ["survey.toml"]
     faults.of("data", (tmp_path / "none").read_text)
     assert faults.faults[-1].where == "system"
+
+
+def test_points_that_are_surveyed_twice_are_a_fault_as_in_a_correction(street, tmp_path):
+    "More of them than are looked at, each as P and P.1: nothing tells which of the two was seen"
+    folder = shutil.copytree(street, tmp_path / "survey", ignore=shutil.ignore_patterns("truth.*"))
+    header, *rows = (folder / "control.csv").read_text().splitlines()
+    again = [row.replace(",", ".1,", 1) for row in rows]
+    (folder / "control.csv").write_text("\n".join([header, *rows, *again]) + "\n")
+    assert 2 * len(rows) > 8
+    with warnings.catch_warnings(action="ignore"):
+        (fault,) = mlscorr.check(folder).faults
+        with pytest.raises(ValueError, match="Is each point named twice") as refused:
+            mlscorr.correct(mlscorr.read_survey(folder), ties="off")
+    assert fault.sentence == str(refused.value)
+
+
+def test_a_check_without_a_look_at_targets_does_not_pass_them(survey):
+    "Points of a long file out of order: no target is looked for, and the last line says so"
+    cloud = laspy.read(survey / "pass-1.laz")
+    rows = np.random.default_rng(1).permutation(np.resize(np.arange(len(cloud.points)), 510_000))
+    cloud.points = cloud.points[rows]
+    (survey / "pass-1.laz").unlink()
+    cloud.write(survey / "pass-1.las")
+    edit(survey / "survey.toml", "pass-1.laz", "pass-1.las")
+    result = CliRunner().invoke(app, ["check", str(survey)])
+    assert result.exit_code == 0, result.stderr
+    assert "pass-1.las are not in order of time" in result.stderr
+    words = "No fault in what was checked, .*; no control point was found, see Not checked."
+    assert re.match(words, result.stderr.splitlines()[-1])

@@ -48,6 +48,7 @@ def check_project(path: str | Path) -> CheckedSurvey:
         warnings=(*faults.warnings, *_all("warnings", checked)),
         notes=_notes(checked),
         unchecked=(*_all("unchecked", checked), "Which drives ties join: their clouds tell."),
+        is_searched=any(each.is_searched for _, each in checked),
         read=_with_control(_sums([each.read for _, each in checked]), project),
         written=_sums([each.written for _, each in checked]),
         needed=_sums([each.needed for _, each in checked]),
