@@ -28,8 +28,8 @@ from mlscorr.io.conventions import (
 )
 from mlscorr.io.layout_search import NUMBER, likely_header
 from mlscorr.io.layouts import TableLayout
-from mlscorr.io.positions import check_projected, position_file
 from mlscorr.io.open_places import OpenPlace, OpenQuestion
+from mlscorr.io.positions import check_projected, position_file
 from mlscorr.io.survey_sections import TrajectorySection
 from mlscorr.io.table_rows import read_numbers
 from mlscorr.io.tables import read_layout

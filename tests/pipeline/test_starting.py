@@ -441,7 +441,7 @@ ASKED = {  # what is written, words of the question, and the keys that are open
     ),
     "a time by another name": (
         write("trajectory.csv", HEADER.replace("gps_time", "gps_timestamp") + trajectory()),
-        ["gps_time may be meant by 'timestamp'", 'column of the gps_time: "timestamp"'],
+        ["gps_time may be meant by 'gps_timestamp'", 'column of the gps_time: "gps_timestamp"'],
         ["trajectory.columns.gps_time"],
     ),
     "a yaw": (
