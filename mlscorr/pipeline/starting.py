@@ -18,6 +18,7 @@ from mlscorr.io.las import read_chunks
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.output import output_file
 from mlscorr.io.preparation import glance
+from mlscorr.io.storage import files_like
 from mlscorr.io.survey_file import FILE_NAME, read_survey
 from mlscorr.io.survey_sections import PlannedSurveyFile
 from mlscorr.io.toml_file import validate
@@ -202,7 +203,7 @@ def _clouds(folder, given, roles):
     """Clouds of a folder. Raises ValueError where one is damaged, or there is none."""
     names = given.get("cloud", {}).get("files")
     if names is not None:
-        files = [path for name in names for path in sorted(folder.glob(name))]
+        files = [path for name in names for path in files_like(folder, name)]
         return [Cloud(read_layout(path)) for path in files] or _no_cloud(folder)
     damaged = [role.reason for role in roles if role.role == "none"
                and role.path.suffix.lower() in (".las", ".laz")]  # fmt: skip
