@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.las_points import decoding_points, read_records
+from mlscorr.io.noise import count_noise
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_order import in_time_order
@@ -74,10 +75,11 @@ def read_chunks(
     first: int = 0,
     end: int | None = None,
 ) -> Iterator[PointCloud]:
-    """Points of a cloud file by chunks, in file order, withheld points among them.
+    """Points of a cloud file by chunks, in file order, for all that measures.
 
-    Those of a COPC come in order of time. Points whose gps_time is not a number are left out:
-    nothing places them on the trajectory.
+    Those of a COPC come in order of time. Points are left out that are flagged as noise: withheld,
+    or of one of the file's noise_classes; and those whose gps_time is not a number: nothing places
+    them on the trajectory.
 
     Parameters
     ----------
@@ -99,8 +101,14 @@ def read_chunks(
     """
     layout = in_time_order(read_layout(cloud_file.path))
     scale, offset = layout.scale, layout.offset
+    flagged = read = 0
     for whole in read_records(layout, chunk_size, first, end):
         records = whole[cloud_file.rows(whole["point_source_id"])]
+        read += len(records)
+        is_noise = layout.is_noise(records, cloud_file.noise_classes)
+        if is_noise.any():
+            flagged += int(np.count_nonzero(is_noise))
+            records = records[~is_noise]
         xyz = np.empty((len(records), 3))
         for axis, name in enumerate("XYZ"):
             np.multiply(records[name], scale[axis], out=xyz[:, axis])
@@ -110,6 +118,8 @@ def read_chunks(
         is_timed = np.isfinite(times)
         if is_timed.any():
             yield cloud if is_timed.all() else cloud[is_timed]
+    is_whole = first == 0 and end in (None, layout.points)
+    count_noise(cloud_file, None if is_whole else (first, end or layout.points), flagged, read)
 
 
 def sha256(path: str | Path) -> str:

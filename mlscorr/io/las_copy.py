@@ -36,13 +36,14 @@ class CorrectedPart:
     sigma : PointSigma, optional
         Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
     watch : function, optional
-        Called with the gps_time (n,) of each chunk that is done, in the trajectory's system.
+        Called for each chunk that is done with the gps_time (n,) in the trajectory's system, and
+        with which points are flagged as noise (n,).
     """
 
     file: CloudFile
     correction: Correcting
     sigma: PointSigma | None = None
-    watch: Callable[[np.ndarray], object] | None = None
+    watch: Callable[[np.ndarray, np.ndarray], object] | None = None
 
     def move(self, layout: LasLayout, records: np.ndarray, sigmas: np.ndarray | None) -> int:
         """Correct its points among records in place; returns those outside the trajectory.
@@ -68,7 +69,8 @@ class CorrectedPart:
         if not isinstance(rows, slice):  # which is a view
             records[rows] = some
         if self.watch is not None and len(some):
-            self.watch(some["gps_time"] + self.file.time_constant)
+            is_noise = layout.is_noise(some, self.file.noise_classes)
+            self.watch(some["gps_time"] + self.file.time_constant, is_noise)
         return outside
 
 

@@ -14,6 +14,7 @@ from mlscorr.io.las import spread_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box, crs_conflict, stated_crs
 from mlscorr.io.nearness import far_cloud
+from mlscorr.io.noise import counted_noise
 from mlscorr.io.preparation import glance
 from mlscorr.io.projection import crs_code, crs_name
 from mlscorr.io.survey_file import read_survey
@@ -119,9 +120,11 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
             faults.add("data", sentence)
         elif sentence:  # by a header, which may be wrong
             faults.warn(sentence)
-    sample = faults.of("data", needs.sample_clouds, survey)
-    faults.warn(*(sample.warnings if sample else ()))
-    probe, notes, unchecked = _looked(survey, faults, needs_control, is_beside)
+    with counted_noise() as noise:
+        sample = faults.of("data", needs.sample_clouds, survey)
+        faults.warn(*(sample.warnings if sample else ()))
+        probe, notes, unchecked = _looked(survey, faults, needs_control, is_beside)
+    notes += filter(None, [noise.sentence])
     return CheckedSurvey(
         faults=tuple(faults.faults),
         warnings=tuple(faults.warnings),

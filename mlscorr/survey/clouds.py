@@ -8,6 +8,8 @@ import numpy as np
 
 from mlscorr.survey.columns import Columns
 
+NOISE_CLASSES = (7, 18)  # low point (noise) and high noise: ASPRS LAS 1.4 R15, point classes
+
 
 @dataclass(frozen=True, repr=False)
 class PointCloud(Columns):
@@ -48,6 +50,8 @@ class CloudFile:
     time_system : str
     point_source_ids : tuple of int, optional
         Of the points; without it all of the file.
+    noise_classes : tuple of int
+        Classes whose points take no part in a measurement, as withheld points take none.
     """
 
     path: Path
@@ -55,6 +59,7 @@ class CloudFile:
     time_constant: float
     time_system: str
     point_source_ids: tuple[int, ...] | None = None
+    noise_classes: tuple[int, ...] = NOISE_CLASSES
 
     @property
     def name(self) -> str:
