@@ -18,6 +18,7 @@ from mlscorr.io.noise import count_noise
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_order import in_time_order
+from mlscorr.io.time_systems import lacks_time
 from mlscorr.survey import CloudFile, PointCloud
 
 
@@ -34,9 +35,7 @@ def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
     is_standard : bool
         Whether the header says adjusted standard GPS time, not seconds of week.
     times : (65 or fewer,) array
-        gps_time of points spread over the file, first and last among them, in file order, but
-        those that are not a number.
-        Units: s.
+        gps_time of points spread over the file, in file order, that have one. Units: s.
 
     Raises
     ------
@@ -44,8 +43,18 @@ def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
         When the file is missing, not LAS, cut off, or without gps_time.
     """
     layout = read_layout(path)
-    times = spread_records(layout)[1]["gps_time"]
-    return layout.points, layout.is_standard, times[np.isfinite(times)]
+    return layout.points, layout.is_standard, timed_records(layout)["gps_time"]
+
+
+def timed_records(layout: LasLayout) -> np.ndarray:
+    """Records of points spread over a file that have a time; (0,) where none has.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    """
+    records = spread_records(layout)[1]
+    return records[~lacks_time(records["gps_time"])]
 
 
 def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:

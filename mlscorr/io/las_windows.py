@@ -9,6 +9,7 @@ from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_order import in_time_order
+from mlscorr.io.time_systems import lacks_time
 from mlscorr.survey import CloudFile, PointCloud
 
 
@@ -43,7 +44,10 @@ def read_windows(
         return
     places, records = spread_records(layout)
     times = records["gps_time"]
-    if not (np.diff(times) >= 0).all():
+    if not (np.diff(times) >= 0).all():  # because of points without a time, perhaps
+        is_timed = ~lacks_time(times)
+        places, times = places[is_timed], times[is_timed]
+    if len(times) < 2 or not (np.diff(times) >= 0).all():
         raise ValueError(
             f"The points of {file.path.name} are not in order of time: where a time stands in it "
             "is known only once all are read."

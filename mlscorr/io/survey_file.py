@@ -301,7 +301,9 @@ def cloud_file(
     times = records["gps_time"][file.rows(records["point_source_id"])] + layout.time_offset
     if not len(times) and (chunk := next(read_chunks(file), None)) is not None:  # too few of them
         times = chunk.gps_time
-    match = match_times(path.name, times, layout.is_standard, trajectory, setting)
+    match = match_times(
+        path.name, times, layout.is_standard, trajectory, setting, layout.time_offset
+    )
     if crs is not None and (conflict := crs_conflict(layout, crs)):
         warnings.warn(conflict, stacklevel=3)
     constant = match.constant + layout.time_offset

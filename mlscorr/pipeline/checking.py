@@ -10,7 +10,7 @@ from mlscorr.estimate import few_targets
 from mlscorr.evaluate.beams import outside_warnings
 from mlscorr.evaluate.datum import datum_warnings
 from mlscorr.io.conversion import read_in_part
-from mlscorr.io.las import spread_records
+from mlscorr.io.las import timed_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box, crs_conflict, stated_crs
 from mlscorr.io.nearness import far_cloud
@@ -159,7 +159,7 @@ def _placed_times(survey) -> tuple[int, list[str]]:
     """Number of passes that times spread over the files lie in; sentences on those outside."""
     passes, outside = 0, []
     for file in survey.clouds:
-        records = spread_records(read_layout(file.path))[1]
+        records = timed_records(read_layout(file.path))
         times = records["gps_time"][file.rows(records["point_source_id"])] + file.time_constant
         if not len(times):
             continue

@@ -234,7 +234,7 @@ def _put_clouds(text, path, clouds, trajectory):
     spans, passes, systems = [], 0, Counter()
     for cloud in clouds:
         match = cloud.match(trajectory, text.given.get("cloud.gps_time", "auto"))
-        times = cloud.times[np.isfinite(cloud.times)] + match.constant
+        times = cloud.known_times + match.constant
         segment = trajectory.segment(times)
         passes += len(set(segment[segment >= 0].tolist()))
         spans.append((times.min(), times.max()))
