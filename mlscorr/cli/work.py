@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mlscorr.cli.progress import Progress, progress_bars
-from mlscorr.cli.terminal import Exit, deafen, exit_code
+from mlscorr.cli.terminal import Exit, deafen, exit_code, say
 
 
 @contextmanager
@@ -46,6 +46,7 @@ def work(
         before = _entries(out)
     with (
         exit_code(Exit.BAD_DATA, lambda: _entries(out) != before),
+        _noise_said(),
         progress_bars() as progress,
         announced(progress),
     ):
@@ -55,6 +56,19 @@ def work(
             check_unchanged(states)  # the likelier cause
             raise
     deafen()
+
+
+@contextmanager
+def _noise_said():
+    """Say in the end how many points were left out as noise, where there were any."""
+    from mlscorr.io.noise import counted_noise
+
+    with counted_noise() as noise:
+        try:
+            yield
+        finally:
+            if noise.sentence:
+                say(noise.sentence)
 
 
 def _entries(out):

@@ -7,7 +7,7 @@ import numpy as np
 from mlscorr.evaluate.settings import SETTINGS
 from mlscorr.frames import to_scanner
 from mlscorr.io.settings import SETTINGS as IO
-from mlscorr.io.time_systems import utc_lag
+from mlscorr.io.time_systems import lacks_time, listed_times, utc_lag
 from mlscorr.survey import CloudFile, PointCloud, Survey
 
 
@@ -58,8 +58,17 @@ class BeamCheck:
 
     def outside(self) -> Iterator[str]:
         """A sentence on each file with points outside the trajectory."""
-        for file, times in self.times.items():
-            yield from outside_warnings(self.survey, file, np.concatenate([[], *times]))
+        for file, parts in self.times.items():
+            times = np.concatenate([[], *parts])
+            is_missing = lacks_time(times - file.time_constant)
+            if is_missing.any():
+                values = listed_times((times - file.time_constant)[is_missing])
+                yield (
+                    f"{is_missing.sum()} of {len(times)} points sampled from {file.name} have "
+                    f"gps_time {values}: they were written without times, and stay as they are "
+                    "(exit code 4). Export them with gps_time, or remove them."
+                )
+            yield from outside_warnings(self.survey, file, times[~is_missing])
 
     def warnings(self) -> Iterator[str]:
         """A sentence on each file whose beams can't have been measured so."""

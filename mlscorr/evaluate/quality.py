@@ -26,6 +26,7 @@ COUNTS = {
     "coverage.points_outside_control": "points outside the control span",
     "coverage.points_corrected": "corrected points",
     "coverage.points_untouched": "points that were left as they were",
+    "coverage.points_noise": "points flagged as noise",
     "coverage.points_extrapolated": "points whose correction is extrapolated",
     "coverage.share_extrapolated": "share of the points whose correction is extrapolated (0 to 1)",
     "coverage.seconds_extrapolated": "time whose correction is extrapolated (s)",

@@ -24,7 +24,7 @@ from mlscorr.io.ply_clouds import open_ply
 from mlscorr.io.preparation import looked_points, progress_of, temporary_folder
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import file_state, is_remote
-from mlscorr.io.time_systems import ADJUSTMENT
+from mlscorr.io.time_systems import ADJUSTMENT, NO_TIMES, lacks_time
 from mlscorr.survey import CloudFile, PointCloud
 from mlscorr.survey.clouds import WEEK
 
@@ -155,7 +155,8 @@ def _convert(source, target, limit):
             _check_extent(source.path, block.xyz - first.xyz[0])
             intensity = np.zeros(number) if block.intensity is None else block.intensity
             intensity = _in_16_bits((np.nan_to_num(intensity) - base) * gain)
-            cloud = PointCloud(block.xyz, block.gps_time - taken, intensity)
+            is_timed = ~np.isin(block.gps_time, NO_TIMES)
+            cloud = PointCloud(block.xyz, block.gps_time - taken * is_timed, intensity)
             colours = np.zeros((number, 3)) if block.colours is None else block.colours
             colours = _in_16_bits(colours * (LARGEST / source.colour_limit))
             laz.write(cloud, colours=colours if has_colours else None)
@@ -216,6 +217,8 @@ def _time_system(path, times):
             f"{path} has times of {np.abs(times).max():.6g}, which count milli-, micro- or "
             "nanoseconds: export them in seconds."
         )
+    if not lacks_time(times).all():
+        times = times[~lacks_time(times)]
     is_week = times.min() >= 0 and times.max() <= 2 * WEEK
     return not is_week, ADJUSTMENT if times.min() >= ADJUSTMENT else 0.0
 

@@ -12,6 +12,7 @@ from mlscorr.io.control_lists import lacking, unnamed_columns
 from mlscorr.io.conventions import QUATERNION
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.layout_search import NUMBER, find_layout, likely_header
+from mlscorr.io.patterns import folders_below
 from mlscorr.io.ply import announced_faces
 from mlscorr.io.pof import POF_SUFFIX, POQ_SUFFIX
 from mlscorr.io.positions import POSITION_SUFFIX, position_file
@@ -61,23 +62,16 @@ def sort_files(folder: Path) -> list[FileRole]:
     list of FileRole
     """
     left_out: list[FileRole] = []
-    places = list(_places(folder, left_out, SETTINGS.folder_depth))
+
+    def is_wanted(place):
+        reasons = [reason for name, reason in LEFT_OUT.items() if (place / name).exists()]
+        left_out.extend(FileRole(place, "none", reason) for reason in reasons[:1])
+        return not reasons
+
+    places = list(folders_below(folder, SETTINGS.folder_depth, is_wanted))
     files = [path for place in places for path in sorted(place.iterdir()) if path.is_file()]
     roles = [_role(path) for path in files if path.name[0] not in ".~" and path.suffix != ".toml"]
     return roles + left_out
-
-
-def _places(folder, left_out, depth) -> Iterator[Path]:
-    """A folder and those within it that are not hidden; what is left out goes into its list."""
-    yield folder
-    for path in sorted(folder.iterdir()) if depth else ():
-        if not path.is_dir() or path.name[0] == ".":
-            continue
-        reasons = [reason for name, reason in LEFT_OUT.items() if (path / name).exists()]
-        if reasons:
-            left_out.append(FileRole(path, "none", reasons[0]))
-        else:
-            yield from _places(path, left_out, depth - 1)
 
 
 def _role(path) -> FileRole:

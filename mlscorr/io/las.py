@@ -14,9 +14,11 @@ from numpy.typing import ArrayLike
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.las_points import decoding_points, read_records
+from mlscorr.io.noise import count_noise
 from mlscorr.io.opening import open_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_order import in_time_order
+from mlscorr.io.time_systems import lacks_time
 from mlscorr.survey import CloudFile, PointCloud
 
 
@@ -33,9 +35,7 @@ def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
     is_standard : bool
         Whether the header says adjusted standard GPS time, not seconds of week.
     times : (65 or fewer,) array
-        gps_time of points spread over the file, first and last among them, in file order, but
-        those that are not a number.
-        Units: s.
+        gps_time of points spread over the file, in file order, that have one. Units: s.
 
     Raises
     ------
@@ -43,8 +43,18 @@ def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
         When the file is missing, not LAS, cut off, or without gps_time.
     """
     layout = read_layout(path)
-    times = spread_records(layout)[1]["gps_time"]
-    return layout.points, layout.is_standard, times[np.isfinite(times)]
+    return layout.points, layout.is_standard, timed_records(layout)["gps_time"]
+
+
+def timed_records(layout: LasLayout) -> np.ndarray:
+    """Records of points spread over a file that have a time; (0,) where none has.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    """
+    records = spread_records(layout)[1]
+    return records[~lacks_time(records["gps_time"])]
 
 
 def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
@@ -74,10 +84,11 @@ def read_chunks(
     first: int = 0,
     end: int | None = None,
 ) -> Iterator[PointCloud]:
-    """Points of a cloud file by chunks, in file order, withheld points among them.
+    """Points of a cloud file by chunks, in file order, for all that measures.
 
-    Those of a COPC come in order of time. Points whose gps_time is not a number are left out:
-    nothing places them on the trajectory.
+    Those of a COPC come in order of time. Points are left out that are flagged as noise: withheld,
+    or of one of the file's noise_classes; and those whose gps_time is not a number: nothing places
+    them on the trajectory.
 
     Parameters
     ----------
@@ -99,8 +110,14 @@ def read_chunks(
     """
     layout = in_time_order(read_layout(cloud_file.path), cloud_file.new_week)
     scale, offset = layout.scale, layout.offset
+    flagged = read = 0
     for whole in read_records(layout, chunk_size, first, end):
         records = whole[cloud_file.rows(whole["point_source_id"])]
+        read += len(records)
+        is_noise = layout.is_noise(records, cloud_file.noise_classes)
+        if is_noise.any():
+            flagged += int(np.count_nonzero(is_noise))
+            records = records[~is_noise]
         xyz = np.empty((len(records), 3))
         for axis, name in enumerate("XYZ"):
             np.multiply(records[name], scale[axis], out=xyz[:, axis])
@@ -110,6 +127,8 @@ def read_chunks(
         is_timed = np.isfinite(times)
         if is_timed.any():
             yield cloud if is_timed.all() else cloud[is_timed]
+    is_whole = first == 0 and end in (None, layout.points)
+    count_noise(cloud_file, None if is_whole else (first, end or layout.points), flagged, read)
 
 
 def sha256(path: str | Path) -> str:

@@ -21,6 +21,7 @@ from mlscorr.io.opening import open_file
 from mlscorr.io.output import PART, output_file
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.storage import is_remote
+from mlscorr.io.time_systems import PLACEHOLDERS
 from mlscorr.survey import CloudFile, Correcting, PointCloud
 
 
@@ -36,13 +37,14 @@ class CorrectedPart:
     sigma : PointSigma, optional
         Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
     watch : function, optional
-        Called with the gps_time (n,) of each chunk that is done, in the trajectory's system.
+        Called for each chunk that is done with the gps_time (n,) in the trajectory's system, and
+        with which points are flagged as noise (n,).
     """
 
     file: CloudFile
     correction: Correcting
     sigma: PointSigma | None = None
-    watch: Callable[[np.ndarray], object] | None = None
+    watch: Callable[[np.ndarray, np.ndarray], object] | None = None
 
     def move(self, layout: LasLayout, records: np.ndarray, sigmas: np.ndarray | None) -> int:
         """Correct its points among records in place; returns those outside the trajectory.
@@ -69,7 +71,8 @@ class CorrectedPart:
         if not isinstance(rows, slice):  # which is a view
             records[rows] = some
         if self.watch is not None and len(some):
-            self.watch(times + self.file.time_constant)
+            is_noise = layout.is_noise(some, self.file.noise_classes)
+            self.watch(times + self.file.time_constant, is_noise)
         return outside
 
 
@@ -113,11 +116,14 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
             writer.write(corrected.blocks, file)
             output.complete(writer.head, corrected.bounds * layout.scale + layout.offset)
         _check_copy(layout, copy)
-    if corrected.untimed:
+    for value, count in corrected.untimed.items():
+        is_number = np.isfinite(value)
+        if not count or (is_number and count > corrected.outside.sum()):  # a time of the drive
+            continue
+        what = f"of {value:.15g} s" if is_number else "that is not a number"
         warnings.warn(
-            f"{corrected.untimed} of {layout.points} points of {layout.path} have a gps_time that "
-            "is not a number. They can't be placed on the trajectory: nothing that goes by time "
-            "moves them.",
+            f"{count} of {layout.points} points of {layout.path} have a gps_time {what}. They "
+            "can't be placed on the trajectory: nothing that goes by time moves them.",
             stacklevel=3,
         )
     return corrected.outside.tolist()
@@ -132,8 +138,8 @@ class _Corrected:
         Of the corrected records.
     outside : (k,) int array
         Number of points of each part outside the trajectory.
-    untimed : int
-        Number of points without a time.
+    untimed : dict
+        Number of points by what stands in place of a time: a number (s), or NaN for none.
     bounds : (2, 3) array
         Largest and smallest integers of the coordinates.
     """
@@ -148,13 +154,17 @@ class _Corrected:
         """All records, (n,) at a time, as bytes of each; those who watch are told the last time."""
         layout, has_sigmas = self._layout, self._has_sigmas
         parts = self._parts if is_final else [replace(part, watch=None) for part in self._parts]
-        self.outside, self.untimed = np.zeros(len(parts), int), 0
+        self.outside = np.zeros(len(parts), int)
+        self.untimed = dict.fromkeys((np.nan, *PLACEHOLDERS), 0)
         self.bounds = np.array([np.full(3, -np.inf), np.full(3, np.inf)])
         for records in read_records(layout, SETTINGS.chunk_points):
             _check_channels(layout, self._target, records)
             sigmas = np.full((len(records), 3), np.nan) if has_sigmas else None
             self.outside += [part.move(layout, records, sigmas) for part in parts]
-            self.untimed += np.count_nonzero(~np.isfinite(records["gps_time"]))
+            times = records["gps_time"]
+            self.untimed[np.nan] += np.count_nonzero(~np.isfinite(times))
+            for time in PLACEHOLDERS:
+                self.untimed[time] += np.count_nonzero(times == time)
             xyz = [records[name] for name in "XYZ"]
             self.bounds[0] = np.maximum(self.bounds[0], [values.max() for values in xyz])
             self.bounds[1] = np.minimum(self.bounds[1], [values.min() for values in xyz])

@@ -11,7 +11,7 @@ Byte positions are those of the ASPRS LAS 1.4 R15 specification, and of 1.5 R00.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +26,7 @@ from mlscorr.io.time_systems import ADJUSTMENT
 
 VLR_HEADER = struct.Struct("<2x16sHH32s")  # owner, record, length of data, description
 LASZIP, LASZIP_RECORD = b"laszip encoded", 22204  # of the VLR that says how points are compressed
+OLD_CLASS, NEW_CLASS, NEW_FLAGS = "raw_classification", "classification", "classification_flags"
 COPC, HIERARCHY = (b"copc", 1), (b"copc", 1000)  # of the VLR and the EVLR that tell an octree
 
 
@@ -139,9 +140,28 @@ class LasLayout:
         """Type of a point record: the fields that are used here by name, the others by length."""
         fields = PointFormat(self.point_format).dtype().fields
         names = ["X", "Y", "Z", "intensity", "gps_time", "point_source_id"]
+        names += [NEW_FLAGS, NEW_CLASS] if self.point_format >= 6 else [OLD_CLASS]
         kinds, starts = zip(*(fields[name][:2] for name in names), strict=True)
         form: Any = {"names": names, "formats": kinds, "offsets": starts}
         return np.dtype(form | {"itemsize": self.record_length})
+
+    def is_noise(self, records: np.ndarray, classes: Collection[int]) -> np.ndarray:
+        """Which points are withheld or of some classes: (n,) bool.
+
+        Source: ASPRS LAS 1.4 R15, classification of point formats 0 to 5 and of 6 to 10.
+
+        Parameters
+        ----------
+        records : (n,) structured array
+        classes : collection of int
+        """
+        is_left_out = np.zeros(256, bool)  # by the byte that holds the class
+        is_left_out[list(classes)] = True
+        if self.point_format >= 6:
+            return is_left_out[records[NEW_CLASS]] | ((records[NEW_FLAGS] & 4) > 0)
+        byte = np.arange(256)
+        is_left_out = is_left_out[byte & 31] | (byte >= 128)  # 5 bits of class, the 8th is withheld
+        return is_left_out[records[OLD_CLASS]]
 
     @cached_property
     def vlrs(self) -> list[tuple[int, int]]:

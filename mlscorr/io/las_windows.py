@@ -9,6 +9,7 @@ from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.time_order import in_time_order
+from mlscorr.io.time_systems import lacks_time
 from mlscorr.survey import CloudFile, PointCloud
 
 
@@ -42,8 +43,11 @@ def read_windows(
         yield from read_chunks(file)
         return
     places, records = spread_records(layout)
-    times = file.counted(records["gps_time"])
-    if not (np.diff(times) >= 0).all():
+    times = records["gps_time"]
+    is_timed = ~lacks_time(times)
+    places = places[is_timed]
+    times = file.counted(times[is_timed])
+    if len(times) < 2 or not (np.diff(times) >= 0).all():
         raise ValueError(
             f"The points of {file.path.name} are not in order of time: where a time stands in it "
             "is known only once all are read."

@@ -189,7 +189,8 @@ def _stated(path, settings, name, section):
     given = {n: getattr(settings, n) for n in names if n in settings.model_fields_set}
     if section.survey is None:
         own = {n: getattr(section, n) for n in ("mounting", "scanner") if getattr(section, n)}
-        files = CloudSection(files=section.files, gps_time=settings.cloud.gps_time)
+        stated = settings.cloud.model_dump(include={"gps_time", "noise_classes"})
+        files = CloudSection(files=section.files, **stated)
         given = {"name": name, "crs": settings.crs, "cloud": files} | given | own
         whole = SurveyFile(trajectory=section.trajectory, **given)
     else:

@@ -16,10 +16,11 @@ RESERVED = ("tasks", SHARED_TILES, "log.txt", "project.json", "project.html")  #
 
 
 class TilesSection(TomlSection):
-    """All cloud files of the project, and the system of their times."""
+    """All cloud files of the project, the system of their times, and which points are noise."""
 
     files: Annotated[list[str], Field(min_length=1)] | None = None
     gps_time: Literal["auto", "week", "standard"] = "auto"
+    noise_classes: survey_sections.NoiseClasses
 
 
 class DriveSection(TomlSection):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.las import spread_records
+from mlscorr.io.las import timed_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.survey_paths import own_clouds
@@ -53,7 +53,7 @@ def check_belongings(
         for own in [own_clouds(path, "trajectory.files", section.files, clouds)]
     ]
     for cloud in clouds if stated else ():
-        records = spread_records(read_layout(cloud.path))[1]
+        records = timed_records(read_layout(cloud.path))
         times = cloud.trajectory_time(records["gps_time"])
         belongs, inside, names = np.zeros(len(times), bool), np.zeros(len(times), bool), []
         for name, part, ids, own in stated:

@@ -40,7 +40,7 @@ def simulated_survey(path: Path | str, survey: Survey) -> Survey:
                 raise ValueError(f"Bring the simulated clouds into the survey's CRS. {conflict}")
     with warnings.catch_warnings(action="ignore"):  # of the CRS, which agrees
         try:
-            given = survey.trajectory, "auto", survey.crs
+            given = survey.trajectory, "auto", survey.crs, None, survey.clouds[0].noise_classes
             files = [cloud_file(cloud, *given)[0] for cloud in clouds]
         except ValueError as error:
             raise ValueError(

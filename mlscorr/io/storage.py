@@ -5,7 +5,6 @@ imported before there is a URL. Settings of a store (endpoint, credentials) are 
 tools and of fsspec, in the environment, so that workers have them too.
 """
 
-import glob
 import os
 import posixpath
 import re
@@ -14,6 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
+
+from mlscorr.io.patterns import names_like
 
 ETAG = "ETag"  # begins what a store tells contents apart by
 URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")  # a drive of Windows has a single letter
@@ -167,7 +168,7 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
     ----------
     folder : Path
     pattern : str
-        From the folder, or a URL.
+        From the folder, or a URL. On a disk ``**`` enters each folder once, whatever links to it.
 
     Raises
     ------
@@ -179,8 +180,7 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
     if not is_url(pattern) and not is_remote(folder):
         stem, end = posixpath.splitext(pattern)  # endings in capitals are as good
         names = {pattern, stem + end.lower(), stem + end.upper()}
-        matches = (glob.glob(name, root_dir=folder, recursive=True) for name in names)
-        paths = {folder / name for some in matches for name in some}
+        paths = {folder / match for name in names for match in names_like(folder, name)}
         return sorted(path for path in paths if not path.is_dir())
     path: Any = as_path(pattern) if is_url(pattern) else resolved(folder / pattern)
     if path.protocol in WEB:

@@ -21,7 +21,16 @@ from mlscorr.io.survey_sections import PlannedSurveyFile, SurveyFile
 from mlscorr.io.time_systems import ADJUSTMENT, match_times
 from mlscorr.io.toml_file import read_toml
 from mlscorr.io.trajectory_sessions import Sessions, read_sessions
-from mlscorr.survey import CloudFile, ControlPoints, InputFile, Pos, Scanner, Survey, Trajectory
+from mlscorr.survey import (
+    NOISE_CLASSES,
+    CloudFile,
+    ControlPoints,
+    InputFile,
+    Pos,
+    Scanner,
+    Survey,
+    Trajectory,
+)
 
 FILE_NAME = "survey.toml"
 UNKNOWN_POS = (
@@ -100,9 +109,16 @@ class SurveyParts:
         """What is said of the clouds' times."""
         return self.settings.cloud.gps_time if self.settings.cloud else "auto"
 
+    @property
+    def noise_classes(self) -> tuple[int, ...]:
+        """Classes of the clouds' points that are noise."""
+        cloud = self.settings.cloud
+        return NOISE_CLASSES if cloud is None else tuple(cloud.noise_classes)
+
     def cloud_file(self, cloud: Path) -> tuple[CloudFile, str]:
         """The CloudFile of a path; as the function of this name."""
-        return cloud_file(cloud, self.recorded.trajectory, self.system, self.settings.crs)
+        given = self.recorded.trajectory, self.system, self.settings.crs
+        return cloud_file(cloud, *given, noise_classes=self.noise_classes)
 
     def survey(self, read: Sequence[tuple[CloudFile, str]]) -> Survey:
         """The survey of these parts and of clouds.
@@ -245,7 +261,7 @@ def survey_toml(path: str | Path) -> Path:
 
 def cloud_file(
     path: Path, trajectory: Trajectory, setting: str, crs: str | None,
-    ids: tuple[int, ...] | None = None,
+    ids: tuple[int, ...] | None = None, noise_classes: tuple[int, ...] = NOISE_CLASSES,
 ) -> tuple[CloudFile, str]:  # fmt: skip
     """CloudFile of a path, and the sentence on its time system.
 
@@ -259,6 +275,8 @@ def cloud_file(
         That of survey.toml, which can be used.
     ids : tuple of int, optional
         Only the points with these point_source_ids are of the trajectory.
+    noise_classes : tuple of int
+        cloud.noise_classes of survey.toml.
 
     Raises
     ------
@@ -271,7 +289,7 @@ def cloud_file(
         Where the file states another CRS.
     """
     layout = read_layout(path)
-    file = CloudFile(path, layout.points, layout.time_offset, "", ids)
+    file = CloudFile(path, layout.points, layout.time_offset, "", ids, noise_classes)
     if layout.scale.max() > 0.002:  # m, half of what a scanner's ranges are good for
         warnings.warn(
             f"The coordinates of {path.name} are in steps of {layout.scale.max():g} m: neither "
@@ -283,7 +301,9 @@ def cloud_file(
     times = records["gps_time"][file.rows(records["point_source_id"])] + layout.time_offset
     if not len(times) and (chunk := next(read_chunks(file), None)) is not None:  # too few of them
         times = chunk.gps_time
-    match = match_times(path.name, times, layout.is_standard, trajectory, setting)
+    match = match_times(
+        path.name, times, layout.is_standard, trajectory, setting, layout.time_offset
+    )
     if crs is not None and (conflict := crs_conflict(layout, crs)):
         warnings.warn(conflict, stacklevel=3)
     constant = match.constant + layout.time_offset

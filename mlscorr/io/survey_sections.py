@@ -1,6 +1,7 @@
 """What stands in survey.toml, section by section, in its own units (deg)."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.io.column_names import OfficeWord, same_word
 from mlscorr.io.toml_file import TomlSection
-from mlscorr.survey import SEARCH_RADIUS, Mounting, Pos, Scanner
+from mlscorr.survey import NOISE_CLASSES, SEARCH_RADIUS, Mounting, Pos, Scanner
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
@@ -19,6 +20,10 @@ Three = Field(min_length=3, max_length=3)
 Six = Field(min_length=6, max_length=6)
 Column = Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=1)] | None
 PointSource = Annotated[int, Field(ge=0, le=65535)]  # 16 bits of a LAS point
+NoiseClasses = Annotated[
+    list[Annotated[int, Field(ge=0, le=255)]],  # 8 bits of a LAS point
+    Field(default_factory=partial(list, NOISE_CLASSES)),
+]
 Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
 
 
@@ -38,10 +43,11 @@ class ColumnsSection(TomlSection):
 
 
 class CloudSection(TomlSection):
-    """Which cloud files, and the system of their times."""
+    """Which cloud files, the system of their times, and which of their points are noise."""
 
     files: Annotated[list[str], Field(min_length=1)]
     gps_time: Literal["auto", "week", "standard"] = "auto"
+    noise_classes: NoiseClasses  # whose points take no part in a measurement
     mounting: Literal["stated", "recorded"] = "stated"  # by which the points are georeferenced
 
 

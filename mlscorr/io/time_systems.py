@@ -20,6 +20,8 @@ from mlscorr.survey.clouds import WEEK, counted_on
 
 DAY = 86400.0  # s
 ADJUSTMENT = 1e9  # s
+NO_TIMES = (0.0, -1.0)  # what programs write where a point has no time
+PLACEHOLDERS = (*NO_TIMES, *(time - ADJUSTMENT for time in NO_TIMES))  # s, converted likewise
 SYSTEMS = ("week", "standard", "gps")
 NAMES = {
     "week": "GPS seconds of week",
@@ -67,8 +69,9 @@ class TimeMatch:
 
 
 def match_times(
-    name: str, times: ArrayLike, is_standard: bool, trajectory: Trajectory, setting: str = "auto"
-) -> TimeMatch:
+    name: str, times: ArrayLike, is_standard: bool, trajectory: Trajectory, setting: str = "auto",
+    time_offset: float = 0.0,
+) -> TimeMatch:  # fmt: skip
     """Constant between a cloud's times and the trajectory's.
 
     Parameters
@@ -82,6 +85,8 @@ def match_times(
     trajectory : Trajectory
     setting : str
         ``auto`` prefers the header but takes what fits; ``week`` and ``standard`` are obeyed.
+    time_offset : float
+        That was added to the times as stored. Units: s.
 
     Returns
     -------
@@ -95,7 +100,7 @@ def match_times(
     Warns
     -----
     UserWarning
-        When what fits contradicts the header, and of points without a time.
+        When what fits contradicts the header, and of points without a time, which decide nothing.
 
     Examples
     --------
@@ -110,19 +115,22 @@ def match_times(
     times = times[np.isfinite(times)]
     if not len(times):
         raise ValueError(f"{name} has no points with a gps_time.")
-    if not times.any():
+    stored = times - time_offset
+    is_missing = lacks_time(stored)
+    if is_missing.all():
         raise ValueError(
-            f"The points of {name} have gps_time 0 throughout: it was written without times. "
-            "Export it anew with gps_time, which places points on the trajectory."
+            f"The points of {name} have gps_time {listed_times(stored)} throughout: it was written "
+            "without times. Export it anew with gps_time, which places points on the trajectory."
         )
-    if (zeros := np.count_nonzero(times == 0)) > 1:  # the week starts within one epoch
+    if is_missing.any():
         warnings.warn(
-            f"{zeros} of {len(times)} points sampled from {name} have gps_time 0: they were "
-            "written without times. Export them with gps_time, which places points on the "
+            f"{is_missing.sum()} of {len(times)} points sampled from {name} have gps_time "
+            f"{listed_times(stored[is_missing])}: they were written without times, and its time "
+            "system is that of the others. Export them with gps_time, which places points on the "
             "trajectory.",
             stacklevel=2,
         )
-        times = times[times != 0]
+        times = times[~is_missing]
     _check_precision(name, times)
     match = _match(times, is_standard, trajectory, setting)
     new_week = _new_week(times)
@@ -219,6 +227,39 @@ def _new_week(times):
         return -np.inf
     last = int(np.argmax(gaps))
     return float((ordered[last] + ordered[last + 1]) / 2)
+
+
+def lacks_time(times: np.ndarray) -> np.ndarray:
+    """Which points have no time: (n,) bool; what is no number, and 0 or -1 in their place.
+
+    Parameters
+    ----------
+    times : (n,) array
+        As stored. Units: s.
+    """
+    times = np.round(times, 6)  # s; an offset that was added and taken off again leaves less
+    is_placeholder = np.isin(times, PLACEHOLDERS)
+    is_missing = is_placeholder | ~np.isfinite(times)
+    if np.count_nonzero(is_placeholder) == 1 and not is_missing.all():
+        # a single one within the drive is a time: the week starts within one epoch
+        rest = times[~is_missing]
+        is_missing &= ~(is_placeholder & (np.abs(times - np.median(rest)) <= np.ptp(rest)))
+    return is_missing
+
+
+def listed_times(times: np.ndarray) -> str:
+    """Values of points without a time, with the number of each where they differ.
+
+    Parameters
+    ----------
+    times : (n,) array
+        Of these points, as stored. Units: s.
+    """
+    values, counts = np.unique(np.round(times, 6), return_counts=True)
+    if len(values) == 1:
+        return f"{values[0] + 0.0:.15g}"  # and not -0
+    some = zip(values.tolist(), counts.tolist(), strict=True)
+    return " and ".join(f"{value:.15g} ({number})" for value, number in some)
 
 
 def _check_precision(name, times):

@@ -11,10 +11,11 @@ from mlscorr.estimate.inputs import checked_inputs
 from mlscorr.evaluate.beams import outside_warnings
 from mlscorr.evaluate.datum import DatumDifference, datum_differences
 from mlscorr.io.conversion import read_in_part
-from mlscorr.io.las import spread_records
+from mlscorr.io.las import timed_records
 from mlscorr.io.las_checks import read_layout
 from mlscorr.io.las_crs import cloud_box, crs_conflict, stated_crs
 from mlscorr.io.nearness import far_cloud
+from mlscorr.io.noise import counted_noise
 from mlscorr.io.preparation import glance
 from mlscorr.io.projection import crs_code, crs_name
 from mlscorr.io.survey_file import read_survey
@@ -129,11 +130,13 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
             faults.add("data", sentence)
         elif sentence:  # by a header, which may be wrong
             faults.warn(sentence)
-    sample = faults.of("data", needs.sample_clouds, survey)
-    faults.warn(*(sample.warnings if sample else ()))
-    probe, matched, is_searched, notes, unchecked = _looked(
-        survey, faults, needs_control, is_beside
-    )
+    with counted_noise() as noise:
+        sample = faults.of("data", needs.sample_clouds, survey)
+        faults.warn(*(sample.warnings if sample else ()))
+        probe, matched, is_searched, notes, unchecked = _looked(
+            survey, faults, needs_control, is_beside
+        )
+    notes += filter(None, [noise.sentence])
     datum: tuple[DatumDifference, ...] = ()
     if matched is not None:
         datum = datum_differences(matched, survey.trajectory, survey.pos, survey.crs)
@@ -174,9 +177,8 @@ def _placed_times(survey) -> tuple[int, list[str]]:
     """Number of passes that times spread over the files lie in; sentences on those outside."""
     passes, outside = 0, []
     for file in survey.clouds:
-        records = spread_records(read_layout(file.path))[1]
-        own = records["gps_time"][file.rows(records["point_source_id"])]
-        times = file.trajectory_time(own)
+        records = timed_records(read_layout(file.path))
+        times = file.trajectory_time(records["gps_time"][file.rows(records["point_source_id"])])
         if not len(times):
             continue
         segment = survey.trajectory.segment(times)

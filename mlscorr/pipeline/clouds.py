@@ -41,7 +41,7 @@ def write_clouds(
     for name, part in survey.by_scanner.items():
         moved = correction[name] if isinstance(correction, Mapping) else correction
         for file in part.clouds:
-            corrected = CorrectedPart(file, moved, watch=lambda times: done(len(times)))
+            corrected = CorrectedPart(file, moved, watch=lambda times, _: done(len(times)))
             parts.setdefault(file.path, []).append(corrected)
     written = []
     for source, some in parts.items():
@@ -53,7 +53,7 @@ def write_clouds(
 
 @dataclass(frozen=True)
 class WrittenClouds:
-    """Corrected clouds, and how many of their points nothing holds.
+    """Corrected clouds, and how many of their points nothing holds or are noise.
 
     Parameters
     ----------
@@ -64,12 +64,15 @@ class WrittenClouds:
         Before the first or past the last control point.
     extrapolated : int
         In weak stretches.
+    noise : int
+        Flagged as noise, and not measured.
     """
 
     files: tuple[tuple[str, str, int], ...] = ()
     outside: int = 0
     uncontrolled: int = 0
     extrapolated: int = 0
+    noise: int = 0
 
     def below(self, folder: str) -> WrittenClouds:
         """The same, with names of files in a folder.
@@ -95,6 +98,7 @@ class WrittenClouds:
             sum(part.outside for part in parts),
             sum(part.uncontrolled for part in parts),
             sum(part.extrapolated for part in parts),
+            sum(part.noise for part in parts),
         )
 
 
@@ -115,13 +119,14 @@ class MovedClouds:
     held: tuple[tuple[float, float], Support]
 
     def parts(
-        self, watch: Callable[[np.ndarray], object], with_sigma: bool
+        self, watch: Callable[[np.ndarray, np.ndarray], object], with_sigma: bool
     ) -> Iterator[CorrectedPart]:
         """The points of each file and scanner.
 
         Parameters
         ----------
-        watch : function of gps_time (n,)
+        watch : function
+            As of CorrectedPart.
         with_sigma : bool
             Whether each point gets its sigmas.
         """
@@ -150,7 +155,7 @@ def write_counted(
     list of WrittenClouds
         Of each drive, with the numbers of its own points.
     """
-    counts = [np.zeros(2, int) for _ in drives]
+    counts = [np.zeros(3, int) for _ in drives]
     parts: dict[Path, list[tuple[int, CorrectedPart]]] = {}
     for number, drive in enumerate(drives):
         for part in drive.parts(_counting(drive.held, counts[number], done), with_sigma):
@@ -171,12 +176,12 @@ def write_counted(
 
 
 def _counting(held, counts, done):
-    """A function of gps_time that counts, and tells how many there were."""
+    """A function of gps_time and noise that counts, and tells how many there were."""
     (first, last), support = held
 
-    def watch(times):
+    def watch(times, is_noise):
         is_outside = (times < first) | (times > last)
-        counts[:] += np.count_nonzero([is_outside, support.contains(times)], axis=1)
+        counts[:] += np.count_nonzero([is_outside, support.contains(times), is_noise], axis=1)
         done(len(times))
 
     return watch

@@ -271,6 +271,7 @@ class CorrectedSurvey(Summary):
                 points_outside_trajectory=written.outside,
                 points_outside_control=written.uncontrolled,
                 points_extrapolated=written.extrapolated,
+                points_noise=written.noise,
                 points_corrected=sum(n for _, _, n in written.files) - written.outside,
             ),
             files=tuple(FileRow(name, digest, points=n) for name, digest, n in written.files),

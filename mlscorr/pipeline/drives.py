@@ -16,7 +16,7 @@ from mlscorr.io.las_layout import LasLayout
 from mlscorr.io.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion, places_of
 from mlscorr.io.poses import utm_zone
 from mlscorr.io.survey_sections import TrajectorySection
-from mlscorr.io.time_systems import TimeMatch, match_times
+from mlscorr.io.time_systems import TimeMatch, lacks_time, match_times
 from mlscorr.io.trajectory_sessions import (
     SessionFile,
     Sessions,
@@ -57,6 +57,11 @@ class Cloud:
         return self.records["gps_time"] + self.layout.time_offset
 
     @property
+    def known_times(self) -> np.ndarray:
+        """Those of points that have a time. Units: s."""
+        return self.times[~lacks_time(self.records["gps_time"])]
+
+    @property
     def takes_turns(self) -> bool:
         """Whether ids of points come again and again, not one after the other as of strips."""
         ids = self.records["point_source_id"][np.argsort(self.times, kind="stable")]
@@ -72,7 +77,8 @@ class Cloud:
 
     def match(self, trajectory: Trajectory, setting: str = "auto") -> TimeMatch:
         """How its times become those of a trajectory; as match_times."""
-        return match_times(self.name, self.times, self.layout.is_standard, trajectory, setting)
+        offset, is_standard = self.layout.time_offset, self.layout.is_standard
+        return match_times(self.name, self.times, is_standard, trajectory, setting, offset)
 
 
 @dataclass(frozen=True)
@@ -205,7 +211,7 @@ def join_drives(drives: list[Drive], clouds: list[Cloud]) -> Iterator[Drive]:
         try:
             recorded = _joined(group).recorded
             whole = recorded.trajectory
-            time = np.concatenate([c.match(whole).placed(c.times) for c in clouds])
+            time = np.concatenate([c.match(whole).placed(c.known_times) for c in clouds])
         except ValueError:  # of several time systems, or all together cover the clouds in part
             continue
         used = [

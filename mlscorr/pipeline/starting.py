@@ -29,6 +29,7 @@ from mlscorr.io.open_places import (
 )
 from mlscorr.io.output import output_file
 from mlscorr.io.preparation import glance
+from mlscorr.io.storage import files_like
 from mlscorr.io.survey_file import FILE_NAME, read_survey
 from mlscorr.io.survey_sections import ControlSection, PlannedSurveyFile
 from mlscorr.io.toml_file import validate
@@ -307,7 +308,7 @@ def _clouds(folder, given, roles):
     """Clouds of a folder. Raises ValueError where one is damaged, or there is none."""
     names = given.get("cloud", {}).get("files")
     if names is not None:
-        files = [path for name in names for path in sorted(folder.glob(name))]
+        files = [path for name in names for path in files_like(folder, name)]
         return [Cloud(read_layout(path)) for path in files] or _no_cloud(folder)
     damaged = [role.reason for role in roles if role.role == "none"
                and role.path.suffix.lower() in (".las", ".laz")]  # fmt: skip
@@ -344,7 +345,7 @@ def _put_clouds(text, path, clouds, trajectory):
     spans, passes, systems = [], 0, Counter()
     for cloud in clouds:
         match = cloud.match(trajectory, text.given.get("cloud.gps_time", "auto"))
-        times = match.placed(cloud.times[np.isfinite(cloud.times)])
+        times = match.placed(cloud.known_times)
         segment = trajectory.segment(times)
         passes += len(set(segment[segment >= 0].tolist()))
         spans.append((times.min(), times.max()))

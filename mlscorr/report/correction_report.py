@@ -55,6 +55,8 @@ class Coverage:
         point of the survey.
     points_extrapolated, points_corrected : int
         Points in the weak stretches, and all that were moved.
+    points_noise : int
+        Points flagged as noise, which took no part in the measurement.
     """
 
     control_span: tuple[float, float]
@@ -63,6 +65,7 @@ class Coverage:
     points_outside_control: int = 0
     points_extrapolated: int = 0
     points_corrected: int = 0
+    points_noise: int = 0
 
     @property
     def share_extrapolated(self) -> float:

@@ -87,6 +87,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     seconds, metres = number(report.seconds_extrapolated, 1), number(report.metres_extrapolated, 0)
     outside, beyond = covered.points_outside_trajectory, covered.points_outside_control
     unheld, gaps = covered.points_extrapolated, correction.recorded.gaps
+    noise = covered.points_noise
     values = {
         "Trajectory": span(time[0], time[-1]),
         "Control span (first to last control epoch)": control,
@@ -94,6 +95,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
         "Points outside the trajectory (left as they were)": points(outside),
         "Points before the first or past the last control point": points(beyond),
         "Points whose correction is extrapolated: no control point holds them": points(unheld),
+        "Points flagged as noise (not measured, corrected like all others)": points(noise),
         "Time and way whose correction is extrapolated": f"{seconds} s, {metres} m",
         "Gaps of the trajectory (nothing is interpolated across them)": len(gaps),
     }

@@ -4,7 +4,7 @@ float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forwar
 """
 
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Pos, Scanner
-from mlscorr.survey.clouds import CloudFile, Correcting, PointCloud
+from mlscorr.survey.clouds import NOISE_CLASSES, CloudFile, Correcting, PointCloud
 from mlscorr.survey.recording import (
     InputFile,
     MountedScanner,

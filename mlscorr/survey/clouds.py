@@ -9,6 +9,7 @@ import numpy as np
 from mlscorr.survey.columns import Columns
 
 WEEK = 604_800.0  # s
+NOISE_CLASSES = (7, 18)  # low point (noise) and high noise: ASPRS LAS 1.4 R15, point classes
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,6 +54,8 @@ class CloudFile:
     new_week : float
         Times of the file below it are of the week after that of the others, as its seconds of
         week start again. Units: s.
+    noise_classes : tuple of int
+        Classes whose points take no part in a measurement, as withheld points take none.
     """
 
     path: Path
@@ -61,6 +64,7 @@ class CloudFile:
     time_system: str
     point_source_ids: tuple[int, ...] | None = None
     new_week: float = -np.inf
+    noise_classes: tuple[int, ...] = NOISE_CLASSES
 
     @property
     def name(self) -> str:

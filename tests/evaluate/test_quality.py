@@ -24,6 +24,7 @@ REPORT = {
         "points_corrected": 1000,
         "points_untouched": 0,
         "points_extrapolated": 250,
+        "points_noise": 30,
         "share_extrapolated": 0.25,
         "seconds_extrapolated": 31.0,
         "metres_extrapolated": 190.0,

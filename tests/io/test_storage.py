@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -268,3 +269,37 @@ def test_a_folder_is_like_no_pattern(tmp_path):
     (tmp_path / "a.laz").touch()
     (tmp_path / "old.laz").mkdir()
     assert files_like(tmp_path, "*.laz") == [tmp_path / "a.laz"]
+
+
+def test_folders_that_link_to_each_other_are_entered_once(tmp_path):
+    "12 folders with links to all and to the one above: each of their 12 files once, within 2 s"
+    folders = [tmp_path / "drive" / f"day-{number:02d}" for number in range(12)]
+    for folder in folders:
+        folder.mkdir(parents=True)
+        (folder / f"{folder.name}.laz").touch()
+        (folder / "up").symlink_to("..")
+        for other in folders:
+            (folder / f"to-{other.name}").symlink_to(other)
+    (tmp_path / "drive" / "itself").symlink_to("itself")
+    start = perf_counter()
+    found = files_like(tmp_path, "drive/**/*.laz")
+    assert perf_counter() - start < 2.0
+    assert found == [folder / f"{folder.name}.laz" for folder in folders]
+
+
+def test_a_link_to_a_folder_elsewhere_is_followed(tmp_path):
+    "** finds files in a folder of another place by the link to it, but none in a hidden folder"
+    (tmp_path / "disk" / "deep").mkdir(parents=True)
+    (tmp_path / "disk" / "deep" / "a.laz").touch()
+    (tmp_path / "survey" / ".old").mkdir(parents=True)
+    (tmp_path / "survey" / ".old" / "b.laz").touch()
+    (tmp_path / "survey" / "c.LAZ").touch()
+    (tmp_path / "survey" / "data").symlink_to("../disk")
+    found = files_like(tmp_path / "survey", "**/*.laz")
+    assert [path.relative_to(tmp_path / "survey").as_posix() for path in found] == [
+        "c.LAZ",
+        "data/deep/a.laz",
+    ]
+    everything = files_like(tmp_path / "survey", "**")
+    assert [path.name for path in everything] == ["c.LAZ", "a.laz"]
+    assert files_like(tmp_path, f"{tmp_path}/disk/**/*.laz") == [tmp_path / "disk/deep/a.laz"]

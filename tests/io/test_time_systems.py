@@ -252,3 +252,49 @@ def test_any_week_is_recovered(week, start, cloud_system, trajectory_system):
         )
     placed = of_week + shift[cloud_system] + match.constant
     np.testing.assert_allclose(placed, goal, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, -1e9, -1_000_000_001.0])
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_points_without_a_time_do_not_judge_the_time_system(value, system):
+    "Three times of 0 or -1 are named as what they are, and the system is that of the others"
+    times = SYSTEMS[system].copy()
+    times[[0, 250, 499]] = value
+    goal = trajectory(SYSTEMS[system][0] - 5, SYSTEMS[system][-1] + 5)
+    with pytest.warns(UserWarning) as caught:
+        match = match_times("a.laz", times, system != "week", goal, setting="auto")
+    told = [str(warning.message) for warning in caught]
+    assert told[0].startswith(f"3 of 500 points sampled from a.laz have gps_time {value:.15g}:")
+    assert len(told) == (2 if system == "gps" else 1)  # of the header, which can't state it
+    assert match.constant == 0.0
+    assert match.cloud_system == system
+    assert match.inside == 1.0
+
+
+def test_both_placeholders_are_counted():
+    "Points with 0 and with -1 are counted apart; where all points have one of them, that is said"
+    times = SYSTEMS["week"].copy()
+    times[:3], times[3:5] = -1.0, 0.0
+    with pytest.warns(UserWarning, match=r"5 of 500 points .* gps_time -1 \(3\) and 0 \(2\):"):
+        match_times("a.laz", times, False, trajectory())
+    with pytest.raises(ValueError, match=r"have gps_time -1 \(3\) and 0 \(2\) throughout"):
+        match_times("a.laz", times[:5], False, trajectory())
+
+
+def test_the_first_second_of_a_week_is_a_time():
+    "A drive over the start of the week has one sample at 0 s, which is its time: nothing is warned"
+    times = np.arange(0.0, 600.0, 1.0)
+    match = match_times("a.laz", times, False, trajectory(-5.0, 605.0))
+    assert match.constant == 0.0
+    assert match.inside == 1.0
+
+
+def test_an_offset_of_the_header_hides_no_placeholder():
+    "Times stored less an offset: those stored as -1 are found after it was added"
+    times = SYSTEMS["standard"].copy()
+    offset = 1e6 * 1300 - 1e9  # s
+    times[[3, 4]] = offset - 1.0
+    goal = trajectory(times[0] - 5, times[-1] + 5)
+    with pytest.warns(UserWarning, match="2 of 500 points sampled from a.laz have gps_time -1:"):
+        match = match_times("a.laz", times, True, goal, time_offset=offset)
+    assert match.inside == 1.0

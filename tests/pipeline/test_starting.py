@@ -5,6 +5,7 @@ import shutil
 import tomllib
 import warnings
 from dataclasses import replace
+from time import perf_counter
 
 import laspy
 import numpy as np
@@ -660,3 +661,25 @@ def test_a_folder_that_is_not_there_is_a_failure_to_write(folder):
     assert f"{out.parent} is no folder, so survey.toml can't be written there." in " ".join(
         result.output.split()
     ).replace("- ", "-")
+
+
+def test_folders_that_link_into_themselves_are_read_once(tmp_path):
+    "init and read_survey of a folder with links to itself find its one cloud once, within 2 s each"
+    data = tmp_path / "data"
+    data.mkdir()
+    write_cloud(data / "pass.laz")
+    (data / "drive.csv").write_text(HEADER + trajectory())
+    (data / "control.csv").write_text(CONTROL + control())
+    for name in ("again", "once-more"):
+        (data / name).symlink_to(".")
+        (tmp_path / name).symlink_to("data")
+    start = perf_counter()
+    text = mlscorr.init(tmp_path, given={"crs": "EPSG:32650"}).text
+    assert perf_counter() - start < 2.0
+    assert tomllib.loads(text)["cloud"]["files"] == ["data/pass.laz"]
+    survey = tmp_path / "survey.toml"
+    survey.write_text(text.replace('"data/pass.laz"', '"**/*.laz"'))
+    start = perf_counter()
+    clouds = mlscorr.read_survey(survey).clouds
+    assert perf_counter() - start < 2.0
+    assert [file.path for file in clouds] == [data / "pass.laz"]

@@ -209,6 +209,13 @@ def _statements(project, rows, drives, faults):
         "green" if len(used) == len(project.control) else "amber",
         f"{len(used)} of {len(project.control)} surveyed control points are used.",
     )
+    if noise := sum(report["coverage"]["points_noise"] for _, report in drives):
+        yield headline.Statement(
+            "Noise",
+            "green",
+            f"{noise} of {sum(row['points'] for row in rows)} points are flagged as noise. They "
+            "take no part in any measurement, and are corrected like all others.",
+        )
     yield from _minded(rows, [report for _, report in drives])
     if faults:
         yield headline.Statement(

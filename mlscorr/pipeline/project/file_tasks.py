@@ -53,7 +53,7 @@ class TileOwner:
     name : str
     ends : Trajectory
         Its first and last epoch.
-    system, crs
+    system, crs, noise_classes
         As of cloud_file.
     ids : tuple of int or None
         The point_source_ids of its points; None where all points of the file are its.
@@ -64,6 +64,7 @@ class TileOwner:
     system: str
     crs: str | None
     ids: tuple[int, ...] | None
+    noise_classes: tuple[int, ...]
 
 
 def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
@@ -95,7 +96,8 @@ def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
     for owner in owners:
         points = layout.points if counts is None else int(counts[list(owner.ids or ())].sum())
         if points:
-            file, note = cloud_file(path, owner.ends, owner.system, owner.crs, owner.ids)
+            given = owner.ends, owner.system, owner.crs, owner.ids, owner.noise_classes
+            file, note = cloud_file(path, *given)
             tiles[owner.name] = Tile(replace(file, points=points), note, box)
     return tiles
 

@@ -33,7 +33,8 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
     for drive in project.drives:
         parts, whole = drive.parts, drive.trajectory
         ends = whole.select([0, -1])
-        owner = file_tasks.TileOwner(drive.name, ends, parts.system, parts.settings.crs, drive.ids)
+        given = parts.system, parts.settings.crs, drive.ids, parts.noise_classes
+        owner = file_tasks.TileOwner(drive.name, ends, *given)
         for path in parts.files.clouds:
             tiles.setdefault(resolved(path), (path, []))[1].append(owner)
     tasks = []
@@ -210,8 +211,8 @@ def finding_tasks(
         near = near[np.argsort(np.array(near.name, dtype=str), kind="stable")]
         inputs = file, store.folder, kept, identity, near, origin, with_ties
         where = near.name, near.position, near.kind, near.size, near.normal
-        timing = file.time_constant, file.new_week
-        given = identity, timing, file.point_source_ids, own.mounting, own.scanner
+        points = file.time_constant, file.new_week, file.point_source_ids, file.noise_classes
+        given = identity, *points, own.mounting, own.scanner
         key = digest(core, *given, *where, origin, with_ties)
         near_points = file.points * _share_near(survey, near, box)
         named = key, survey.name, task_name(survey.name, file)
@@ -253,7 +254,10 @@ def cloud_tasks(
         folder, used = _folder(surveys), tuple(motions[survey.name] for survey in surveys)
         files = [[file for file in survey.clouds if file.path == path] for survey in surveys]
         parts = [
-            [(file.time_constant, file.new_week, file.point_source_ids) for file in some]
+            [
+                (file.time_constant, file.new_week, file.point_source_ids, file.noise_classes)
+                for file in some
+            ]
             for some in files
         ]
         key = digest(VERSION, used, parts, path.name, identity, with_sigma)

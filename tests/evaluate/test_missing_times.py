@@ -1,0 +1,28 @@
+"""Points without a time are not called points outside the trajectory."""
+
+import laspy
+import numpy as np
+import pytest
+
+import mlscorr
+from mlscorr.evaluate.beams import BeamCheck
+from mlscorr.io.las import read_chunks
+from tests.beds.missing_times import write_survey
+
+
+@pytest.mark.parametrize("late", [0, 200])
+def test_points_without_a_time_are_not_outside_the_trajectory(late, tmp_path):
+    "Where 1 % of the points have -1 that is said; points past the trajectory's end are, too"
+    times = write_survey(tmp_path, -1.0, step=31)
+    las = laspy.read(tmp_path / "pass.las")
+    las.gps_time = np.where((np.arange(len(times)) >= len(times) - late) & (times > 0),
+                            times + 20.0, times)  # fmt: skip
+    las.write(tmp_path / "pass.las")
+    with pytest.warns(UserWarning, match="gps_time -1"):
+        survey = mlscorr.read_survey(tmp_path)
+    beams = BeamCheck(survey)
+    list(beams.watched(read_chunks)(survey.clouds[0]))
+    told = list(beams.outside())
+    assert "have gps_time -1: they were written without times" in told[0]
+    assert len(told) == 1 + (late > 0)
+    assert all("lie outside the trajectory" in sentence for sentence in told[1:])
