@@ -22,7 +22,6 @@ from mlscorr.estimate.inputs import check_order
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.survey import Matched, Survey, TieFeatures, Ties, time_spans
-from mlscorr.survey.summary import counted
 from mlscorr.ties import (
     NORMAL_SCATTER,
     SETTINGS,
@@ -290,11 +289,10 @@ def _untied(estimate, features, radius):
     """The estimate with the reason why nothing is tied, a warning where something should be."""
     if estimate.untied:
         return estimate
-    passes, near = len(np.unique(features.pass_number)), _revisited(features, radius)
+    near = _revisited(features, radius)
     what = (
-        f"{near} of {len(features)} planes, poles and markings of {counted(passes, 'pass')} "
-        f"lie within about {radius:.1f} m of what was scanned at another "
-        "time"
+        f"{near} of {len(features)} planes, poles and markings lie within about {radius:.1f} m of "
+        "what was scanned at another time"
     )
     if near < SETTINGS.neighbours:
         reason = (

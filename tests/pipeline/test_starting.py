@@ -212,6 +212,7 @@ def test_clouds_in_a_folder_of_their_own_are_a_pattern(folder):
     assert document["cloud"]["files"] == ["las/*.las"]
     assert document["scene"] == {"reference": "street.ply"}
     assert "Files overlap in time" in started.text
+    assert "passes: 1" in started.text  # the tiles go on in time
 
 
 def test_simulated_surveys_and_results_are_left_out_and_called_what_they_are(folder):
@@ -565,3 +566,19 @@ def test_a_folder_that_is_not_there_is_a_failure_to_write(folder):
     assert f"{out.parent} is no folder, so survey.toml can't be written there." in " ".join(
         result.output.split()
     ).replace("- ", "-")
+
+
+def test_init_and_check_state_the_same_duration_and_passes(folder):
+    "A trajectory of 40 s and, 60 s later, of 30 s is one of 70 s without gaps, with 2 passes"
+    rows = trajectory(seconds=40.05) + trajectory(START + 100.0, 30.05)
+    (folder / "trajectory.csv").write_text(HEADER + rows)
+    write_cloud(folder / "pass-1.las", "EPSG:32650", START + 2.0)
+    write_cloud(folder / "pass-1b.las", "EPSG:32650", START + 17.0)
+    write_cloud(folder / "pass-2.las", "EPSG:32650", START + 102.0)
+    started = mlscorr.init(folder)
+    assert "70 s without gaps" in started.text
+    assert "passes: 2" in started.text
+    started.write()
+    amounts = {amount.what: amount for amount in mlscorr.check(folder).read}
+    assert amounts["trajectory"].number == pytest.approx(70.0, abs=0.2)  # s
+    assert amounts["passes"].number == 2
