@@ -3,7 +3,7 @@
     python examples/correct_a_survey.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
 SURVEY is a survey.toml or its folder. Without it a small survey is simulated: a street, a drive
-with a GNSS outage of 25 s, and 24 targets, of which 8 are check points.
+in which GNSS fails for 11 s in a canyon and for 25 s, and 24 targets, of which 8 are check points.
 """
 
 import argparse
