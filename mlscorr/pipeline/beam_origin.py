@@ -84,19 +84,21 @@ def _meeting_point(time, place, rate):
     Least squares of the distances at which the beams pass by it, with the rate (rad/s) and the
     angle at time zero; beams that pass far from it, as of moved things, weigh less.
     """
-    seen = np.arctan2(place[:, 1], place[:, 0]) - rate * time
-    state = np.array([0.0, 0.0, np.angle(np.mean(np.exp(1j * seen))), rate])
+    phase = np.arctan2(place[:, 1], place[:, 0]) - rate * time
+    state = np.array([0.0, 0.0, np.angle(np.mean(np.exp(1j * phase))), rate])
     for _ in range(SETTINGS.beam_rounds):
         angle = state[2] + state[3] * time
         beam = np.column_stack([np.cos(angle), np.sin(angle)])
         away = place - state[:2]
-        aside = beam[:, 0] * away[:, 1] - beam[:, 1] * away[:, 0]
+        distance = beam[:, 0] * away[:, 1] - beam[:, 1] * away[:, 0]
         along = np.sum(beam * away, axis=1)
-        scatter = max(1.48 * float(np.median(np.abs(aside))), 1e-6)  # of normal errors: one sigma
-        weight = 1.0 / (1.0 + (aside / (3.0 * scatter)) ** 2)
+        scatter = max(
+            1.48 * float(np.median(np.abs(distance))), 1e-6
+        )  # of normal errors: one sigma
+        weight = 1.0 / (1.0 + (distance / (3.0 * scatter)) ** 2)
         design = np.column_stack([beam[:, 1], -beam[:, 0], -along, -along * time])
         normal = design.T @ (weight[:, None] * design)
-        step = np.linalg.solve(normal, -design.T @ (weight * aside))
+        step = np.linalg.solve(normal, -design.T @ (weight * distance))
         state += step
     sigma = scatter * np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max())
     is_found = max(scatter, sigma, np.abs(step[:2]).max()) < SETTINGS.beam_scatter
