@@ -64,7 +64,8 @@ def _ties(document) -> Iterator[headline.Statement]:
             "both saw. All other methods use the control points alone."
         )
     else:
-        sentence = f"{OWN} equals {UNTIED} here, for no ties were used. {own['details']['untied']}"
+        why = own["details"]["untied"] or ""
+        sentence = f"{OWN} equals {UNTIED} here, for no ties were used. {why}".rstrip()
     yield headline.Statement("Ties", "green", sentence)
 
 

@@ -115,7 +115,8 @@ def test_what_failed_stands_on_the_first_screen():
     [
         ({"ties": 375, "untied": None}, "375 ties"),
         ({"ties": 375, "untied": None}, "All other methods use the control points alone."),
-        ({"ties": 0, "untied": "One pass."}, "correct equals lsc here, for no ties were used."),
+        ({"ties": 0, "untied": "One pass."}, "equals lsc here, for no ties were used. One pass."),
+        ({"ties": 0, "untied": None}, "correct equals lsc here, for no ties were used."),
     ],
 )
 def test_what_other_methods_leave_out_is_stated(details, words):
