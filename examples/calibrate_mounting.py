@@ -20,7 +20,7 @@ import mlscorr
 from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS as COMPONENTS
 from mlscorr.evaluate.scores import misclosures
 
-ASSETS = Path(__file__).parents[1] / "assets"
+PICTURES = Path(__file__).parents[1] / "build" / "examples"
 WRONG = (
     {"name": "lever_arm", "magnitude": [0.0004, 0.0145, -0.0642]},  # m: right, forward, up
     {"name": "boresight", "magnitude": [-0.0307, -0.0561, 0.2077]},  # deg
@@ -52,7 +52,7 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("survey", nargs="?", type=Path)
     parser.add_argument("--out", type=Path, help="keep the results in this folder")
-    parser.add_argument("--picture", type=Path, default=ASSETS / "calibrate_mounting.png")
+    parser.add_argument("--picture", type=Path, default=PICTURES / "calibrate_mounting.png")
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)
     return arguments

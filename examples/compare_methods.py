@@ -48,7 +48,9 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("survey", nargs="?", type=Path)
     parser.add_argument("--out", type=Path, help="keep compare.html and compare.json here")
-    parser.add_argument("--picture", type=Path, default=ROOT / "assets" / "compare_methods.png")
+    parser.add_argument(
+        "--picture", type=Path, default=ROOT / "build" / "examples" / "compare_methods.png"
+    )
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)
     return arguments

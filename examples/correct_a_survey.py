@@ -3,7 +3,7 @@
     python examples/correct_a_survey.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
 SURVEY is a survey.toml or its folder. Without it a small survey is simulated: a street, a drive
-with a GNSS outage of 25 s, and 24 targets, of which 8 are check points.
+in which GNSS fails for 11 s in a canyon and for 25 s, and 24 targets, of which 8 are check points.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 import mlscorr
 from mlscorr.io.las import read_chunks
 
-ASSETS = Path(__file__).parents[1] / "assets"
+PICTURES = Path(__file__).parents[1] / "build" / "examples"
 REACH = 1.2  # m, drawn about the surveyed target
 
 
@@ -44,7 +44,7 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("survey", nargs="?", type=Path)
     parser.add_argument("--out", type=Path, help="keep the results in this folder")
-    parser.add_argument("--picture", type=Path, default=ASSETS / "correct_a_survey.png")
+    parser.add_argument("--picture", type=Path, default=PICTURES / "correct_a_survey.png")
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)
     return arguments

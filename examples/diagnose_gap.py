@@ -20,7 +20,7 @@ from mlscorr.simulate import Scenario, simulate
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-ASSETS = Path(__file__).parents[1] / "assets"
+PICTURES = Path(__file__).parents[1] / "build" / "examples"
 HIDDEN = [
     {"name": "time_offset", "magnitude": 0.006},
     {"name": "vertical_datum", "magnitude": 0.06},
@@ -103,7 +103,7 @@ def main():
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--picture", type=Path, default=ASSETS / "diagnose.png")
+    parser.add_argument("--picture", type=Path, default=PICTURES / "diagnose.png")
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)
     return arguments

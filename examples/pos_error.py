@@ -65,7 +65,9 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("series", nargs="?", type=Path, default=shared if shared.exists() else None)
     parser.add_argument("--drives", type=int, default=5, help="simulated drives of 1500 s")
-    parser.add_argument("--picture", type=Path, default=ROOT / "assets" / "pos_error.png")
+    parser.add_argument(
+        "--picture", type=Path, default=ROOT / "build" / "examples" / "pos_error.png"
+    )
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)
     return arguments

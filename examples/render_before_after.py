@@ -49,7 +49,9 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("survey", nargs="?", type=Path)
     parser.add_argument("--out", type=Path, help="write every picture into this folder")
-    parser.add_argument("--picture", type=Path, default=ROOT / "assets/render_before_after.png")
+    parser.add_argument(
+        "--picture", type=Path, default=ROOT / "build/examples/render_before_after.png"
+    )
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)
     return arguments

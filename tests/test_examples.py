@@ -2,13 +2,14 @@
 
 import json
 import os
+import runpy
 import subprocess
 import sys
 
 import pytest
 
 from tests.beds.joint_scores import records
-from tests.beds.places import BENCHMARKS, EXAMPLES
+from tests.beds.places import BENCHMARKS, EXAMPLES, ROOT
 
 
 @pytest.mark.long
@@ -68,6 +69,16 @@ def test_an_example_without_its_input_ends_in_a_sentence(name, tmp_path):
     done = subprocess.run(script, text=True, capture_output=True, cwd=tmp_path, check=False)
     assert done.returncode and str(tmp_path / "none") in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.py")))
+def test_an_example_draws_outside_the_manual(name):
+    "Without --picture it draws into build/examples, so that no picture of the manual changes"
+    script = runpy.run_path(str(EXAMPLES / f"{name}.py"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", [f"{name}.py"])
+        given = script["parse"]()
+    assert given.picture.parent == ROOT / "build" / "examples"
 
 
 SCRIPTS = sorted(p.stem for p in BENCHMARKS.glob("*.py") if "__main__" in p.read_text())

@@ -74,7 +74,9 @@ def parse():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--layouts", type=int, default=1, help="of targets, to count verdicts over")
     parser.add_argument("-o", "--out", type=Path, default=Path("pos_gap"))
-    parser.add_argument("--picture", type=Path, default=ROOT / "assets" / "real_pos_gap.png")
+    parser.add_argument(
+        "--picture", type=Path, default=ROOT / "build" / "examples" / "real_pos_gap.png"
+    )
     return parser.parse_args()
 
 

@@ -91,7 +91,9 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("-o", "--out", type=Path, default=Path("two_pass_gap"))
-    parser.add_argument("--picture", type=Path, default=ROOT / "assets" / "two_pass_gap.png")
+    parser.add_argument(
+        "--picture", type=Path, default=ROOT / "build" / "examples" / "two_pass_gap.png"
+    )
     return parser.parse_args()
 
 

@@ -20,7 +20,7 @@ class Registration(Transformation):
     Parameters
     ----------
     variant : str
-        ``point-to-point`` or ``point-to-plane``, whichever has more inliers.
+        ``point-to-point`` or ``point-to-plane``, whichever leaves less at the control points.
     fitness : float
         Share of the targets' points within 0.05 m of a surveyed surface.
     inlier_rmse : float
@@ -39,10 +39,12 @@ class Registration(Transformation):
 def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Registration:
     """Rigid motion by iterative closest points, of the targets' points to the surveyed surfaces.
 
-    Point-to-point first, then point-to-plane from there; the one with the more inliers is taken.
     A surveyed surface is a disc or plate of the target's kind and size at the surveyed centre and
-    normal (the observed one where none was surveyed). Points farther from the surfaces than twice
-    the largest misclosure of a control point are no partners.
+    normal (the observed one where none was surveyed). Partners are sought coarse to fine: within
+    twice the largest misclosure of a control point first, then within half of that, down to 0.05 m.
+    Each distance starts from the motion of the one before, by point-to-point, and by point-to-plane
+    from there. Of all these motions the one with the smallest RMSE at the control points is taken:
+    where the POS drifts, a small distance fits a part of the targets alone.
 
     Parameters
     ----------
@@ -68,22 +70,37 @@ def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Reg
     source, surface = _surfaces(matched, cloud, pass_number, pairs.origin)
     misclosure = np.linalg.norm(pairs.misclosure, axis=1)
     largest = 2.0 * max(float(misclosure.max()), SETTINGS.inlier)
-    point = _register(source, surface, largest, np.eye(4), "PointToPoint")
-    plane = _register(source, surface, largest, point, "PointToPlane")
-    motions = {"point-to-point": point, "point-to-plane": plane}
+    motions = _motions(source, surface, largest)
+    variant, matrix = min(motions, key=lambda motion: _control_rmse(pairs, motion[1]))
     evaluate = open3d.pipelines.registration.evaluate_registration
-    scores = {name: evaluate(source, surface, SETTINGS.inlier, m) for name, m in motions.items()}
-    variant = max(scores, key=lambda name: (scores[name].fitness, -scores[name].inlier_rmse))
-    matrix, score = motions[variant], scores[variant]
+    score = evaluate(source, surface, SETTINGS.inlier, matrix)
     change = matrix[:3, :3] - np.eye(3)
-    remaining = pairs.misclosure - matrix[:3, 3] - pairs.observed @ change.T
     registration = Registration(
         pairs.origin, matrix[:3, 3].copy(), change, variant=variant, fitness=float(score.fitness),
-        inlier_rmse=float(score.inlier_rmse), control_before=float(np.sqrt(np.mean(misclosure**2))),
-        control_after=float(np.sqrt(np.mean(np.sum(remaining**2, axis=1)))),
+        inlier_rmse=float(score.inlier_rmse), control_before=_control_rmse(pairs, np.eye(4)),
+        control_after=_control_rmse(pairs, matrix),
     )  # fmt: skip
     _warn(registration)
     return registration
+
+
+def _motions(source, surface, largest):
+    """Variant and 4 x 4 matrix of the ICP of each kind within each distance, coarse to fine."""
+    motions, point, within = [], np.eye(4), largest
+    while True:
+        point = _register(source, surface, within, point, "PointToPoint")
+        plane = _register(source, surface, within, point, "PointToPlane")
+        motions += [("point-to-point", point), ("point-to-plane", plane)]
+        if within <= SETTINGS.inlier:
+            return motions
+        within = max(within / 2, SETTINGS.inlier)
+
+
+def _control_rmse(pairs, matrix):
+    """3D RMSE of the control points' misclosures after a motion. Units: m."""
+    change = matrix[:3, :3] - np.eye(3)
+    remaining = pairs.misclosure - matrix[:3, 3] - pairs.observed @ change.T
+    return float(np.sqrt(np.mean(np.sum(remaining**2, axis=1))))
 
 
 def _warn(registration):

@@ -129,11 +129,6 @@ def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
         ("check points", report["check"], "after"),
     ]
     terminal.say_rmse(rows, width=24, decimals=3)
-    made = {file["name"] for file in report["files"]}
-    clouds = [path.name for path in out.glob("*") if path.suffix.lower() in (".las", ".laz")]
-    pages = [n for n in ("report.html", "pictures") if not page and (out / n).exists()]
-    if older := sorted({*clouds, *pages} - made):
-        terminal.warn(f"Of an earlier run, and left as it was in {out}: {', '.join(older)}.")
     if page:
         terminal.say(f"Report:    {out / 'report.html'}")
         terminal.say(f"Pictures:  {out / 'pictures'}")

@@ -21,6 +21,6 @@ def demo(
     with work(out, overwrite) as progress:
         from mlscorr.pipeline import demo
 
-        say("Simulating a street, a drive with a GNSS outage, and a scanner ...")
+        say("Simulating a street, a drive with two GNSS outages, and a scanner ...")
         report = demo(out, seed, overwrite, progress)
     tell(report, out / "corrected", as_json)

@@ -18,8 +18,7 @@ def extract(
     print_json(content, as_json)
     targets = content["targets"]
     matched = sum(row["matched"] for row in targets)
-    passes = counted(len({row["pass"] for row in targets}), "pass")
-    say(f"{counted(len(targets), 'target-like object')} in {passes}.")
+    say(f"{counted(len(targets), 'target-like object')} found.")
     if content["surveyed"]:
         points = len({row["name"] for row in targets if row["matched"]})
         say(

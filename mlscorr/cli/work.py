@@ -7,7 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mlscorr.cli.progress import Progress, progress_bars
-from mlscorr.cli.terminal import Exit, deafen, exit_code, say
+from mlscorr.cli.terminal import Exit, deafen, exit_code, say, warn
+
+NAMED = 10  # files in a sentence; more are counted
 
 
 @contextmanager
@@ -16,6 +18,9 @@ def work(
     planned: bool = False,
 ) -> Iterator[Progress]:  # fmt: skip
     """Check where results go, then show progress; bad data end with a sentence and their code.
+
+    Files that were in the folder before and that the command did not write anew are named at the
+    end: they may be results of an earlier run.
 
     Parameters
     ----------
@@ -55,6 +60,7 @@ def work(
         except ValueError:
             check_unchanged(states)  # the likelier cause
             raise
+    _name_older(out, before or {})
     deafen()
 
 
@@ -73,7 +79,26 @@ def _noise_said():
 
 def _entries(out):
     """Names and numbers of the files in a folder, None without one: whether results were put in."""
-    return {e.name: e.inode() for e in os.scandir(out)} if out.is_dir() else None
+    if not out.is_dir():
+        return None
+    return {
+        os.path.relpath(os.path.join(folder, name), out): os.lstat(f"{folder}/{name}").st_ino
+        for folder, _, names in os.walk(out)
+        for name in names
+    }
+
+
+def _name_older(out, before):
+    """Name the files of a folder that are the same as before."""
+    after = _entries(out) or {}
+    older = sorted(name for name, number in before.items() if after.get(name) == number)
+    if not older:
+        return
+    more = f" and {len(older) - NAMED} more" if len(older) > NAMED else ""
+    warn(
+        f"Not written by this run, and left as they were in {out}: {', '.join(older[:NAMED])}"
+        f"{more}. Delete them if they are results of an earlier run."
+    )
 
 
 def print_json(content: dict, as_json: bool) -> None:

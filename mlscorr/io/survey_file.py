@@ -289,7 +289,7 @@ def cloud_file(
         Where the file states another CRS.
     """
     layout = read_layout(path)
-    file = CloudFile(path, layout.points, layout.time_offset, "", ids, noise_classes)
+    file = CloudFile(path, layout.points, layout.time_offset, "", ids, noise_classes=noise_classes)
     if layout.scale.max() > 0.002:  # m, half of what a scanner's ranges are good for
         warnings.warn(
             f"The coordinates of {path.name} are in steps of {layout.scale.max():g} m: neither "

@@ -19,6 +19,7 @@ from mlscorr.io.noise import counted_noise
 from mlscorr.io.preparation import glance
 from mlscorr.io.projection import crs_code, crs_name
 from mlscorr.io.survey_file import read_survey
+from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pipeline import needs
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
 from mlscorr.pipeline.finding import find_control
@@ -175,16 +176,15 @@ def _crs_hints(survey, layouts) -> Iterator[str]:
 
 def _placed_times(survey) -> tuple[int, list[str]]:
     """Number of passes that times spread over the files lie in; sentences on those outside."""
-    passes, outside = 0, []
+    placed, outside = [], []
     for file in survey.clouds:
         records = timed_records(read_layout(file.path))
         times = file.trajectory_time(records["gps_time"][file.rows(records["point_source_id"])])
         if not len(times):
             continue
-        segment = survey.trajectory.segment(times)
-        passes += len(set(segment[segment >= 0].tolist()))
+        placed.append(times)
         outside += outside_warnings(survey, file, times)
-    return passes, outside
+    return survey.trajectory.count_passes(placed, MATCHING.pause), outside
 
 
 def _uncovered(survey, layouts) -> tuple[list[str], bool]:

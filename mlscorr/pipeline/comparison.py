@@ -11,10 +11,11 @@ from mlscorr.evaluate.rows import Statistics
 from mlscorr.evaluate.scores import misclosures
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.pipeline.compared_survey import ComparedSurvey
-from mlscorr.pipeline.finding import find_control, silent
-from mlscorr.pipeline.methods import METHODS, load_open3d
+from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.methods import METHODS, Observed, load_open3d
 from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.pipeline.tying import observe_survey, tie_use
 from mlscorr.survey import Survey, check_survey
 
 
@@ -55,40 +56,41 @@ def compare(
     True
     """
     check_survey(survey)
-    control, check, finding = find_control(survey, rng, progress)
+    survey, control, check, finding, features = observe_survey(
+        survey, tie_use(survey, None), rng, progress
+    )
     for sentence in reuse_warnings(survey):
         warnings.warn(sentence, stacklevel=2)
-    candidates = finding.candidates
+    observed = Observed(survey, finding.candidates, features)
     load_open3d()  # takes seconds, which are not the method's
     is_few = len(set(check.name)) < SETTINGS.check_points
     groups = _groups(control) if is_few else []
     done = (progress or silent)("Fitting", len(METHODS) * (1 + len(groups)))
     rows, corrections = [], {}
     for method in METHODS:
-        row, correction = _row(method, survey, control, check, candidates)
+        row, correction = _row(method, observed, control, check)
         done(1)
         if is_few:
             left = misclosures(check, correction)
-            row["cross_validated"] = _cross_validated(
-                method, survey, control, candidates, groups, left, done
-            )
+            row["cross_validated"] = _cross_validated(method, observed, control, groups, left, done)
         rows.append(row)
         if correction is not None:
             corrections[method.name] = correction
+    from mlscorr.report.comparison_screen import method_warnings
+
+    for sentence in method_warnings(rows):
+        warnings.warn(sentence, stacklevel=2)
     return ComparedSurvey(
         survey=survey, matched_control=control, matched_check=check, rows=tuple(rows),
         corrections=corrections, groups=len(groups),
-        missing=unseen_rows(survey, finding.matches.refusals, candidates, finding.scanned),
+        missing=unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned),
     )  # fmt: skip
 
 
-def _row(method, survey, control, check, candidates):
+def _row(method, observed, control, check):
     """A method's row of compare.json, and its correction or None."""
     with warnings.catch_warnings(record=True, action="always") as caught:
-        correction, details, why, seconds = _fitted(method, survey, control, candidates)
-    doubts = [str(warning.message) for warning in caught]
-    for sentence in doubts:
-        warnings.warn(f"{method.name}: {sentence}", stacklevel=3)
+        correction, details, why, seconds = _fitted(method, observed, control)
     row = {
         "name": method.name,
         "kind": method.kind,
@@ -98,17 +100,17 @@ def _row(method, survey, control, check, candidates):
         "check": _score(check, correction),
         "control": _score(control, correction),
         "seconds": seconds,
-        "warnings": doubts,
+        "warnings": [str(warning.message) for warning in caught],
         "details": details,
     }
     return row, correction
 
 
-def _fitted(method, survey, matched, candidates):
+def _fitted(method, observed, matched):
     """Correction or None, details, why there is none, and seconds."""
     start = perf_counter()
     try:
-        correction, details = method.fit(survey, matched, candidates)
+        correction, details = method.fit(observed, matched)
     except Undetermined as problem:
         return None, {}, str(problem), None
     return correction, details, None, perf_counter() - start
@@ -132,7 +134,7 @@ def _groups(control):
     return [set(names[i::number]) for i in range(number)] if len(names) > 1 else []
 
 
-def _cross_validated(method, survey, control, candidates, groups, of_check, done):
+def _cross_validated(method, observed, control, groups, of_check, done):
     """N and the statistics over all points: each control point as the others correct it, each
     check point as all control points do. Without any group there is nothing to validate.
     """
@@ -140,7 +142,7 @@ def _cross_validated(method, survey, control, candidates, groups, of_check, done
     for group in groups:
         left_out = np.array([name in group for name in control.name])
         with warnings.catch_warnings(action="ignore"):  # told of the fit to all control points
-            correction, _, problem, _ = _fitted(method, survey, control[~left_out], candidates)
+            correction, _, problem, _ = _fitted(method, observed, control[~left_out])
         done(1)
         if correction is None:
             why = f"Without {', '.join(sorted(group))}: {problem}"

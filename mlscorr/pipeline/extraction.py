@@ -14,6 +14,7 @@ import numpy as np
 from mlscorr.io.las import read_chunks
 from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_extracted_csv
+from mlscorr.pipeline.beam_origin import with_beam_origin
 from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, silent, unmatched
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, TargetObservations, check_rng, check_survey
@@ -78,7 +79,8 @@ def extract(
     def searched(file):
         """The chunks of a file, each searched as it passes."""
         of_file = objects.setdefault(len(objects), [])
-        for chunk, targets in search_targets(read_chunks(file), survey.of(file), shapes, rng):
+        own = with_beam_origin(survey.of(file), file)
+        for chunk, targets in search_targets(read_chunks(file), own, shapes, rng):
             present[chunk.intensity] = True
             of_file += targets
             yield chunk

@@ -67,7 +67,7 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
         targets=[(segments[number], target) for number, target in fitted],
         unplaced=candidates.unplaced,
         scanned=frozenset(names[i] for i in np.flatnonzero(near.is_scanned)),
-        warnings=tuple(near.beams.warnings()),
+        warnings=tuple(near.warnings()),
         uncovered=tuple(near.beams.outside()),
         features=replace(features, pass_number=np.array(numbers, int)),
         seconds=candidates.seconds,

@@ -93,7 +93,7 @@ def _bar(survey, progress):
 
 def _checked(survey, targets, candidates, near):
     """The Finding of what fit_while_reading gives; raises as find_targets does."""
-    uncovered, sentences = tuple(near.beams.outside()), tuple(near.beams.warnings())
+    uncovered, sentences = tuple(near.beams.outside()), tuple(near.warnings())
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=4)
     finding = matched_finding(survey, targets, candidates, near)
@@ -169,7 +169,7 @@ def fit_while_reading(
     def fit(file, index, cloud):
         near.add_ball(index, cloud)
         generator = np.random.default_rng(seed)  # whatever was looked at before
-        targets = fit_near_control(index, cloud, survey.of(survey.clouds[file]), generator)
+        targets = fit_near_control(index, cloud, near.survey_of(survey.clouds[file]), generator)
         latest.extend(target for _, target in targets)
         fits.extend((index, (file, number), target) for number, target in targets)
 

@@ -23,15 +23,55 @@ def line_rate(cloud: PointCloud, trajectory: Trajectory) -> float | None:
         None where no rate stands out: a swinging mirror, several beams at once, a narrow view.
         Units: 1/s.
     """
+    beams = sampled_beams(cloud, trajectory)
+    if beams is None:
+        return None
+    time, place = beams
+    rate = turning_rate(time, np.exp(1j * np.arctan2(place[:, 2], place[:, 0])))
+    return None if rate is None else abs(rate)
+
+
+def sampled_beams(
+    cloud: PointCloud, trajectory: Trajectory
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Times (n,) from the first on and places (n, 3) in body axes of some points of a run.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        In any order.
+    trajectory : Trajectory
+
+    Returns
+    -------
+    tuple of array, or None
+        None where too few of them have a pose. Units: s, m.
+    """
     some = cloud[np.abs(cloud.gps_time - np.median(cloud.gps_time)) < SETTINGS.turning_time / 2]
     some = some[:: max(1, len(some) // SETTINGS.turning_points)]
     some = some[trajectory.segment(some.gps_time) >= 0]
     if len(some) < 100:
         return None
     pose = trajectory.at(some.gps_time)
-    beam = pose.attitude.inv().apply(some.xyz - pose.position)
-    time = some.gps_time - some.gps_time[0]
-    direction = np.exp(1j * np.arctan2(beam[:, 2], beam[:, 0]))
+    place = pose.attitude.inv().apply(some.xyz - pose.position)
+    return some.gps_time - some.gps_time[0], place
+
+
+def turning_rate(time: np.ndarray, direction: np.ndarray) -> float | None:
+    """Turns a second that leave of directions the least scatter, where they turn evenly.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Units: s.
+    direction : (n,) complex array
+        Of length one.
+
+    Returns
+    -------
+    float or None
+        Negative where they turn clockwise. Units: 1/s.
+    """
     length = float(np.ptp(time))
     if length < SETTINGS.turning_time / 10:
         return None
@@ -47,7 +87,7 @@ def line_rate(cloud: PointCloud, trajectory: Trajectory) -> float | None:
     (finest,) = _evenness(near, time, direction)
     if 1.0 - finest.max() > SETTINGS.uneven_turn * (1.0 - evenness[others].max()):
         return None
-    return float(abs(near[np.argmax(finest)]))
+    return float(near[np.argmax(finest)])
 
 
 def _evenness(rates, time, *directions):

@@ -7,8 +7,30 @@ from difflib import get_close_matches
 from functools import partial
 
 from mlscorr import baselines
+from mlscorr.estimate import SETTINGS as ESTIMATE
 from mlscorr.estimate import estimate_correction
 from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.pipeline.tying import estimate_together
+from mlscorr.survey import Survey, TieFeatures
+from mlscorr.targets import Candidates
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What the methods are given beside the control points.
+
+    Parameters
+    ----------
+    survey : Survey
+    candidates : Candidates
+        Points near the targets.
+    features : TieFeatures or None
+        Planes, poles and paint that may tie passes; None where the survey leaves ties out.
+    """
+
+    survey: Survey
+    candidates: Candidates
+    features: TieFeatures | None
 
 
 @dataclass(frozen=True)
@@ -20,8 +42,8 @@ class Method:
     name, kind, about : str
         As compare.json has them.
     fit : function
-        ``fit(survey, matched, candidates)`` gives what has ``apply(cloud)``, and details of it as
-        a dict; it raises Undetermined where the control points don't suffice.
+        ``fit(observed, matched)`` gives what has ``apply(cloud)``, and details of it as a dict; it
+        raises Undetermined where the control points don't suffice.
     """
 
     name: str
@@ -32,7 +54,7 @@ class Method:
 
 def _one_move(name, about, fit):
     """A Method whose fit needs no more than pairs of places."""
-    return Method(name, "one move", about, lambda _survey, matched, _: (fit(matched), {}))
+    return Method(name, "one move", about, lambda _, matched: (fit(matched), {}))
 
 
 def load_open3d() -> str | None:
@@ -44,12 +66,13 @@ def load_open3d() -> str | None:
     return None
 
 
-def _icp(_survey, matched, candidates):
+def _icp(observed, matched):
     problem = load_open3d()
     if problem is not None:
         raise baselines.Undetermined(problem)
     from mlscorr.baselines.registration import fit_icp
 
+    candidates = observed.candidates
     registration = fit_icp(matched, candidates.cloud, candidates.pass_number)
     names = ("variant", "fitness", "inlier_rmse", "control_before", "control_after")
     return registration, {name: getattr(registration, name) for name in names}
@@ -58,8 +81,8 @@ def _icp(_survey, matched, candidates):
 def _over_time(name, about, fit):
     """A Method whose fit needs the trajectory and the control points."""
 
-    def of_survey(survey, matched, _):
-        return fit(survey.trajectory, matched), {}
+    def of_survey(observed, matched):
+        return fit(observed.survey.trajectory, matched), {}
 
     return Method(name, "over time", about, of_survey)
 
@@ -70,7 +93,8 @@ def _polynomial(order):
 
 
 def _literal(order):
-    def fit(survey, matched, _):
+    def fit(observed, matched):
+        survey = observed.survey
         return baselines.fit_literal(survey.trajectory, matched, survey.pos, order)
 
     about = (
@@ -80,8 +104,21 @@ def _literal(order):
     return Method(f"lsc-{order}", "collocation", about, fit)
 
 
-def _lsc(survey, matched, _):
+def _lsc(observed, matched):
+    survey = observed.survey
     estimate = estimate_correction(survey.trajectory, matched, survey.pos)
+    return _with_details(estimate)
+
+
+def _correct(observed, matched):
+    estimate = estimate_together(observed.survey, matched, observed.features, ESTIMATE.order)
+    correction, details = _with_details(estimate)
+    used = 0 if estimate.ties is None else int(estimate.ties.used.sum())
+    return correction, details | {"ties": used, "untied": estimate.untied or None}
+
+
+def _with_details(estimate):
+    """The correction of an Estimate and its details; its warnings are given on."""
     for sentence in estimate.warnings:
         warnings.warn(sentence, stacklevel=2)
     details = asdict(estimate.parameters) | {
@@ -123,6 +160,12 @@ METHODS = (
         "collocation",
         "Collocation with parameters that the control points themselves make likely.",
         _lsc,
+    ),
+    Method(
+        "correct",
+        "collocation",
+        "What mlscorr correct does: lsc, with ties between passes where they overlap.",
+        _correct,
     ),
 )
 

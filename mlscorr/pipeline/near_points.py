@@ -8,8 +8,9 @@ from scipy.spatial import cKDTree
 
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.project_file import ProjectParts
+from mlscorr.pipeline.beam_origin import with_beam_origin
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import PointCloud, Survey, SurveyFileError
+from mlscorr.survey import CloudFile, PointCloud, Survey, SurveyFileError
 from mlscorr.survey.summary import counted
 from mlscorr.targets import BY_EDGES, Candidates, search_radius, why_useless
 
@@ -25,6 +26,8 @@ class NearPoints:
     is_present : (65536,) bool array
         Which intensities they have.
     points : int
+    of_file : dict
+        The survey of each CloudFile about which something was asked, with the place of its scanner.
 
     Parameters
     ----------
@@ -33,6 +36,7 @@ class NearPoints:
 
     def __init__(self, survey: Survey):
         self.beams, self.points = BeamCheck(survey), 0
+        self.survey, self.of_file = survey, {}
         self.is_scanned = np.zeros(len(survey.surveyed), bool)
         self.is_present = np.zeros(1 << 16, bool)
 
@@ -41,6 +45,29 @@ class NearPoints:
         """The darkest and the brightest, in words."""
         present = np.flatnonzero(self.is_present)
         return f"intensity {present[0]} to {present[-1]}"
+
+    def survey_of(self, file: CloudFile) -> Survey:
+        """The survey of the scanner that wrote a file, with the scanner's place.
+
+        Parameters
+        ----------
+        file : CloudFile
+        """
+        if file not in self.of_file:
+            self.of_file[file] = with_beam_origin(self.survey.of(file), file)
+        return self.of_file[file]
+
+    def warnings(self) -> Iterator[str]:
+        """Sentences on files whose beams can't have been measured so, or come from nowhere."""
+        yield from self.beams.warnings()
+        for file, survey in self.of_file.items():
+            if survey.mounting is None and survey.beam_origin is None:
+                yield (
+                    f"{survey.path} gives no [mounting], and the beams of {file.name} don't show "
+                    "where the scanner was: it is taken to be at the navigation centre. Plates "
+                    "that stand free may be missed or found centimetres off; give lever_arm and "
+                    "boresight under [mounting]."
+                )
 
     def add(self, cloud: PointCloud) -> None:
         """Count more of them.

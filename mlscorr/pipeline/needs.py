@@ -4,8 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter
 
-import numpy as np
-
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.io.conversion import recorded_points
 from mlscorr.io.las import read_chunks
@@ -90,14 +88,13 @@ def amounts_read(survey: Survey, sampled: int) -> tuple[Amount, ...]:
     tuple of Amount
     """
     trajectory = survey.trajectory
-    driven = float(np.sum(np.diff(trajectory.passes, axis=1)))
-    way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+    driven = f"{len(trajectory)} epochs, {trajectory.length / 1e3:.2f} km, without gaps"
     points = sum(map(recorded_points, survey.clouds))
     return (
         Amount("points", points, "", f"headers of {_files(survey)}"),
         Amount("scanners", len(survey.by_scanner), "", "survey.toml"),
         Amount("passes", sampled, "", f"{IO.sampled_points} times of each file"),
-        Amount("trajectory", driven, "s", f"{len(trajectory)} epochs, {way.sum() / 1e3:.2f} km"),
+        Amount("trajectory", trajectory.duration, "s", driven),
         Amount("control points", len(survey.control), "", "role control"),
         Amount("check points", len(survey.check), "", "role check; they take no part"),
     )

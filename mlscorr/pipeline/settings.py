@@ -27,6 +27,11 @@ class Settings:
     turning_points: int = 4000  # points of these: enough for the mean of a direction
     turning_rates: tuple[float, float] = (4.0, 600.0)  # 1/s, slower and faster than any scanner
     uneven_turn: float = 0.25  # of the scatter that any other rate leaves; that of turns is a tenth
+    # Where beams come from, without a mounting
+    looked_shares: tuple[float, ...] = (0.5, 0.25, 0.75, 0.0, 1.0)  # of a file, until one shows it
+    beam_rounds: int = 20  # of least squares; a metre off at first, five suffice
+    # m, by which beams pass by where they come from: millimetres do, and a wrong rate decimetres
+    beam_scatter: float = 0.05
     epoch_bytes: int = 137  # bytes, of a line of trajectory.csv with sigmas in a UTM zone
     # What a correction took beside the fits of its targets, docs/results.md
     decodings: float = 5.0  # times decoding the points once: reading, ties, copying, drawing

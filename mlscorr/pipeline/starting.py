@@ -33,6 +33,7 @@ from mlscorr.io.storage import files_like
 from mlscorr.io.survey_file import FILE_NAME, read_survey
 from mlscorr.io.survey_sections import ControlSection, PlannedSurveyFile
 from mlscorr.io.toml_file import validate
+from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pipeline.choice import choose_control, choose_crs
 from mlscorr.pipeline.drives import Cloud, choose_accuracy, choose_trajectory
 from mlscorr.pipeline.line_rate import line_rate
@@ -342,14 +343,14 @@ def _put_clouds(text, path, clouds, trajectory):
         there = list(path.parent.glob(next(iter(patterns))))
         names = sorted(patterns) if len(there) == len(names) else names
     points = sum(recorded_points(cloud.file()) for cloud in clouds)
-    spans, passes, systems = [], 0, Counter()
+    spans, placed, systems = [], [], Counter()
     for cloud in clouds:
         match = cloud.match(trajectory, text.given.get("cloud.gps_time", "auto"))
         times = match.placed(cloud.known_times)
-        segment = trajectory.segment(times)
-        passes += len(set(segment[segment >= 0].tolist()))
+        placed.append(times)
         spans.append((times.min(), times.max()))
         systems[str(match)] += 1
+    passes = trajectory.count_passes(placed, MATCHING.pause)
     text.put("cloud", "files", names, f"files: {len(clouds)}, points: {points}, passes: {passes}")
     text.put("cloud", "gps_time", "auto", "; ".join(systems))
     start, end = np.array(sorted(spans)).T
@@ -370,8 +371,8 @@ def _put_sessions(text, path, drive, accuracy):
     """File and accuracy of the trajectory, or of each."""
     for number, (file, part) in enumerate(zip(drive.paths, drive.recorded.parts, strict=True)):
         section = "trajectory" if len(drive.paths) == 1 else text.listed("trajectory", number)
-        length = float(np.ptp(part.gps_time))
-        text.put(section, "file", _name(path, file), f"{len(part)} epochs, {length:.0f} s")
+        length = f"{len(part)} epochs, {part.duration:.0f} s without gaps"
+        text.put(section, "file", _name(path, file), length)
         if file in accuracy:
             text.put(section, "accuracy", _name(path, accuracy[file]), "sigmas of the trajectory")
 

@@ -18,8 +18,8 @@ OPTIONAL = {
         '# file = "control.csv"          # surveyed targets; without them passes are only tied'
     ],
     "mounting": [
-        "# How the scanner stands on the POS, by drawing or calibration; calibrate and diagnose",
-        "# need it, a correction does without.",
+        "# How the scanner stands on the POS, by drawing or calibration. calibrate and plan need",
+        "# it, diagnose judges fewer effects without, and a correction does without.",
         "# lever_arm = [0.0, 0.0, 0.0]   # m: right, forward, up; from the POS to the scanner",
         "# boresight = [0.0, 0.0, 0.0]   # deg, [a, b, c]: Rz(c) Ry(b) Rx(a), scanner to body",
     ],

@@ -16,7 +16,7 @@ from mlscorr.io.output import document, output_folder, write_json
 from mlscorr.io.result_tables import write_ties_csv
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import TIE_KINDS, Survey, TieFeatures, check_survey
-from mlscorr.survey.summary import Summary, counted
+from mlscorr.survey.summary import Summary
 from mlscorr.ties import (
     SETTINGS,
     TieCollector,
@@ -152,11 +152,10 @@ class TiedSurvey(Summary):
     def warnings(self) -> tuple[str, ...]:
         """What a reader of the ties must know."""
         ties, refused = self.search.ties, self.search.refused
-        passes = np.unique(self.features.pass_number)
         if len(ties) == 0:
             return (
-                f"No tie was found: {counted(len(passes), 'pass')} with {len(self.features)} "
-                f"planes, poles and markings saw nothing twice within {self.search.radius:.2f} m. "
+                f"No tie was found: none of {len(self.features)} planes, poles and markings was "
+                f"seen twice within {self.search.radius:.2f} m. "
                 "Drive the street twice, best in both directions; where that was done, passes lie "
                 "farther apart than the POS states: raise its sigmas, or [matching] search_radius.",
             )

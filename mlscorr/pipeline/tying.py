@@ -22,7 +22,6 @@ from mlscorr.estimate.inputs import check_order
 from mlscorr.io.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.survey import Matched, Survey, TieFeatures, Ties, time_spans
-from mlscorr.survey.summary import counted
 from mlscorr.ties import (
     NORMAL_SCATTER,
     SETTINGS,
@@ -79,13 +78,67 @@ def estimate_survey(
         As ``find_control``, for another use of ties, an order that is none, and where they alone
         are asked for and there is none.
     """
-    ties = ("auto" if survey.use_ties else "off") if ties is None else ties
-    if ties not in get_args(TieUse):
-        known = ", ".join(map(repr, get_args(TieUse)))
-        raise ValueError(f"ties = {ties!r} is no use of ties: give one of {known}, or None.")
+    ties = tie_use(survey, ties)
     check_order(order)
     if ties == "only":
         survey = without_control(survey)
+    survey, control, check, finding, features = observe_survey(survey, ties, rng, progress)
+    estimate = estimate_together(survey, control, features, order)
+    if ties == "only" and estimate.ties is None:
+        raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
+    return survey, control, check, finding, estimate
+
+
+def tie_use(survey: Survey, ties: TieUse | None) -> TieUse:
+    """Use of ties that is asked for; what survey.toml states where nothing is.
+
+    Parameters
+    ----------
+    survey : Survey
+    ties : str or None
+        As of ``correct``.
+
+    Raises
+    ------
+    ValueError
+        For another use than there is.
+    """
+    if ties is None:
+        return "auto" if survey.use_ties else "off"
+    if ties not in get_args(TieUse):
+        known = ", ".join(map(repr, get_args(TieUse)))
+        raise ValueError(f"ties = {ties!r} is no use of ties: give one of {known}, or None.")
+    return ties
+
+
+def observe_survey(
+    survey: Survey, ties: TieUse, rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+) -> tuple[Survey, Matched, Matched, Finding, TieFeatures | None]:  # fmt: skip
+    """Read a survey's clouds once, for its targets and for the features that may tie its passes.
+
+    Parameters
+    ----------
+    survey : Survey
+    ties : str
+        ``only``: no control point is needed.
+    rng, progress
+        As of ``find_targets``.
+
+    Returns
+    -------
+    survey : Survey
+        Its trajectory knows the seconds in which points lie.
+    control, check : Matched
+    finding : Finding
+    features : TieFeatures or None
+        None where ties are off.
+
+    Raises
+    ------
+    ValueError
+        As ``find_control``.
+    """
     collector = TieCollector(survey)
     read = read_chunks if ties == "off" else read_into(collector.add)
     if ties == "only":
@@ -95,11 +148,7 @@ def estimate_survey(
         control, check, finding = find_control(survey, rng, progress, read)
     features = None if ties == "off" else collector.features()
     trajectory = survey.trajectory.scanned_at(finding.candidates.seconds)
-    survey = replace(survey, trajectory=trajectory)
-    estimate = estimate_together(survey, control, features, order)
-    if ties == "only" and estimate.ties is None:
-        raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
-    return survey, control, check, finding, estimate
+    return replace(survey, trajectory=trajectory), control, check, finding, features
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
@@ -240,11 +289,10 @@ def _untied(estimate, features, radius):
     """The estimate with the reason why nothing is tied, a warning where something should be."""
     if estimate.untied:
         return estimate
-    passes, near = len(np.unique(features.pass_number)), _revisited(features, radius)
+    near = _revisited(features, radius)
     what = (
-        f"{near} of {len(features)} planes, poles and markings of {counted(passes, 'pass')} "
-        f"lie within about {radius:.1f} m of what was scanned at another "
-        "time"
+        f"{near} of {len(features)} planes, poles and markings lie within about {radius:.1f} m of "
+        "what was scanned at another time"
     )
     if near < SETTINGS.neighbours:
         reason = (

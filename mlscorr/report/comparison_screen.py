@@ -9,7 +9,8 @@ from mlscorr.report import headline, tables
 from mlscorr.report.settings import SETTINGS
 from mlscorr.survey.summary import counted
 
-COLLOCATION = "lsc"
+OWN = "correct"  # the method that the command of this name uses
+UNTIED = "lsc"  # the same by control points alone
 OTHERS = {
     "one move": "Best of those that move the whole cloud as one",
     "over time": "Best of polynomials and interpolation over time",
@@ -31,10 +32,9 @@ def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[s
         _scored(document),
         headline.check_statement(PointCounts.of(rows, "check")),
         headline.control_statement(PointCounts.of(rows, "control")),
+        *_ties(document),
         *_undetermined(document),
-        *headline.warning_statements(
-            f"{row['name']}: {text}" for row in document["methods"] for text in row["warnings"]
-        ),
+        *headline.warning_statements(method_warnings(document["methods"])),
     ]
     return headline.statements_section(facts)
 
@@ -51,6 +51,37 @@ def _scored(document):
     """What the scores rest on."""
     rating = "amber" if document["scored_by"] == "control" else "green"
     return headline.Statement("Scores", rating, basis(document))
+
+
+def _ties(document) -> Iterator[headline.Statement]:
+    """Which methods use ties between passes, where there are any."""
+    own = next((row for row in document["methods"] if row["name"] == OWN), None)
+    if own is None or own["status"] != "determined":
+        return
+    if count := own["details"]["ties"]:
+        sentence = (
+            f"{OWN} also uses {counted(count, 'tie')}: planes, poles and paint that two passes "
+            "both saw. All other methods use the control points alone."
+        )
+    else:
+        why = own["details"]["untied"] or ""
+        sentence = f"{OWN} equals {UNTIED} here, for no ties were used. {why}".rstrip()
+    yield headline.Statement("Ties", "green", sentence)
+
+
+def method_warnings(rows: list[dict]) -> list[str]:
+    """Warnings of all methods, each once, after the names of the methods that gave it.
+
+    Parameters
+    ----------
+    rows : list of dict
+        ``methods`` of compare.json.
+    """
+    names: dict[str, list[str]] = {}
+    for row in rows:
+        for sentence in row["warnings"]:
+            names.setdefault(sentence, []).append(row["name"])
+    return [f"{joined(of_one)}: {sentence}" for sentence, of_one in names.items()]
 
 
 def _undetermined(document) -> Iterator[headline.Statement]:
@@ -138,10 +169,11 @@ def verdict(document: dict) -> list[str]:
         rest = [row["name"] for row in ranked if row["kind"] == kind]
         if rest and rest[0] not in tied:
             sentences.append(f"{words}: {rest[0]}, with {tables.number(value[rest[0]])} m.")
-    if COLLOCATION in value and COLLOCATION not in tied:
-        own, behind = value[COLLOCATION], value[COLLOCATION] - value[best]
+    if OWN in value and OWN not in tied:
+        own = value[OWN]
+        behind = own - value[best]
         sentences.append(
-            f"{COLLOCATION}, with {tables.number(own)} m, is {tables.number(behind)} m behind."
+            f"{OWN}, with {tables.number(own)} m, is {tables.number(behind)} m behind."
         )
     return sentences
 

@@ -12,6 +12,7 @@ from mlscorr.report.map_frame import corners, frame
 from mlscorr.report.pages import Page, data_uri
 from mlscorr.report.style import new_figure, nice, styled, svg
 from mlscorr.report.target_map import write_names
+from mlscorr.survey.summary import counted
 
 SECTIONS = {"drives": "Drives", "map": "Map"}
 
@@ -30,7 +31,7 @@ def write_project(path: str | Path, document: dict, tracks: dict[str, np.ndarray
     """
     figures = {"map": data_uri(svg(project_map(tracks)))} if tracks else {}
     Page(
-        title=f"{document['name']}: correction of {len(document['drives'])} drives",
+        title=f"{document['name']}: correction of {counted(len(document['drives']), 'drive')}",
         summary="project-summary.html",
         sections={name: title for name, title in SECTIONS.items() if name != "map" or tracks},
         content={"document": document, "figures": figures},

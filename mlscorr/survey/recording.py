@@ -93,6 +93,9 @@ class Survey(Summary):
         Names of the control points by which the trajectory, and the clouds, were corrected before.
     is_remounted : bool
         Whether a calibration changed the mounting, and the clouds are as it was recorded before.
+    beam_origin : (3,) array, optional
+        Where the beams come from in body axes, as the cloud shows it, where no mounting is given.
+        Units: m.
     """
 
     name: str
@@ -114,6 +117,7 @@ class Survey(Summary):
     scanners: tuple[MountedScanner, ...] = ()
     corrected_by: tuple[str, ...] = ()
     is_remounted: bool = False
+    beam_origin: np.ndarray | None = None
 
     @cached_property
     def surveyed(self) -> ControlPoints:
@@ -148,8 +152,11 @@ class Survey(Summary):
 
     @property
     def assumed_mounting(self) -> Mounting:
-        """The mounting; where none is known, beams are from the navigation centre, in body axes."""
-        return self.mounting or Mounting(np.zeros(3), Rotation.identity())
+        """The mounting; where none is known, beams are in body axes from where they show it, or
+        else from the navigation centre.
+        """
+        origin = np.zeros(3) if self.beam_origin is None else self.beam_origin
+        return self.mounting or Mounting(origin, Rotation.identity())
 
     @cached_property
     def by_scanner(self) -> dict[str, Survey]:

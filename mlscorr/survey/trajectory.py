@@ -144,6 +144,44 @@ class Trajectory(Summary):
         scanned[:-1] |= inside[1:] & is_step
         return replace(self, scanned=scanned)
 
+    @property
+    def duration(self) -> float:
+        """Time that was recorded, without the gaps. Units: s."""
+        return self.recorded_time(*self.gps_time[[0, -1]])
+
+    @property
+    def length(self) -> float:
+        """Length of the recorded path, without what lies across the gaps. Units: m."""
+        steps = np.linalg.norm(np.diff(self.position, axis=0), axis=1)
+        return float(steps[np.diff(self.segment(self.gps_time)) == 0].sum())
+
+    def count_passes(self, times: Iterable[np.ndarray], pause: float) -> int:
+        """Number of passes in which several files were scanned.
+
+        A pass ends at a gap of the trajectory, and where no file goes on within a pause. So tiles
+        of one drive are one pass, and so are the files of two scanners.
+
+        Parameters
+        ----------
+        times : iterable of (n,) array
+            Times of some points of each file, in any order. Units: s.
+        pause : float
+            Files go on if they do within this and their own widest step. Units: s.
+        """
+        spans = []
+        for of_file in times:
+            segment = self.segment(of_file)
+            for number in np.unique(segment[segment >= 0]):
+                own = np.sort(of_file[segment == number])
+                widest = np.diff(own).max(initial=0.0)
+                spans.append((own[0], own[-1] + widest, number))
+        if not spans:
+            return 0
+        starts, ends, segments = np.array(sorted(spans)).T
+        goes_on = starts[1:] <= np.maximum.accumulate(ends)[:-1] + pause
+        goes_on &= segments[1:] == segments[:-1]
+        return 1 + int(np.count_nonzero(~goes_on))
+
     def recorded_time(self, start: float, end: float) -> float:
         """Time from start to end without the gaps that lie whole between them. Units: s."""
         starts, ends = self.gaps.T

@@ -55,6 +55,15 @@ def test_icp_finds_a_small_motion():
     assert found.control_after < 0.010 < found.control_before
 
 
+def test_icp_comes_close_from_a_metre_away():
+    "Coarse to fine, discs 1.1 m away from where they were surveyed come within 1 cm of it"
+    rng = np.random.default_rng(12)
+    case = icp_case(rng, lambda p, _: p + np.array([0.8, -0.6, 0.4]))
+    found = fit_icp(case, *surface_points(rng, case.observations))
+    assert found.control_before > 1.0
+    assert np.abs(misclosures(case, found)).max() < 0.010
+
+
 def test_icp_says_loudly_that_it_failed():
     "Where the POS drifts by a metre, ICP tells fitness and RMSE, and that it moved from control"
     rng = np.random.default_rng(9)

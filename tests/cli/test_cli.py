@@ -17,7 +17,8 @@ import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
-from mlscorr.cli.correct import tell
+from mlscorr.cli.work import work
+from mlscorr.io.output import output_folder
 from tests.beds.documents import undocumented
 from tests.beds.places import MLSCORR, ROOT
 
@@ -325,16 +326,26 @@ def test_a_cloud_that_has_sigmas_is_refused_before_its_points_are_read(survey):
     assert ended.exit_code == 3 and "have the field sigma_easting already" in ended.stderr
 
 
-def test_pictures_of_an_earlier_run_are_named(tmp_path, capsys):
-    "Without a new report, those of other numbers lie beside it: both are said to be older"
+def test_files_of_an_earlier_run_are_named(tmp_path, capsys):
+    "What --overwrite leaves as it was, in folders too; what is written anew is not named"
+    for name in ("out.sbet", "smrmsg_out.out", "out.tum", "new.json"):
+        (tmp_path / name).write_text("old")
     (tmp_path / "pictures").mkdir()
-    (tmp_path / "report.html").write_text("old")
-    none = {key: {"rmse": None} for key in ("before", "after", "leave_one_out")}
-    groups = {key: {"n": 0, "n_scored": 0, **none} for key in ("control", "check")}
-    report = {"statements": [], "ties": None, "files": [], **groups}
-    tell(report, tmp_path, as_json=False, page=False)
-    assert "Of an earlier run, and left as it was in" in (said := capsys.readouterr().err)
-    assert said.splitlines()[-2].endswith(": pictures, report.html.")
+    (tmp_path / "pictures" / "map.png").write_text("old")
+    with work(tmp_path, True), output_folder(tmp_path, overwrite=True) as folder:
+        (folder / "new.json").write_text("new")
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "left as they were" in said
+    assert ": out.sbet, out.tum, pictures/map.png, smrmsg_out.out. Delete" in said
+    assert "new.json" not in said and (tmp_path / "new.json").read_text() == "new"
+
+
+def test_a_new_folder_names_no_file_of_an_earlier_run(tmp_path, capsys):
+    "Nor does one of which every file is written anew"
+    for _ in range(2):
+        with work(tmp_path / "out", True), output_folder(tmp_path / "out", overwrite=True) as new:
+            (new / "new.json").write_text("new")
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("command", ["calibrate", "plan"])

@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 import pytest
@@ -281,9 +280,7 @@ def test_folders_that_link_to_each_other_are_entered_once(tmp_path):
         for other in folders:
             (folder / f"to-{other.name}").symlink_to(other)
     (tmp_path / "drive" / "itself").symlink_to("itself")
-    start = perf_counter()
     found = files_like(tmp_path, "drive/**/*.laz")
-    assert perf_counter() - start < 2.0
     assert found == [folder / f"{folder.name}.laz" for folder in folders]
 
 

@@ -15,6 +15,7 @@ import mlscorr
 from mlscorr.baselines import RAW, Transformation
 from mlscorr.io.las import read_chunks
 from mlscorr.io.survey_file import read_survey
+from mlscorr.simulate import Scenario, simulate
 from tests.beds.copies import write_corrected
 from tests.beds.documents import undocumented
 from tests.beds.places import EXAMPLES, MLSCORR
@@ -22,7 +23,7 @@ from tests.beds.shared import shared
 
 NAMES = ["raw", "shift", "transformation", "rigid", "affine", "icp"]
 NAMES += ["ls-2", "ls-3", "ls-4", "ls-5", "linear", "pchip", "linear-steps", "gp"]
-NAMES += ["lsc-2", "lsc-3", "lsc-4", "lsc-5", "lsc"]
+NAMES += ["lsc-2", "lsc-3", "lsc-4", "lsc-5", "lsc", "correct"]
 ONE_MOVE = ("shift", "transformation", "rigid", "affine", "icp")
 
 
@@ -113,6 +114,41 @@ def test_a_left_out_point_is_predicted_from_the_others_alone(compared):
     assert compared.row("shift")["cross_validated"]["rmse"] == pytest.approx(wanted, abs=1e-9)
 
 
+def test_the_row_of_correct_is_what_correct_leaves(street, compared):
+    "Its residuals are those of mlscorr.correct to 1e-12 m; on a single pass lsc leaves the same"
+    with warnings.catch_warnings(action="ignore"):
+        corrected = mlscorr.correct(mlscorr.read_survey(street))
+    row = compared.row("correct")
+    assert row["check"]["rmse"] == pytest.approx(corrected.check["after"]["rmse"], abs=1e-12)
+    assert row["check"] == compared.row("lsc")["check"]
+    assert row["details"]["ties"] == 0
+    assert row["details"]["untied"] == corrected.estimate.untied
+    (ties,) = [fact for fact in compared.document["statements"] if fact["what"] == "Ties"]
+    assert "correct equals lsc" in ties["sentence"]
+
+
+@pytest.mark.long
+def test_the_row_of_correct_uses_what_two_passes_saw(tmp_path):
+    """A street driven there and back with an outage of 18 s: correct uses the same ties as
+    mlscorr.correct, its residuals are the same to 1e-12 m, and no other method uses any
+    """
+    scenario = Scenario(
+        drive={"duration": 30.0, "speed": 6.0, "passes": [{}, {"direction": "back"}]},
+        targets={"control": 4, "check": 5},
+        scanner=[{"lines_per_second": 75, "points_per_line": 300}],
+        pos={"grade": "mems", "processing": "filtered", "outages": [[6.0, 18.0]]},
+    )
+    simulate(scenario, np.random.default_rng(5)).write(tmp_path / "survey")
+    compared = compare(tmp_path / "survey")
+    with warnings.catch_warnings(action="ignore"):
+        corrected = mlscorr.correct(mlscorr.read_survey(tmp_path / "survey"))
+    row, lsc = compared.row("correct"), compared.row("lsc")
+    assert row["check"]["rmse"] == pytest.approx(corrected.check["after"]["rmse"], abs=1e-12)
+    assert row["details"]["ties"] == int(corrected.estimate.ties.used.sum()) > 50
+    assert row["check"]["rmse_3d"] != lsc["check"]["rmse_3d"]
+    assert "ties" not in lsc["details"]
+
+
 @pytest.mark.long
 def test_check_points_have_no_influence_on_any_method(street, compared, tmp_path):
     "A check point surveyed 7 cm elsewhere changes its own misclosure by 7 cm and nothing else"
@@ -152,12 +188,12 @@ def test_without_check_points_the_control_points_are_left_out_in_turn(street, tm
 
 @pytest.mark.long
 def test_one_target_leaves_what_one_target_can_tell(street, tmp_path):
-    "One control point determines raw, shift, lines and lsc; every other method says why it is not"
+    "One control point determines raw, shift, lines, lsc, correct; the others say why not"
     folder = shutil.copytree(street, tmp_path / "survey")
     rewrite_control(folder, lambda rows: [row for row in rows if row["role"] == "control"][:1])
     other = compare(folder)
     determined = [row["name"] for row in other.rows if row["status"] == "determined"]
-    assert determined == ["raw", "shift", "linear", "pchip", "linear-steps", "lsc"]
+    assert determined == ["raw", "shift", "linear", "pchip", "linear-steps", "lsc", "correct"]
     assert all(row["why"] for row in other.rows if row["status"] != "determined")
     assert other.scored_by == "control"
     assert "mere fit" in other.document["statements"][1]["sentence"]
@@ -182,7 +218,9 @@ def test_collocation_beats_every_single_move_on_the_real_drift():
     ours = np.array(compared.row("lsc")["check"]["rmse"])
     for name in ONE_MOVE:
         assert np.all(ours < compared.row(name)["check"]["rmse"]), name
-    assert any("moved the cloud away" in text for text in compared.row("icp")["warnings"])
+    icp = compared.row("icp")
+    assert any("no rigid motion fits them" in text for text in icp["warnings"])
+    assert icp["check"]["rmse_3d"] < compared.row("raw")["check"]["rmse_3d"]
 
 
 # ---- files

@@ -5,7 +5,13 @@ import pytest
 
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.report.comparison_page import comparison_figure, write_comparison
-from mlscorr.report.comparison_screen import basis, comparison_screen, ranking, verdict
+from mlscorr.report.comparison_screen import (
+    basis,
+    comparison_screen,
+    method_warnings,
+    ranking,
+    verdict,
+)
 
 PLACE = np.array([532_000.0, 3_374_000.0, 42.0])
 UNSEEN = [TargetRow.unobserved("T9", 1, "check", PLACE, "No disc there.", True)]
@@ -13,7 +19,7 @@ UNSEEN = [TargetRow.unobserved("T9", 1, "check", PLACE, "No disc there.", True)]
 
 def fake(scores, **changes):
     "A document of compare.json with these 3D RMSE (m)"
-    kinds = {"raw": "none", "lsc": "collocation", "ls-2": "over time"}
+    kinds = {"raw": "none", "lsc": "collocation", "correct": "collocation", "ls-2": "over time"}
     rows = []
     for name, value in scores.items():
         axes = None if value is None else [value / np.sqrt(3)] * 3
@@ -30,7 +36,7 @@ def fake(scores, **changes):
                 "cross_validated": score,
                 "seconds": None if value is None else 0.1,
                 "warnings": [],
-                "details": {},
+                "details": {"ties": 0, "untied": "One pass."} if name == "correct" else {},
             }
         )
     document = {"name": "street", "crs": None, "control_points": 9, "check_points": 8}
@@ -44,7 +50,7 @@ def fake(scores, **changes):
     [
         ({"raw": 0.5, "shift": 0.2, "lsc": 0.02}, "Best is lsc (about lsc <&>): 3D RMSE 0.020 m"),
         ({"raw": 0.5, "shift": 0.0215, "lsc": 0.02}, "Best are lsc and shift: 3D RMSE 0.020 m"),
-        ({"raw": 0.5, "ls-2": 0.02, "lsc": 0.03}, "lsc, with 0.030 m, is 0.010 m behind."),
+        ({"raw": 0.5, "ls-2": 0.02, "correct": 0.03}, "correct, with 0.030 m, is 0.010 m behind."),
         ({"raw": 0.021, "shift": 0.02, "lsc": 0.03}, "No method improves this cloud by 2 mm"),
         ({"raw": 0.5, "affine": None, "lsc": 0.02}, "against 0.500 m without any correction."),
     ],
@@ -102,6 +108,33 @@ def test_what_failed_stands_on_the_first_screen():
     assert facts["Result"]["rating"] == "green"
     nothing = fake({"raw": 0.5, "lsc": 0.02}, scored_by="control")["statements"]
     assert [row["rating"] for row in nothing[:2]] == ["amber", "amber"]
+
+
+@pytest.mark.parametrize(
+    ("details", "words"),
+    [
+        ({"ties": 375, "untied": None}, "375 ties"),
+        ({"ties": 375, "untied": None}, "All other methods use the control points alone."),
+        ({"ties": 0, "untied": "One pass."}, "equals lsc here, for no ties were used. One pass."),
+        ({"ties": 0, "untied": None}, "correct equals lsc here, for no ties were used."),
+    ],
+)
+def test_what_other_methods_leave_out_is_stated(details, words):
+    "How many ties correct used, or why none; a document without that method says nothing of ties"
+    document = fake({"raw": 0.5, "lsc": 0.03, "correct": 0.02})
+    document["methods"][-1]["details"] = details
+    facts = {row["what"]: row for row in comparison_screen(document, UNSEEN)["statements"]}
+    assert words in facts["Ties"]["sentence"]
+    without = fake({"raw": 0.5, "lsc": 0.03})["statements"]
+    assert "Ties" not in [row["what"] for row in without]
+
+
+def test_a_warning_of_two_methods_stands_once():
+    "With both names before it; another one by itself"
+    rows = fake({"raw": 0.5, "lsc": 0.03, "correct": 0.02})["methods"]
+    rows[1]["warnings"] = ["T1 was refused."]
+    rows[2]["warnings"] = ["T1 was refused.", "Ties disagree."]
+    assert method_warnings(rows) == ["lsc and correct: T1 was refused.", "correct: Ties disagree."]
 
 
 def test_each_method_stands_at_its_rmse():

@@ -269,6 +269,17 @@ def test_the_demo_shows_a_drift_worth_correcting(demo):
     assert DEMO.pos.outages[0][1] == 25.0  # s
 
 
+def test_the_demo_loses_gnss_twice(demo):
+    "In its canyon for 11 s and in its outage for 25 s: the stated sigma grows there alone"
+    time = demo.trajectory.gps_time - demo.trajectory.gps_time[0]
+    is_lost = np.linalg.norm(demo.trajectory.position_sigma, axis=1) > 0.08  # m; else 2 to 7 cm
+    starts = time[1:][np.diff(is_lost.astype(int)) == 1]
+    ends = time[1:][np.diff(is_lost.astype(int)) == -1]
+    assert starts == pytest.approx([8.0, 29.0], abs=1.0)  # s, after 4 s of growth
+    assert ends == pytest.approx([16.0, 50.0], abs=0.5)  # s
+    assert [start for start, _ in DEMO.pos.canyons + DEMO.pos.outages] == [4.0, 25.0]  # s
+
+
 def test_the_survey_folder_is_whole_and_as_promised(short, tmp_path):
     "survey.toml, cloud, trajectory, control and truth stand as the readers expect them"
     short.write(tmp_path)

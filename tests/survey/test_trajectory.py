@@ -185,3 +185,33 @@ def test_epochs_with_points_about_them_are_known_by_seconds():
     assert scanned.select(slice(150, None)).scanned_passes[0, 0] == pytest.approx(413_215.0)
     end = trajectory.scanned_at(np.array([413_299])).scanned_passes - 413_200.0
     assert end == pytest.approx(np.array([[98.9, 99.9]]), abs=1e-6)
+
+
+def test_duration_and_length_leave_gaps_out():
+    "Two drives of 10 s at 10 m/s, 50 s apart: 20 s and 200 m, to the last epoch of each"
+    time = np.concatenate([np.arange(0.0, 10.05, 0.1), np.arange(60.0, 70.05, 0.1)])
+    recorded = drive(START + time)
+    assert recorded.duration == pytest.approx(20.0, abs=1e-6)  # s
+    assert recorded.length == pytest.approx(200.0, abs=0.1)  # m
+
+
+def test_tiles_of_one_drive_are_one_pass():
+    """Files that go on where another ends are one pass, in any order of their points; a gap of
+    the trajectory and a pause of a minute each start another
+    """
+    rng = np.random.default_rng(3)
+    first, second = np.arange(0.0, 100.05, 0.1), np.arange(160.0, 400.05, 0.1)
+    recorded = drive(START + np.concatenate([first, second]))
+
+    def tile(begin, end):
+        return START + rng.uniform(begin, end, 65)
+
+    tiles = [tile(20 * i, 20 * i + 20) for i in range(5)]
+    assert recorded.count_passes(tiles, 2.0) == 1
+    assert recorded.count_passes(tiles[::-1], 2.0) == 1
+    assert recorded.count_passes([*tiles, tile(160, 200)], 2.0) == 2  # beyond the gap
+    both = np.concatenate([tile(80, 100), tile(160, 180)])  # a tile that both drives cross
+    assert recorded.count_passes([*tiles[:4], both, tile(180, 200)], 2.0) == 2
+    assert recorded.count_passes([tile(160, 200), tile(260, 300)], 2.0) == 2  # a pause of 60 s
+    assert recorded.count_passes([tile(160, 200), tile(160, 200)], 2.0) == 1  # two scanners
+    assert recorded.count_passes([tile(120, 140)], 2.0) == 0  # in the gap

@@ -194,7 +194,7 @@ def _statements(project, rows, drives, faults):
     yield headline.Statement(
         "Drives",
         "green" if held == len(project.drives) else "red",
-        f"{held} of {len(project.drives)} drives are held by control points, "
+        f"Held by control points: {held} of {counted(len(project.drives), 'drive')}, "
         f"{len(count['tied'])} of them through ties with other drives.",
         tuple((", ".join(names), STATES[state]) for state, names in others),
     )
@@ -236,7 +236,7 @@ def _minded(rows, reports):
     ]
     if doubts:
         doubts.sort(key=lambda doubt: -headline.RATINGS.index(doubt[0]))
-        sentence = f"There is something to mind in {len(doubts)} of {len(rows)} drives."
+        sentence = f"There is something to mind in {len(doubts)} of {counted(len(rows), 'drive')}."
         items = headline.capped(doubt[1:] for doubt in doubts)
         yield headline.Statement("Doubts", doubts[0][0], sentence, items)
 

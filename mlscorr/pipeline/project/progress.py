@@ -111,9 +111,11 @@ class Progress:
         rate = counts["worked"] / (monotonic() - counts["start"])  # what was there took no time
         left = f"{duration((total - counts['points']) / rate)} left of this stage, " if rate else ""
         drives = {task["drive"] for task in tasks} - {""}
-        files = f" files of {len(drives)} drives" if drives else ""
+        whole = str(len(tasks))
+        if drives:
+            whole = f"{counted(len(tasks), 'file')} of {counted(len(drives), 'drive')}"
         return (
-            f"{TITLES[kind]}: {counts['done']} of {len(tasks)}{files}, "
+            f"{TITLES[kind]}: {counts['done']} of {whole}, "
             f"{100 * counts['points'] / total:.0f} %, {rate / 1e6:.3g} M points/s, {left}"
             f"{counted(counts['faults'], 'failure')} so far"
         )

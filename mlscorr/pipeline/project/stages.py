@@ -19,6 +19,7 @@ from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey
 from mlscorr.pipeline.project.tasks import VERSION, Task
 from mlscorr.survey import CloudFile, ControlPoints, Survey
+from mlscorr.survey.summary import counted
 from mlscorr.targets import search_radius
 
 
@@ -158,7 +159,8 @@ def check_control_near(project: ProjectParts, surveys: Sequence[Survey]) -> None
         check_control(project)
         raise ValueError(
             f"None of the {len(project.control)} control points of {project.path} (first: "
-            f"{project.control.name[0]}) lies near a cloud of its {len(surveys)} drives by the "
+            f"{project.control.name[0]}) lies near a cloud of its "
+            f"{counted(len(surveys), 'drive')} by the "
             "headers. Is the list whole, and in the CRS of the clouds? --ties-only needs none."
         )
 

@@ -1,0 +1,105 @@
+"""Where the beams of a scanner come from, by its cloud alone: where no mounting is given.
+
+The points of a line scanner lie in one plane of the vehicle, and seen from the scanner their angle
+in it grows evenly with time. From anywhere else it does not.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from mlscorr.io.las import read_chunks
+from mlscorr.pipeline.line_rate import sampled_beams, turning_rate
+from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.survey import CloudFile, PointCloud, Survey, Trajectory
+
+
+def with_beam_origin(survey: Survey, file: CloudFile) -> Survey:
+    """The survey of a file with the place of its scanner, where its beams show it.
+
+    Parameters
+    ----------
+    survey : Survey
+        Of one scanner. It stays as it is where its mounting is given.
+    file : CloudFile
+        Some runs of points are read of it.
+    """
+    if survey.mounting is not None:
+        return survey
+    run = min(file.points, SETTINGS.rated_points)
+    for share in SETTINGS.looked_shares:
+        first = int(share * (file.points - run))
+        chunks = list(read_chunks(file, first=first, end=first + run))
+        if not chunks:
+            continue
+        origin = beam_origin(PointCloud.concatenate(chunks), survey.trajectory)
+        if origin is not None:
+            return replace(survey, beam_origin=origin)
+    return survey
+
+
+def beam_origin(cloud: PointCloud, trajectory: Trajectory) -> np.ndarray | None:
+    """Where the beams of a line scanner that turns evenly come from, in body axes.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        A run of points, in any order.
+    trajectory : Trajectory
+
+    Returns
+    -------
+    (3,) array or None
+        Right, forward, up from the navigation centre. None where the points lie in no plane, no
+        rate stands out or the beams don't meet in a point: a swinging mirror, several beams at
+        once, a narrow view. Units: m.
+    """
+    beams = sampled_beams(cloud, trajectory)
+    if beams is None:
+        return None
+    try:
+        return _origin(*beams)
+    except np.linalg.LinAlgError:  # beams of one direction
+        return None
+
+
+def _origin(time, place):
+    """The origin (3,) of beams that ended at places (n, 3) in body axes, or None. m."""
+    axes = np.linalg.svd(place - place.mean(axis=0), full_matrices=False)[2]
+    across = place @ axes[2]
+    offset = float(np.median(across))
+    if np.median(np.abs(across - offset)) > SETTINGS.beam_scatter:
+        return None
+    in_plane = place @ axes[:2].T
+    rate = turning_rate(time, np.exp(1j * np.arctan2(in_plane[:, 1], in_plane[:, 0])))
+    if rate is None:
+        return None
+    middle = _meeting_point(time, in_plane, 2 * np.pi * rate)
+    return None if middle is None else middle @ axes[:2] + offset * axes[2]
+
+
+def _meeting_point(time, place, rate):
+    """The point (2,) from which places (n, 2) are seen under an angle that grows evenly. m.
+
+    Least squares of the distances at which the beams pass by it, with the rate (rad/s) and the
+    angle at time zero; beams that pass far from it, as of moved things, weigh less.
+    """
+    phase = np.arctan2(place[:, 1], place[:, 0]) - rate * time
+    state = np.array([0.0, 0.0, np.angle(np.mean(np.exp(1j * phase))), rate])
+    for _ in range(SETTINGS.beam_rounds):
+        angle = state[2] + state[3] * time
+        beam = np.column_stack([np.cos(angle), np.sin(angle)])
+        away = place - state[:2]
+        distance = beam[:, 0] * away[:, 1] - beam[:, 1] * away[:, 0]
+        along = np.sum(beam * away, axis=1)
+        scatter = max(
+            1.48 * float(np.median(np.abs(distance))), 1e-6
+        )  # of normal errors: one sigma
+        weight = 1.0 / (1.0 + (distance / (3.0 * scatter)) ** 2)
+        design = np.column_stack([beam[:, 1], -beam[:, 0], -along, -along * time])
+        normal = design.T @ (weight[:, None] * design)
+        step = np.linalg.solve(normal, -design.T @ (weight * distance))
+        state += step
+    sigma = scatter * np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max())
+    is_found = max(scatter, sigma, np.abs(step[:2]).max()) < SETTINGS.beam_scatter
+    return state[:2] if is_found else None
