@@ -1,13 +1,16 @@
 """What is said of a verdict in a sentence, and what to do about it."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from mlscorr.effects import effect_class
 from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import percent, size, with_articles
 from mlscorr.gap.agreement import Agreement
 from mlscorr.gap.close.closure import Closure
-from mlscorr.gap.infer.causes import Inference
+from mlscorr.gap.infer.causes import Cause, Inference
+from mlscorr.gap.infer.parameters import CauseParameter
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.plan.additions import NextData
 
@@ -55,6 +58,26 @@ def no_cause(labels: Sequence[str], excess: str) -> str:
     return "Nothing is wrong that this survey could show"
 
 
+def distinct_parameters(cause: Cause) -> tuple[CauseParameter, ...]:
+    """Parameters of a cause; those of one name have the name of their effect before it.
+
+    Parameters
+    ----------
+    cause : Cause
+        Its parts are in the order of its parameters.
+    """
+    often = Counter(parameter.name for parameter in cause.parameters)
+    owners = {
+        name: iter([part.name for part, _ in cause.parts if name in part.parameters])
+        for name, count in often.items()
+        if count > 1
+    }
+    return tuple(
+        replace(p, name=f"{next(owners[p.name])} {p.name}") if p.name in owners else p
+        for p in cause.parameters
+    )
+
+
 def sentence_of(inference: Inference, excess: str) -> str:
     """The verdict in a sentence.
 
@@ -75,7 +98,8 @@ def sentence_of(inference: Inference, excess: str) -> str:
         )
     if verdict.label == "unknown":
         return f"No known effect explains it ({chance}): it looks like a {verdict.lead}."
-    sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in cause.parameters]
+    parameters = distinct_parameters(cause)
+    sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in parameters]
     do = "explain" if "+" in verdict.label else "explains"
     return f"{title(verdict.label)} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
 
@@ -105,10 +129,12 @@ def advice_of(
     elif verdict.label == "unknown":
         sentences.append(f"Look for what makes a {verdict.lead}: no effect of the library does.")
         if closure.effect != "none":  # it impersonates the cause
+            share = f"closes {percent(max(0.0, closure.shrink))} of the squared gap, but "
+            if closure.is_within_noise:
+                share = ""
             sentences.append(
-                f"The nearest known effect, {lowered(title(closure.effect))}, closes "
-                f"{percent(max(0.0, closure.shrink))} of the squared gap, but does not explain "
-                "it: don't use it."
+                f"The nearest known effect, {lowered(title(closure.effect))}, {share}does not "
+                "explain it: don't use it."
             )
     else:
         sentences += [effect_class(part).remedy for part in verdict.label.split("+")]

@@ -8,9 +8,10 @@ import numpy as np
 
 from mlscorr.effects import Effect
 from mlscorr.effects.wording import with_articles
-from mlscorr.gap.advice import advice_of, excess_of, sentence_of
+from mlscorr.gap.advice import advice_of, distinct_parameters, excess_of, sentence_of
 from mlscorr.gap.agreement import agreements
 from mlscorr.gap.close.closure import Closure
+from mlscorr.gap.headline import headline
 from mlscorr.gap.infer.causes import Cause, Inference
 from mlscorr.gap.infer.separability import Separability
 from mlscorr.gap.infer.where import NAMES
@@ -63,7 +64,7 @@ def gap_document(
             "sentence": with_articles(sentence_of(inference, excess)),
         },
         "gap": vars(closure.gap) | {"unit": closure.unit, "kind": closure.kind},
-        "headline": with_articles(where.headline),
+        "headline": headline(where, verdict.label, verdict.lead, rows.reference.start),
         "agreement": [vars(part) for part in agreement],
         "advice": advice_of(inference, closure, next_data, excess),
         "where": [_split(split) for split in where.splits],
@@ -108,7 +109,7 @@ def cause_document(rows: Rows, cause: Cause) -> dict:
         "effect": cause.effect,
         "probability": float(cause.probability),
         "rms_mm": float(1e3 * np.sqrt(np.mean(moved**2))),
-        "parameters": [asdict(parameter) for parameter in cause.parameters],
+        "parameters": [asdict(parameter) for parameter in distinct_parameters(cause)],
     } | ({"target": target[0]} if target else {})
 
 
@@ -131,10 +132,12 @@ def separability_document(compared: Separability) -> dict:
 
 
 def _closure(closure):
-    names = ("effect", "probability", "kind", "before", "after", "unit", "shrink")
+    names = ("effect", "probability", "kind", "before", "after", "unit")
     names += ("held_out", "is_held_out")
+    is_within = closure.is_within_noise
     return {name: getattr(closure, name) for name in names} | {
-        "interval": list(closure.interval),
+        "shrink": None if is_within else closure.shrink,
+        "interval": [None, None] if is_within else list(closure.interval),
         "null_band": list(closure.null_band),
         "folds": [
             {"label": closure.effect, "before": float(before), "after": float(after)}
