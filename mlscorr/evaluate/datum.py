@@ -11,6 +11,10 @@ from mlscorr.pos import stated_sigma
 from mlscorr.survey import Matched, Pos, Trajectory
 
 FOLLOWS = "The corrected cloud follows the control; find out which of the two is right."
+ASSUMED = (
+    "Nobody stated the sigma of the POS: {sigma:g} m is assumed, and a worse POS could differ as "
+    "much. State it under [pos] in survey.toml."
+)
 
 
 def datum_warnings(control: Matched, trajectory: Trajectory, pos: Pos) -> tuple[str, ...]:
@@ -35,7 +39,11 @@ def datum_warnings(control: Matched, trajectory: Trajectory, pos: Pos) -> tuple[
         return ()
     filled, _ = filled_sigmas(trajectory)
     sigma = stated_sigma(filled, pos, control.gps_time).position
-    return *_height(control.misclosure[:, 2], sigma[:, 2]), *_plan(control, sigma[:, :2], pos)
+    sentences = *_height(control.misclosure[:, 2], sigma[:, 2]), *_plan(control, sigma[:, :2], pos)
+    if trajectory.position_sigma is not None or "position_sigma" not in pos.assumed:
+        return sentences
+    assumed = ASSUMED.format(sigma=pos.position_sigma)
+    return tuple(f"{sentence} {assumed}" for sentence in sentences)
 
 
 def _height(misclosure, sigma):

@@ -15,6 +15,9 @@ from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.plan.additions import NextData
 
 NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
+ONLY_DRIFT = (
+    "Run mlscorr correct: what is left looks like drift of the POS, whose sigma nobody stated."
+)
 ADVICE = {  # where no cause is named, by what is left is more than
     "": NOTHING_TO_DO,
     "stated": "Errors are larger than stated: run mlscorr correct, or state POS sigmas larger.",
@@ -22,7 +25,9 @@ ADVICE = {  # where no cause is named, by what is left is more than
 }
 
 
-def excess_of(inference: Inference, closure: Closure, agreement: Iterable[Agreement]) -> str:
+def excess_of(
+    inference: Inference, closure: Closure, agreement: Iterable[Agreement], is_stated: bool = True
+) -> str:
     """What it is more than that is left where no cause is named: stated, chance, or nothing.
 
     Parameters
@@ -31,11 +36,13 @@ def excess_of(inference: Inference, closure: Closure, agreement: Iterable[Agreem
     closure : Closure
         Of its verdict.
     agreement : iterable of Agreement
+    is_stated : bool
+        Whether somebody stated the sigmas of the POS: nothing is more than a default.
     """
     if inference.verdict.label != "none":
         return ""
     worse = [part for part in agreement if part.rms_mm > SETTINGS.quantile * part.stated_mm]
-    if worse or closure.over_sigma.beyond:
+    if is_stated and (worse or closure.over_sigma.beyond):
         return "stated"
     gaps = closure.gap, inference.where
     return "chance" if any(gap.before > gap.null_band[1] for gap in gaps) else ""
@@ -105,7 +112,11 @@ def sentence_of(inference: Inference, excess: str) -> str:
 
 
 def advice_of(
-    inference: Inference, closure: Closure, next_data: Sequence[NextData], excess: str
+    inference: Inference,
+    closure: Closure,
+    next_data: Sequence[NextData],
+    excess: str,
+    is_stated: bool = True,
 ) -> list[str]:
     """What to do about a verdict, in sentences.
 
@@ -117,10 +128,12 @@ def advice_of(
     next_data : sequence of NextData
     excess : str
         As ``excess_of`` gives it.
+    is_stated : bool
+        Whether somebody stated the sigmas of the POS.
     """
     verdict, sentences = inference.verdict, []
     if verdict.label == "none":
-        sentences.append(ADVICE[excess])
+        sentences.append(ADVICE[excess] if is_stated or excess else ONLY_DRIFT)
     elif verdict.is_hidden:
         sentences.append(
             "Find out why the targets of that stretch could not be matched before the survey is "

@@ -17,6 +17,7 @@ from mlscorr.gap.infer.separability import Separability
 from mlscorr.gap.infer.where import NAMES
 from mlscorr.gap.observe.absence import Absence
 from mlscorr.gap.observe.rows import Rows, background
+from mlscorr.gap.open_scale import open_sigmas
 from mlscorr.gap.plan.additions import NextData
 from mlscorr.survey import Survey
 
@@ -49,7 +50,8 @@ def gap_document(
     """
     verdict, where = inference.verdict, inference.where
     agreement = agreements(rows, background(rows, survey))
-    excess = excess_of(inference, closure, agreement)
+    is_stated = not open_sigmas(survey)
+    excess = excess_of(inference, closure, agreement, is_stated)
     return {
         "name": survey.name,
         "verdict": {
@@ -66,7 +68,7 @@ def gap_document(
         "gap": vars(closure.gap) | {"unit": closure.unit, "kind": closure.kind},
         "headline": headline(where, verdict.label, verdict.lead, rows.reference.start),
         "agreement": [vars(part) for part in agreement],
-        "advice": advice_of(inference, closure, next_data, excess),
+        "advice": advice_of(inference, closure, next_data, excess, is_stated),
         "where": [_split(split) for split in where.splits],
         "causes": [cause_document(rows, cause) for cause in inference.causes],
         "separability": separability_document(inference.separability),
@@ -83,6 +85,30 @@ def gap_document(
         "warnings": [*absence.warnings, *warnings],
         "notes": list(survey.notes),
     }
+
+
+def assumed_document(survey: Survey, inference: Inference, scale: float) -> list[dict]:
+    """What nobody stated: the default, and how far the POS errs by the survey itself.
+
+    Parameters
+    ----------
+    survey : Survey
+        As it was diagnosed.
+    inference : Inference
+    scale : float
+        That it has on the defaults of the sigmas of the POS.
+    """
+    likely = inference.evidence.likely_model(inference.verdict.label).scale
+    scaled = [f"pos.{name}" for name in open_sigmas(survey)]
+    rows = []
+    for row in (*survey.assumed_pos, *survey.assumed_scanner):
+        value, estimate = row.value, None
+        if row.key in scaled:
+            value = (np.array(value) / scale).round(9).tolist()
+        if row.key == "pos.position_sigma":
+            estimate = float(survey.pos.position_sigma * likely)
+        rows.append({"key": row.key, "value": value, "unit": row.unit, "estimate": estimate})
+    return rows
 
 
 def _split(split):

@@ -7,7 +7,7 @@ import numpy as np
 from mlscorr.estimate import NextControl, Support
 from mlscorr.estimate.support import DRIFT, REASONS
 from mlscorr.evaluate.rows import PointCounts, Score, Statistics, TargetRow
-from mlscorr.survey import PointCloud
+from mlscorr.survey import Assumption, PointCloud
 
 GROUPS = ("control", "check", "unused")
 
@@ -107,6 +107,8 @@ class CorrectionReport:
     position_sigma : dict or None
         3D sigma of the corrected position, in m: ``median``, ``largest``, and the ``time`` (s) of
         the latter.
+    assumed : tuple of Assumption
+        Accuracies of the POS that nobody stated.
     """
 
     name: str
@@ -125,6 +127,7 @@ class CorrectionReport:
     next_control: tuple[NextControl, ...] = ()
     ties: dict | None = None
     position_sigma: dict[str, float] | None = None
+    assumed: tuple[Assumption, ...] = ()
 
     def document(self) -> dict:
         """The content of report.json."""
@@ -148,6 +151,7 @@ class CorrectionReport:
                 "steps": list(self.support.steps),
             },
             "position_sigma": self.position_sigma,
+            "assumed": [vars(row) for row in self.assumed],
             "next_control": [place.document() for place in self.next_control],
             **{name: [row.document() for row in getattr(self, name)] for name in rows[1:]},
         }

@@ -37,6 +37,20 @@ def test_a_good_survey_hears_nothing(seed):
     assert datum_warnings(control(np.random.default_rng(seed)), DRIVE, Pos()) == ()
 
 
+def test_a_default_sigma_is_called_assumed():
+    "Where nobody stated the sigma of the POS, the sentence says so, and the way out"
+
+    def lower(place):
+        return place - [0.0, 0.0, 0.5]
+
+    bare = replace(DRIVE, position_sigma=None, attitude_sigma=None)
+    points = control(np.random.default_rng(3), lower)
+    (stated,) = datum_warnings(points, bare, Pos())
+    (assumed,) = datum_warnings(points, bare, Pos(assumed=("position_sigma",)))
+    assert "assumed" not in stated
+    assert assumed.startswith(stated) and "0.02 m is assumed" in assumed and "[pos]" in assumed
+
+
 def test_heights_of_another_datum_are_named():
     "Control 0.3 m lower: how much, how well all agree, and what it looks like"
     (sentence,) = said(lambda place: place - [0.0, 0.0, 0.3])

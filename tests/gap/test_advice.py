@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.advice import ADVICE, NOTHING_TO_DO, advice_of, excess_of, sentence_of
+from mlscorr.gap.advice import (
+    ADVICE,
+    NOTHING_TO_DO,
+    ONLY_DRIFT,
+    advice_of,
+    excess_of,
+    sentence_of,
+)
 from mlscorr.gap.agreement import Agreement
 from mlscorr.gap.close.closure import Closure, Gap
 from mlscorr.gap.close.over_sigma import OverSigma
@@ -54,6 +61,15 @@ def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rm
     assert advice_of(found, closed, [], excess) == [ADVICE[excess]]
     assert ("Nothing is wrong" in sentence_of(found, excess)) == (not excess)
     assert (ADVICE[excess] == NOTHING_TO_DO) == (not excess)
+
+
+def test_nothing_is_larger_than_a_default():
+    "Where nobody stated the sigma of the POS, 9 cm and 7 sigmas are no excess, but drift"
+    found, closed = inference(), closure(over=7.3)
+    far = [Agreement("target", 9, 91.6, 20.6)]
+    assert excess_of(found, closed, far) == "stated"
+    assert excess_of(found, closed, far, is_stated=False) == ""
+    assert advice_of(found, closed, [], "", is_stated=False) == [ONLY_DRIFT]
 
 
 def test_where_something_is_to_be_measured_something_needs_to_be_done():

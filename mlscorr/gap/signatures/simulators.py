@@ -80,7 +80,13 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     scale, pos = cause.model.scale, simulator.pos
     if not cause.parts or scale != 1.0:
         attitude = np.asarray(pos.attitude_sigma) * scale
-        pos = replace(pos, position_sigma=pos.position_sigma * scale, attitude_sigma=attitude)
+        found = tuple(name for name in pos.assumed if name == "correlation_time")
+        pos = replace(
+            pos,
+            position_sigma=pos.position_sigma * scale,
+            attitude_sigma=attitude,
+            assumed=found,
+        )
     pos = replace(pos, windows=(*pos.windows, *cause.model.windows))
     mounting = beliefs_of(survey).mounting
     return replace(simulator, mounting=mounting, pos=pos, effects=in_order(effects))
