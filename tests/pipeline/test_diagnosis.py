@@ -311,10 +311,9 @@ def test_costs_below_zero_are_refused(street, cost):
 def unstated(tmp_path_factory):
     "A street on which the POS loses GNSS, and of whose accuracy no file states anything"
     folder = tmp_path_factory.mktemp("unstated") / "survey"
-    outage = {"start": 12.0, "duration": 25.0}
     scenario = Scenario(
         drive={"duration": 50.0},
-        pos={"outages": [outage]},
+        pos={"processing": "filtered", "outages": [[12.0, 25.0]]},
         targets={"control": 16, "check": 3},
         scanner=[{"lines_per_second": 75, "points_per_line": 400}],
     )
