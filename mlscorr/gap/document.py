@@ -98,7 +98,7 @@ def assumed_document(survey: Survey, inference: Inference, scale: float) -> list
     scale : float
         That it has on the defaults of the sigmas of the POS.
     """
-    likely = inference.evidence.likely_model(inference.verdict.label).scale
+    model = inference.evidence.likely_model(inference.verdict.label)
     scaled = [f"pos.{name}" for name in open_sigmas(survey)]
     rows = []
     for row in (*survey.assumed_pos, *survey.assumed_scanner):
@@ -106,7 +106,7 @@ def assumed_document(survey: Survey, inference: Inference, scale: float) -> list
         if row.key in scaled:
             value = (np.array(value) / scale).round(9).tolist()
         if row.key == "pos.position_sigma":
-            estimate = float(survey.pos.position_sigma * likely)
+            estimate = float(survey.pos.position_sigma * model.scale)
         rows.append({"key": row.key, "value": value, "unit": row.unit, "estimate": estimate})
     return rows
 

@@ -21,7 +21,7 @@ from mlscorr.survey import Pos, Survey
 SIGMAS = ("position_sigma", "attitude_sigma")
 STEP = float(np.sqrt(max(SETTINGS.pos_scales) / min(SETTINGS.pos_scales)))
 # from one scale to the next: half of what the inference averages over, so that these overlap
-WORTH = 1.0
+LEAST_GAIN = 1.0
 # log evidence by which a scale must be better: less is not worth a mention (Kass, Raftery 1995)
 
 
@@ -84,7 +84,7 @@ def likely_scale(
         return 1.0
     scale = 1.0
     best = evidence(scale)
-    while (tried := evidence(scale * STEP)) > best + WORTH:
+    while (tried := evidence(scale * STEP)) > best + LEAST_GAIN:
         scale *= STEP
         best = tried
     return scale

@@ -80,12 +80,14 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     scale, pos = cause.model.scale, simulator.pos
     if not cause.parts or scale != 1.0:
         attitude = np.asarray(pos.attitude_sigma) * scale
-        found = tuple(name for name in pos.assumed if name == "correlation_time")
+        assumed = tuple(
+            name for name in pos.assumed if name not in ("position_sigma", "attitude_sigma")
+        )
         pos = replace(
             pos,
             position_sigma=pos.position_sigma * scale,
             attitude_sigma=attitude,
-            assumed=found,
+            assumed=assumed,
         )
     pos = replace(pos, windows=(*pos.windows, *cause.model.windows))
     mounting = beliefs_of(survey).mounting

@@ -11,7 +11,7 @@ GAPS = {  # by the kind of gap that a closure measures
     "scatter": "Scatter beyond the stated one",
     "returns": "Returns beyond the expected ones",
 }
-WITHIN = "Before, it was no larger than chance makes it: there is nothing to close."
+NOTHING_TO_CLOSE = "Before, it was no larger than chance makes it: there is nothing to close."
 AXES = {"E": "easting", "N": "northing", "H": "height"}
 
 
@@ -96,7 +96,7 @@ def shrunk(closure: dict) -> str:
     """
     (low, high), share, between = closure["interval"], closure["shrink"], ""
     if not known(share):
-        return not_closed(closure) + WITHIN
+        return not_closed(closure) + NOTHING_TO_CLOSE
     if known(low) and known(high):
         between = f" (95 %: {percent(low)} to {percent(high)})"
     text = f"{percent(share)} of the squared gap is gone{between}."

@@ -3,7 +3,7 @@
 import pytest
 
 from mlscorr.report.gap import diagnosis_page
-from mlscorr.report.gap.shrinking import WITHIN, is_within, shrinking, shrunk
+from mlscorr.report.gap.shrinking import NOTHING_TO_CLOSE, is_within, shrinking, shrunk
 from mlscorr.report.gap.splits import closure_figure
 from tests.beds.gap_documents import gap_document
 from tests.report.gap.test_verdict import summary
@@ -43,8 +43,8 @@ def test_a_gap_within_chance_is_not_closed_by_a_share():
     document["closure"] |= {"before": 0.0, "after": -1.2, "shrink": None, "interval": [None, None]}
     fact = shrinking(document)
     assert fact.number == "0.00 mm → −1.2 mm"
-    assert fact.more == WITHIN and "%" not in fact.more
-    assert WITHIN in summary(document)
+    assert fact.more == NOTHING_TO_CLOSE and "%" not in fact.more
+    assert NOTHING_TO_CLOSE in summary(document)
 
 
 @pytest.mark.parametrize(("value", "within"), [(3.0, True), (4.0, False), (None, False)])
