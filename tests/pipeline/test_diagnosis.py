@@ -162,6 +162,9 @@ def test_a_cause_that_the_simulator_has_already_is_joined_with_it(late, tmp_path
     write_simulator(improved, tmp_path / "simulator.toml")
     assert read_simulator(tmp_path / "simulator.toml").pos.windows == (window,)
     assert as_believed(survey, improved)[0].pos.windows == (window,)
+    bare = replace(simulator, pos=replace(simulator.pos, assumed=("position_sigma",)))
+    assert with_cause(bare, survey, worse).pos.assumed == ()  # twice the default was found
+    assert with_cause(bare, survey, outage).pos.assumed == ("position_sigma",)
 
 
 @pytest.mark.long
