@@ -154,7 +154,7 @@ class PositionNoise(Effect):
     random: ClassVar = True
     title: ClassVar = "Noisy positions"
     meaning: ClassVar = "The recorded position is noisier, or drifts more, than its sigmas say."
-    sentence: ClassVar = "The positions of the POS are worse than their sigmas say: {size}."
+    sentence: ClassVar = "The positions of the POS are worse than the simulator assumes: {size}."
     remedy: ClassVar = (
         "Run mlscorr correct, which takes the drift out of the cloud; tell it how well the POS "
         "is known with the sigmas found."

@@ -41,6 +41,10 @@ UNITS = {SHIFT: "m", HEIGHT: "m", SCALE: "ratio", TURN: "rad", TILT: "m/m"}
 COLUMNS = {SCALE: [0], TURN: [1], TILT: [2, 3]}  # of linear_columns
 SETS = [tuple(s) for k in range(4) for s in combinations(COLUMNS, k)]  # of terms, the empty first
 FOLLOWS = "The corrected cloud follows the control; find out which of the two is right."
+ASSUMED = (
+    "Nobody stated the sigma of the POS: {sigma:g} m is assumed, and a worse POS could differ as "
+    "much. State it under [pos] in survey.toml."
+)
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,8 @@ class DatumDifference:
         RMS distance of the control points from their middle, in plan. Units: m.
     ground : MapFactors, optional
         Of the survey's CRS at the control; None without a CRS.
+    assumed_sigma : float, optional
+        Of the POS, where nobody stated one; only a shift and a height are judged by it. Units: m.
     """
 
     term: str
@@ -71,6 +77,7 @@ class DatumDifference:
     observations: int
     extent: float
     ground: MapFactors | None = None
+    assumed_sigma: float | None = None
 
     @property
     def length(self) -> float:
@@ -91,7 +98,10 @@ class DatumDifference:
     @property
     def sentence(self) -> str:
         """The warning that check, correct and the page share."""
-        return f"{self._finding()} {self._cause()} {FOLLOWS}"
+        sentence = f"{self._finding()} {self._cause()} {FOLLOWS}"
+        if self.assumed_sigma is None or self.term not in (SHIFT, HEIGHT):
+            return sentence
+        return f"{sentence} {ASSUMED.format(sigma=self.assumed_sigma)}"
 
     def _finding(self):
         """The term with its size, and the evidence for it."""
@@ -214,6 +224,8 @@ def datum_differences(
     about = {"observations": len(control), "extent": _extent(place)}
     if crs is not None:
         about["ground"] = map_factors(crs, middle)
+    if trajectory.position_sigma is None and "position_sigma" in pos.assumed:
+        about["assumed_sigma"] = pos.position_sigma
     return tuple(DatumDifference(*terms, **about) for terms in chain(shifts, linear))
 
 

@@ -55,13 +55,13 @@ def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[
     trajectory : Trajectory
         None is told of one without sigmas.
     survey : Survey, optional
-        As recorded: then ``stated``, the median by its POS, stands beside them.
+        As recorded: then ``stated``, the median by its POS, stands beside them, if it is stated.
     """
     scanned = trajectory.scanned_rows
     sigma = np.linalg.norm(trajectory.position_sigma[scanned], axis=1)
     time = float(trajectory.gps_time[scanned[sigma.argmax()]])
     result = {"median": float(np.median(sigma)), "largest": float(sigma.max()), "time": time}
-    if survey is not None:
+    if survey is not None and not survey.has_assumed_position:
         stated = stated_sigma(survey.trajectory, survey.pos).position[scanned]
         result["stated"] = float(np.median(np.linalg.norm(stated, axis=1)))
     return result

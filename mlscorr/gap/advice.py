@@ -1,17 +1,23 @@
 """What is said of a verdict in a sentence, and what to do about it."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from mlscorr.effects import effect_class
 from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import percent, size, with_articles
 from mlscorr.gap.agreement import Agreement
 from mlscorr.gap.close.closure import Closure
-from mlscorr.gap.infer.causes import Inference
+from mlscorr.gap.infer.causes import Cause, Inference
+from mlscorr.gap.infer.parameters import CauseParameter
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.plan.additions import NextData
 
 NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
+ONLY_DRIFT = (
+    "Run mlscorr correct: what is left looks like drift of the POS, whose sigma nobody stated."
+)
 ADVICE = {  # where no cause is named, by what is left is more than
     "": NOTHING_TO_DO,
     "stated": "Errors are larger than stated: run mlscorr correct, or state POS sigmas larger.",
@@ -19,7 +25,9 @@ ADVICE = {  # where no cause is named, by what is left is more than
 }
 
 
-def excess_of(inference: Inference, closure: Closure, agreement: Iterable[Agreement]) -> str:
+def excess_of(
+    inference: Inference, closure: Closure, agreement: Iterable[Agreement], is_stated: bool = True
+) -> str:
     """What it is more than that is left where no cause is named: stated, chance, or nothing.
 
     Parameters
@@ -28,11 +36,13 @@ def excess_of(inference: Inference, closure: Closure, agreement: Iterable[Agreem
     closure : Closure
         Of its verdict.
     agreement : iterable of Agreement
+    is_stated : bool
+        Whether somebody stated the sigmas of the POS: nothing is more than a default.
     """
     if inference.verdict.label != "none":
         return ""
     worse = [part for part in agreement if part.rms_mm > SETTINGS.quantile * part.stated_mm]
-    if worse or closure.over_sigma.beyond:
+    if is_stated and (worse or closure.over_sigma.beyond):
         return "stated"
     gaps = closure.gap, inference.where
     return "chance" if any(gap.before > gap.null_band[1] for gap in gaps) else ""
@@ -55,6 +65,26 @@ def no_cause(labels: Sequence[str], excess: str) -> str:
     return "Nothing is wrong that this survey could show"
 
 
+def distinct_parameters(cause: Cause) -> tuple[CauseParameter, ...]:
+    """Parameters of a cause; those of one name have the name of their effect before it.
+
+    Parameters
+    ----------
+    cause : Cause
+        Its parts are in the order of its parameters.
+    """
+    often = Counter(parameter.name for parameter in cause.parameters)
+    owners = {
+        name: iter([part.name for part, _ in cause.parts if name in part.parameters])
+        for name, count in often.items()
+        if count > 1
+    }
+    return tuple(
+        replace(p, name=f"{next(owners[p.name])} {p.name}") if p.name in owners else p
+        for p in cause.parameters
+    )
+
+
 def sentence_of(inference: Inference, excess: str) -> str:
     """The verdict in a sentence.
 
@@ -75,13 +105,18 @@ def sentence_of(inference: Inference, excess: str) -> str:
         )
     if verdict.label == "unknown":
         return f"No known effect explains it ({chance}): it looks like a {verdict.lead}."
-    sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in cause.parameters]
+    parameters = distinct_parameters(cause)
+    sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in parameters]
     do = "explain" if "+" in verdict.label else "explains"
     return f"{title(verdict.label)} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
 
 
 def advice_of(
-    inference: Inference, closure: Closure, next_data: Sequence[NextData], excess: str
+    inference: Inference,
+    closure: Closure,
+    next_data: Sequence[NextData],
+    excess: str,
+    is_stated: bool = True,
 ) -> list[str]:
     """What to do about a verdict, in sentences.
 
@@ -93,10 +128,12 @@ def advice_of(
     next_data : sequence of NextData
     excess : str
         As ``excess_of`` gives it.
+    is_stated : bool
+        Whether somebody stated the sigmas of the POS.
     """
     verdict, sentences = inference.verdict, []
     if verdict.label == "none":
-        sentences.append(ADVICE[excess])
+        sentences.append(ADVICE[excess] if is_stated or excess else ONLY_DRIFT)
     elif verdict.is_hidden:
         sentences.append(
             "Find out why the targets of that stretch could not be matched before the survey is "
@@ -105,10 +142,12 @@ def advice_of(
     elif verdict.label == "unknown":
         sentences.append(f"Look for what makes a {verdict.lead}: no effect of the library does.")
         if closure.effect != "none":  # it impersonates the cause
+            share = f"closes {percent(max(0.0, closure.shrink))} of the squared gap, but "
+            if closure.is_within_noise:
+                share = ""
             sentences.append(
-                f"The nearest known effect, {lowered(title(closure.effect))}, closes "
-                f"{percent(max(0.0, closure.shrink))} of the squared gap, but does not explain "
-                "it: don't use it."
+                f"The nearest known effect, {lowered(title(closure.effect))}, {share}does not "
+                "explain it: don't use it."
             )
     else:
         sentences += [effect_class(part).remedy for part in verdict.label.split("+")]

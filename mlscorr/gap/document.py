@@ -8,14 +8,16 @@ import numpy as np
 
 from mlscorr.effects import Effect
 from mlscorr.effects.wording import with_articles
-from mlscorr.gap.advice import advice_of, excess_of, sentence_of
+from mlscorr.gap.advice import advice_of, distinct_parameters, excess_of, sentence_of
 from mlscorr.gap.agreement import agreements
 from mlscorr.gap.close.closure import Closure
+from mlscorr.gap.headline import headline
 from mlscorr.gap.infer.causes import Cause, Inference
 from mlscorr.gap.infer.separability import Separability
 from mlscorr.gap.infer.where import NAMES
 from mlscorr.gap.observe.absence import Absence
 from mlscorr.gap.observe.rows import Rows, background
+from mlscorr.gap.open_scale import open_sigmas
 from mlscorr.gap.plan.additions import NextData
 from mlscorr.survey import Survey
 
@@ -48,7 +50,8 @@ def gap_document(
     """
     verdict, where = inference.verdict, inference.where
     agreement = agreements(rows, background(rows, survey))
-    excess = excess_of(inference, closure, agreement)
+    is_stated = not open_sigmas(survey)
+    excess = excess_of(inference, closure, agreement, is_stated)
     return {
         "name": survey.name,
         "verdict": {
@@ -63,9 +66,9 @@ def gap_document(
             "sentence": with_articles(sentence_of(inference, excess)),
         },
         "gap": vars(closure.gap) | {"unit": closure.unit, "kind": closure.kind},
-        "headline": with_articles(where.headline),
+        "headline": headline(where, verdict.label, verdict.lead, rows.reference.start),
         "agreement": [vars(part) for part in agreement],
-        "advice": advice_of(inference, closure, next_data, excess),
+        "advice": advice_of(inference, closure, next_data, excess, is_stated),
         "where": [_split(split) for split in where.splits],
         "causes": [cause_document(rows, cause) for cause in inference.causes],
         "separability": separability_document(inference.separability),
@@ -82,6 +85,30 @@ def gap_document(
         "warnings": [*absence.warnings, *warnings],
         "notes": list(survey.notes),
     }
+
+
+def assumed_document(survey: Survey, inference: Inference, scale: float) -> list[dict]:
+    """What nobody stated: the default, and how far the POS errs by the survey itself.
+
+    Parameters
+    ----------
+    survey : Survey
+        As it was diagnosed.
+    inference : Inference
+    scale : float
+        That it has on the defaults of the sigmas of the POS.
+    """
+    model = inference.evidence.likely_model(inference.verdict.label)
+    scaled = [f"pos.{name}" for name in open_sigmas(survey)]
+    rows = []
+    for row in (*survey.assumed_pos, *survey.assumed_scanner):
+        value, estimate = row.value, None
+        if row.key in scaled:
+            value = (np.array(value) / scale).round(9).tolist()
+        if row.key == "pos.position_sigma":
+            estimate = float(survey.pos.position_sigma * model.scale)
+        rows.append({"key": row.key, "value": value, "unit": row.unit, "estimate": estimate})
+    return rows
 
 
 def _split(split):
@@ -108,7 +135,7 @@ def cause_document(rows: Rows, cause: Cause) -> dict:
         "effect": cause.effect,
         "probability": float(cause.probability),
         "rms_mm": float(1e3 * np.sqrt(np.mean(moved**2))),
-        "parameters": [asdict(parameter) for parameter in cause.parameters],
+        "parameters": [asdict(parameter) for parameter in distinct_parameters(cause)],
     } | ({"target": target[0]} if target else {})
 
 
@@ -131,10 +158,12 @@ def separability_document(compared: Separability) -> dict:
 
 
 def _closure(closure):
-    names = ("effect", "probability", "kind", "before", "after", "unit", "shrink")
+    names = ("effect", "probability", "kind", "before", "after", "unit")
     names += ("held_out", "is_held_out")
+    is_within = closure.is_within_noise
     return {name: getattr(closure, name) for name in names} | {
-        "interval": list(closure.interval),
+        "shrink": None if is_within else closure.shrink,
+        "interval": [None, None] if is_within else list(closure.interval),
         "null_band": list(closure.null_band),
         "folds": [
             {"label": closure.effect, "before": float(before), "after": float(after)}

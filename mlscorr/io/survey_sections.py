@@ -1,5 +1,6 @@
 """What stands in survey.toml, section by section, in its own units (deg)."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Literal, Self
@@ -193,6 +194,17 @@ class ControlSection(TomlSection):
         return {same_word(word): OfficeWord.of(text) for word, text in self.words.items()}
 
 
+def left_out(section: TomlSection, names: Iterable[str]) -> tuple[str, ...]:
+    """Those keys of a section that the file leaves out, so that their defaults stand in.
+
+    Parameters
+    ----------
+    section : TomlSection
+    names : iterable of str
+    """
+    return tuple(name for name in names if name not in section.model_fields_set)
+
+
 class ScannerSection(TomlSection):
     """What is believed of the scanner."""
 
@@ -202,7 +214,9 @@ class ScannerSection(TomlSection):
 
     def scanner(self) -> Scanner:
         """The same in radians."""
-        return Scanner(self.range_noise, np.radians(self.angle_noise), self.lines_per_second)
+        noises = self.range_noise, np.radians(self.angle_noise)
+        assumed = left_out(self, ("range_noise", "angle_noise"))
+        return Scanner(*noises, self.lines_per_second, assumed)
 
 
 class MountedScannerSection(ScannerSection):
@@ -250,7 +264,12 @@ class PosSection(TomlSection):
 
     def pos(self) -> Pos:
         """The same in radians."""
-        return Pos(self.position_sigma, np.radians(self.attitude_sigma), self.correlation_time)
+        return Pos(
+            self.position_sigma,
+            np.radians(self.attitude_sigma),
+            self.correlation_time,
+            assumed=left_out(self, ("position_sigma", "attitude_sigma", "correlation_time")),
+        )
 
 
 class MatchingSection(TomlSection):

@@ -294,4 +294,5 @@ class CorrectedSurvey(Summary):
             coverage=Coverage(self.estimate.span, end - start),
             support=self.estimate.support, ties=self.tie_section,
             position_sigma=largest_sigma(self.trajectory, self.survey), datum=self.datum,
+            assumed=self.survey.assumed_pos if self.survey.has_assumed_position else (),
         )  # fmt: skip

@@ -14,9 +14,10 @@ from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import contrast
 from mlscorr.gap.advice import NOTHING_TO_DO
 from mlscorr.gap.close import Closure, FoundCause, cause_for_simulator, close_gap
-from mlscorr.gap.document import gap_document
+from mlscorr.gap.document import assumed_document, gap_document
 from mlscorr.gap.infer import Costs, Inference, infer_causes
 from mlscorr.gap.observe import Absence, Rows, background
+from mlscorr.gap.open_scale import likely_scale, open_sigmas, with_scale
 from mlscorr.gap.plan import NextData, next_data
 from mlscorr.gap.signatures import Signature, as_believed, curvature, select, signatures, with_cause
 from mlscorr.io.output import document, output_folder, write_json
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-STEPS = 5  # of the progress beside reading: the inference, closure, plan
+STEPS = 6  # of the progress beside reading: the inference, closure, plan
 
 
 def diagnose(
@@ -93,6 +94,8 @@ def diagnose(
     library = known_effects() if library is None else library
     progress = progress or silent
     simulator = beliefs_of(survey) if simulator is None else simulator
+    if simulated:  # the clouds show how noisy the simulator's scanner is
+        simulator = replace(simulator, scanner=replace(simulator.scanner, assumed=()))
     believed, effects = as_believed(survey, simulator)
     if simulated:
         simulated = [simulated] if isinstance(simulated, str | Path) else simulated
@@ -103,6 +106,10 @@ def diagnose(
     step = progress("Weighing the causes", STEPS)
     signs, left_out = signatures(observed, believed, library, rng)
     part, signs_of_part = observed.select(used), select(signs, observed, used)
+    # how the scale is found leaves the draws of the verdict alone
+    scale = likely_scale(part, believed, signs_of_part, rng.spawn(1)[0])
+    believed = replace(believed, pos=with_scale(believed.pos, scale, open_sigmas(believed)))
+    step(1)
     errors = background(part, believed)
     infer = partial(infer_causes, survey=believed, signatures=signs_of_part, absence=absence)
     inference = infer(part, errors, rng=rng, costs=costs)
@@ -122,6 +129,7 @@ def diagnose(
         survey, simulator, effects, part, inference, closure, plan, left_out, compared.notes,
         absence, signs_of_part, costs, compared.contrasts,
         (*compared.distances, *_of_innovations(part, errors, inference, rng)), compared.next_run,
+        scale,
     )  # fmt: skip
 
 
@@ -146,7 +154,10 @@ def _looks_again(absence):
 
 @dataclass(frozen=True, repr=False)
 class DiagnosedSurvey(Summary):
-    """A survey with its diagnosis: the document of gap.json, and ``write``."""
+    """A survey with its diagnosis: the document of gap.json, and ``write``.
+
+    ``scale`` is that on the sigmas of the POS that nobody stated.
+    """
 
     survey: Survey
     simulator: Simulator
@@ -163,13 +174,21 @@ class DiagnosedSurvey(Summary):
     contrasts: tuple[contrast.Contrast, ...] = ()
     distances: tuple[contrast.DistributionDistance, ...] = ()
     next_run: str = ""
+    scale: float = 1.0
+
+    @property
+    def _believed(self):
+        """The survey as it was diagnosed."""
+        believed, _ = as_believed(self.survey, self.simulator)
+        pos = with_scale(believed.pos, self.scale, open_sigmas(believed))
+        return replace(believed, pos=pos)
 
     @property
     def document(self) -> dict:
         """The document of gap.json."""
         from mlscorr.report.gap import gap_screen
 
-        believed, _ = as_believed(self.survey, self.simulator)
+        believed = self._believed
         content = gap_document(
             survey=believed, rows=self.rows, inference=self.inference, closure=self.closure,
             next_data=self.next_data, effects=self.effects, left_out=self.left_out,
@@ -180,6 +199,7 @@ class DiagnosedSurvey(Summary):
         if any(contrast.sentences for contrast in self.contrasts):
             content["advice"] = [s for s in content["advice"] if s != NOTHING_TO_DO]
             content["advice"].append("See by what the clouds differ beside geometry: Channels.")
+        content["assumed"] = assumed_document(believed, self.inference, self.scale)
         content["costs"] = vars(self.costs)
         content["contrasts"] = [contrast.document() for contrast in self.contrasts]
         content["distances"] = [distance.document() for distance in self.distances]
@@ -195,8 +215,15 @@ class DiagnosedSurvey(Summary):
         """The Simulator with the cause in it, or the same and a sentence why it can't take that."""
         if self.inference.verdict.label in ("none", "unknown"):
             return self.simulator, ""
+        pos, names = self._believed.pos, open_sigmas(self._believed)
         try:
-            return with_cause(self.simulator, self.survey, self.inference.cause), ""
+            improved = with_cause(
+                replace(self.simulator, pos=pos), self.survey, self.inference.cause
+            )
+            if set(names) <= set(improved.pos.assumed):  # the next run finds their scale again
+                pos = with_scale(improved.pos, 1.0 / self.scale, names)
+                improved = replace(improved, pos=pos)
+            return improved, ""
         except ValueError as error:  # larger than any survey can have
             why = f"simulator.toml is as it was, since no simulator can take that: {error}"
             return self.simulator, why

@@ -90,6 +90,8 @@ def _round_document(number, diagnosed):
     content = cause_document(diagnosed.rows, cause)
     label, kept = content.pop("effect"), ("before", "after", "unit", "shrink", "kind")
     gap = {name: getattr(closure, name) for name in kept}
+    if closure.is_within_noise:
+        gap["shrink"] = None
     if closure.effect != label:  # that of the nearest known effect, which was not put in
         gap |= {"after": None, "shrink": None}
     windows = windows_document(cause, diagnosed.survey)

@@ -8,7 +8,7 @@ from mlscorr.estimate import NextControl, Support
 from mlscorr.estimate.support import DRIFT, REASONS
 from mlscorr.evaluate.datum import DatumDifference
 from mlscorr.evaluate.rows import PointCounts, Score, Statistics, TargetRow
-from mlscorr.survey import PointCloud
+from mlscorr.survey import Assumption, PointCloud
 
 GROUPS = ("control", "check", "unused")
 
@@ -113,6 +113,8 @@ class CorrectionReport:
         the latter.
     datum : tuple of DatumDifference
         By what the control that was used differs from the cloud as a whole.
+    assumed : tuple of Assumption
+        Accuracies of the POS that nobody stated.
     """
 
     name: str
@@ -132,6 +134,7 @@ class CorrectionReport:
     ties: dict | None = None
     position_sigma: dict[str, float] | None = None
     datum: tuple[DatumDifference, ...] = ()
+    assumed: tuple[Assumption, ...] = ()
 
     def document(self) -> dict:
         """The content of report.json."""
@@ -156,6 +159,7 @@ class CorrectionReport:
                 "steps": list(self.support.steps),
             },
             "position_sigma": self.position_sigma,
+            "assumed": [vars(row) for row in self.assumed],
             "next_control": [place.document() for place in self.next_control],
             **{name: [row.document() for row in getattr(self, name)] for name in rows[1:]},
         }

@@ -2,43 +2,18 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from mlscorr.evaluate.rows import SEEN_BY_OTHERS, PointCounts
+from mlscorr.report.assumed import assumed_statement
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
+from mlscorr.report.statement import RATINGS, Statement
 from mlscorr.report.tables import length_in_words, percent, verdict
 from mlscorr.survey.summary import counted
 
 NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
-RATINGS = ("green", "amber", "red")  # as it should be; mind it; not whole, or worse than before
-
-
-@dataclass(frozen=True)
-class Statement:
-    """A fact on the first screen.
-
-    Parameters
-    ----------
-    what : str
-        What it is about.
-    rating : str
-        Of RATINGS.
-    sentence : str
-    items : tuple of (str, str)
-        What it names one by one, and what is said of each.
-    """
-
-    what: str
-    rating: str
-    sentence: str
-    items: tuple[tuple[str, str], ...] = ()
-
-    def document(self) -> dict[str, object]:
-        """The row of ``statements[]`` in report.json."""
-        return {**vars(self), "items": [{"name": name, "text": text} for name, text in self.items]}
 
 
 def first_screen(report: CorrectionReport) -> dict[str, object]:
@@ -69,6 +44,7 @@ def statements(report: CorrectionReport) -> list[Statement]:
     ----------
     report : CorrectionReport
     """
+    assumed = [vars(row) for row in report.assumed]
     return [
         _result(report),
         _points_moved(report),
@@ -78,6 +54,7 @@ def statements(report: CorrectionReport) -> list[Statement]:
         _extrapolated(report),
         *_left_out(report),
         *_sigma(report),
+        *assumed_statement(assumed, " until control points show better", "green"),
         *warning_statements(report.model.get("warnings") or ()),
     ]
 

@@ -28,8 +28,10 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
     pairs.append(("Epochs of the trajectory", f"{thousands(len(time))} at {rate:.4g} Hz"))
     sigma = "its own at each epoch"
     if trajectory.position_sigma is None:
-        sigma = f"{survey.pos.position_sigma:g} m at all times, as survey.toml or the default says"
-    pairs.append(("Stated sigma of the trajectory's position", sigma))
+        origin = "a default" if survey.has_assumed_position else "as survey.toml states"
+        sigma = f"{survey.pos.position_sigma:g} m at all times, {origin}"
+    kind = "Assumed" if survey.has_assumed_position else "Stated"
+    pairs.append((f"{kind} sigma of the trajectory's position", sigma))
     for name, part in survey.by_scanner.items():
         text = "not given (not needed: it cancels where only the trajectory is corrected)"
         if part.mounting is not None:

@@ -112,7 +112,8 @@ def read_simulator(path: Path | str) -> Simulator:
 def write_simulator(simulator: Simulator, path: Path | str) -> None:
     """Write simulator.toml; a file there is replaced.
 
-    Numbers of up to 12 decimals in deg are read as the same to the last bit, others to 1e-15 rad.
+    What nobody stated is left out, so that whoever reads it knows that it is assumed. Numbers of
+    up to 12 decimals in deg are read as the same to the last bit, others to 1e-15 rad.
 
     Parameters
     ----------
@@ -132,6 +133,9 @@ def write_simulator(simulator: Simulator, path: Path | str) -> None:
             "correlation_time": float(pos.correlation_time),
         },
     }
+    for section, assumed in (("scanner", scanner.assumed), ("pos", pos.assumed)):
+        for name in assumed:
+            del sections[section][name]
     if mounting is not None:
         lever_arm = np.asarray(mounting.lever_arm, dtype=float).tolist()
         boresight = {"lever_arm": lever_arm, "boresight": _angles(mounting.boresight)}

@@ -3,7 +3,7 @@
 float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forward, Z up.
 """
 
-from mlscorr.survey.beliefs import SEARCH_RADIUS, Pos, Scanner
+from mlscorr.survey.beliefs import SEARCH_RADIUS, Assumption, Pos, Scanner
 from mlscorr.survey.clouds import NOISE_CLASSES, CloudFile, Correcting, PointCloud
 from mlscorr.survey.recording import (
     InputFile,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.survey.beliefs import SEARCH_RADIUS, Pos, Scanner
+from mlscorr.survey.beliefs import SEARCH_RADIUS, Assumption, Pos, Scanner
 from mlscorr.survey.clouds import CloudFile
 from mlscorr.survey.summary import Summary, counted
 from mlscorr.survey.targets import ControlPoints
@@ -149,6 +149,39 @@ class Survey(Summary):
             ("surveyed", f"{len(self.control)} control and {len(self.check)} check points"),
             ("mounting", mounted),
         ]
+
+    @property
+    def assumed_pos(self) -> tuple[Assumption, ...]:
+        """Accuracies of the POS that neither the trajectory nor survey.toml states."""
+        trajectory, pos = self.trajectory, self.pos
+        angles = tuple(np.degrees(pos.attitude_sigma).round(9).tolist())
+        defaults: dict[str, tuple[np.ndarray | None, float | tuple[float, ...], str]] = {
+            "position_sigma": (trajectory.position_sigma, pos.position_sigma, "m"),
+            "attitude_sigma": (trajectory.attitude_sigma, angles, "deg"),
+            "correlation_time": (None, pos.correlation_time, "s"),
+        }
+        return tuple(
+            Assumption(f"pos.{name}", value, unit)
+            for name, (stated, value, unit) in defaults.items()
+            if stated is None and name in pos.assumed
+        )
+
+    @property
+    def has_assumed_position(self) -> bool:
+        """Whether a default stands in for the sigma of the POS's position."""
+        return any(row.key == "pos.position_sigma" for row in self.assumed_pos)
+
+    @property
+    def assumed_scanner(self) -> tuple[Assumption, ...]:
+        """Noises of the one scanner that survey.toml does not state."""
+        scanner = self.scanner
+        angle = float(np.degrees(scanner.angle_noise).round(9))
+        defaults = {"range_noise": (scanner.range_noise, "m"), "angle_noise": (angle, "deg")}
+        return tuple(
+            Assumption(f"scanner.{name}", value, unit)
+            for name, (value, unit) in defaults.items()
+            if name in scanner.assumed
+        )
 
     @property
     def assumed_mounting(self) -> Mounting:

@@ -73,6 +73,7 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
         },
         "gap": WITHIN if label == "none" else GAP,
         "headline": "Observed and simulated differ by 17.0 mm; 38 % of it is in the axis E.",
+        "assumed": [],
         "agreement": [
             {
                 "channel": "target",

@@ -28,7 +28,7 @@ def answer(
     probability=1.0,
     several=None,
     lead="",
-    shrink=None,
+    shrink=0.0,
     estimate=0.01,
     sigma=1e-3,
     p_value=0.5,
@@ -71,6 +71,9 @@ def test_recovers_the_rates_of_hand_made_answers():
     assert rows["clean: noise claimed"]["value"] == 0.01
     assert rows["gap closed at 3 MDB and more, median"]["value"] == 0.98
     assert rows["gap closed at 3 MDB and more, p10"]["value"] == 0.98
+    small = (label("single", "range_bias"), answer("range_bias", shrink=None))  # within chance
+    closed = scored(*[found] * 3, small)[0]["gap closed at 3 MDB and more, p10"]
+    assert (closed["cases"], closed["value"]) == (3, 0.98)
     assert [one["said"] for one in told["wrong"]] == ["lever_arm", "range_noise", "none", "none"]
 
 

@@ -99,6 +99,23 @@ def test_heights_of_another_datum_are_found():
     assert found.size == pytest.approx([-0.3], abs=0.05)
 
 
+def test_a_default_sigma_is_called_assumed():
+    "Where nobody stated the sigma of the POS, the sentence says so, and the way out"
+
+    def lower(place):
+        return place - [0.0, 0.0, 0.5]
+
+    bare = replace(DRIVE, position_sigma=None, attitude_sigma=None)
+    points = control(np.random.default_rng(3), lower)
+    (stated,) = datum_differences(points, bare, Pos())
+    (assumed,) = datum_differences(points, bare, Pos(assumed=("position_sigma",)))
+    assert stated.assumed_sigma is None
+    assert assumed.assumed_sigma == pytest.approx(0.02)  # m
+    assert assumed.sentence.startswith(stated.sentence)
+    assert "0.02 m is assumed" in assumed.sentence
+    assert "[pos]" in assumed.sentence
+
+
 @pytest.mark.parametrize("rows", [slice(0, 40), slice(None)])
 def test_sigmas_of_zero_are_no_statement_of_a_datum_either(rows):
     "Control 0.3 m lower is found where epochs state a sigma of zero, which others fill in"

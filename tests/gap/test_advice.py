@@ -1,9 +1,18 @@
 """What is said of a verdict, and what to do about it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from mlscorr.gap.advice import ADVICE, NOTHING_TO_DO, advice_of, excess_of, sentence_of
+from mlscorr.gap.advice import (
+    ADVICE,
+    NOTHING_TO_DO,
+    ONLY_DRIFT,
+    advice_of,
+    excess_of,
+    sentence_of,
+)
 from mlscorr.gap.agreement import Agreement
 from mlscorr.gap.close.closure import Closure, Gap
 from mlscorr.gap.close.over_sigma import OverSigma
@@ -54,6 +63,15 @@ def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rm
     assert (ADVICE[excess] == NOTHING_TO_DO) == (not excess)
 
 
+def test_nothing_is_larger_than_a_default():
+    "Where nobody stated the sigma of the POS, 9 cm and 7 sigmas are no excess, but drift"
+    found, closed = inference(), closure(over=7.3)
+    far = [Agreement("target", 9, 91.6, 20.6)]
+    assert excess_of(found, closed, far) == "stated"
+    assert excess_of(found, closed, far, is_stated=False) == ""
+    assert advice_of(found, closed, [], "", is_stated=False) == [ONLY_DRIFT]
+
+
 def test_where_something_is_to_be_measured_something_needs_to_be_done():
     "With an open question and an addition that settles it the addition is all that is advised"
     found = inference(labels=("none", "lever_arm"))
@@ -68,6 +86,18 @@ def test_the_nearest_effect_is_advised_against_by_its_share():
     first, second = advice_of(found, closure("range_scale", 9.0, 0.6, 0.9952), [], "")
     assert "makes an easting error" in first
     assert "closes 99.5 % of the squared gap" in second
+
+
+def test_what_chance_makes_is_not_closed():
+    "Of a gap of 0.5 mm where chance makes up to 0.7 mm no share is told; lost returns count below"
+    found = inference("unknown", labels=("unknown",), lead="easting error")
+    within = closure("range_scale", 0.5, -0.9, -1.0)
+    assert within.is_within_noise and not closure("range_scale", 0.8, 0.1, 0.9).is_within_noise
+    assert not closure("none", 0.5, 0.5).is_within_noise
+    _, second = advice_of(found, within, [], "")
+    assert "%" not in second and "does not explain it: don't use it" in second
+    lost = replace(within, kind="returns", before=-10.0, unit="%")
+    assert not lost.is_within_noise
 
 
 @pytest.mark.parametrize(("after", "shrink", "is_said"), [(-53.9, -0.88, True), (0.1, 0.9, False)])

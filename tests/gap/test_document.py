@@ -6,12 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.effects import make_effect
+from mlscorr.effects import effect_class, make_effect
+from mlscorr.gap.advice import distinct_parameters
 from mlscorr.gap.document import map_document, separability_document, windows_document
 from mlscorr.gap.infer.causes import Cause
 from mlscorr.gap.infer.error_models import STATED
+from mlscorr.gap.infer.parameters import CauseParameter
 from mlscorr.gap.infer.separability import Separability
+from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.gap.train import features
+from mlscorr.report.gap.labels import parameters_of
 
 
 def test_separability_is_told_in_plain_numbers():
@@ -53,3 +57,20 @@ def test_an_effect_is_told_as_a_scenario_names_it():
     effect = make_effect("position_bump", magnitude=[0.1, 0.0, -0.2], time=5.0, width=3.0)
     content = effect.document()
     assert make_effect(content.pop("name"), **content) == effect
+
+
+def test_sizes_of_an_effect_and_of_noise_have_names_of_their_own():
+    "A clock offset beside range noise has two magnitudes: each is told with its effect's name"
+    g = features.geometry(3, targets=6, patches=20)
+    kinds = [effect_class(name) for name in ("time_offset", "range_noise")]
+    late, noisy = signatures(g.rows, g.survey, kinds)[0]
+    sizes = CauseParameter("magnitude", "s", 0.005), CauseParameter("magnitude", "m", 0.02)
+    parts = (late, np.array([0.005])), (noisy, np.array([0.02]))
+    cause = Cause("time_offset+range_noise", 0.9, sizes, parts, np.zeros(len(g.rows)))
+    told = [vars(parameter) for parameter in distinct_parameters(cause)]
+    assert [row["name"] for row in told] == ["time_offset magnitude", "range_noise magnitude"]
+    owned = parameters_of(cause.effect, told)
+    assert owned["time_offset"]["magnitude"].unit == "s"
+    assert owned["range_noise"]["magnitude"].estimate == 0.02
+    alone = Cause("time_offset", 0.9, sizes[:1], parts[:1], np.zeros(len(g.rows)))
+    assert distinct_parameters(alone) == sizes[:1]

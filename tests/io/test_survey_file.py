@@ -3,6 +3,7 @@
 import re
 import shutil
 import warnings
+from dataclasses import replace
 
 import laspy
 import numpy as np
@@ -100,9 +101,36 @@ def test_a_survey_is_read_with_its_defaults(folder):
     assert survey.check.name == ("T02",)
     assert survey.mounting is None
     assert survey.reference is None
-    assert survey.scanner == Scanner()
+    assert replace(survey.scanner, assumed=()) == Scanner()
     assert survey.pos.attitude_sigma == pytest.approx(Pos().attitude_sigma)
     assert len(survey.trajectory) == 800
+
+
+def test_what_nobody_states_is_assumed(folder):
+    "Without [pos] and [scanner] five defaults stand in; what is given there is none of them"
+    survey = read_survey(folder)
+    rows = (*survey.assumed_pos, *survey.assumed_scanner)
+    assert {row.key: row.unit for row in rows} == {
+        "pos.position_sigma": "m",
+        "pos.attitude_sigma": "deg",
+        "pos.correlation_time": "s",
+        "scanner.range_noise": "m",
+        "scanner.angle_noise": "deg",
+    }
+    values = {row.key: row.value for row in rows}
+    assert values["pos.position_sigma"] == Pos.position_sigma
+    assert values["scanner.angle_noise"] == pytest.approx(0.002)
+    assert survey.has_assumed_position
+    with (folder / "survey.toml").open("a") as file:
+        file.write("[pos]\nposition_sigma = 0.02\n[scanner]\nrange_noise = 0.005\n")
+    stated = read_survey(folder)
+    keys = [row.key for row in (*stated.assumed_pos, *stated.assumed_scanner)]
+    assert keys == ["pos.attitude_sigma", "pos.correlation_time", "scanner.angle_noise"]
+    assert not stated.has_assumed_position
+    epochs = np.ones((len(survey.trajectory), 3))
+    columns = replace(survey.trajectory, position_sigma=0.03 * epochs, attitude_sigma=1e-4 * epochs)
+    (left,) = replace(survey, trajectory=columns).assumed_pos
+    assert left.key == "pos.correlation_time"
 
 
 def test_each_cloud_has_its_own_time_constant(folder):
@@ -688,7 +716,8 @@ def test_each_of_several_scanners_has_its_files_and_mounting(mounted):
     assert [file.path.name for file in left.clouds] == ["pass-1.las"]
     assert [file.path.name for file in other.clouds] == ["pass-2.las"]
     assert left.mounting.lever_arm.tolist() == [0.1, -0.6, 0.4]
-    assert (left.scanner.range_noise, other.scanner, other.mounting) == (0.01, Scanner(), None)
+    assert (left.scanner.range_noise, other.mounting) == (0.01, None)
+    assert replace(other.scanner, assumed=()) == Scanner()
     assert any("left wrote pass-1.las; 2 wrote pass-2.las" in note for note in survey.notes)
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomlkit
 from typer.testing import CliRunner
 
 import mlscorr
@@ -30,7 +31,7 @@ KEYS = {
     *("schema", "verdict", "gap", "headline", "advice", "where", "causes", "separability"),
     *("closure", "next_data", "evidence", "innovations", "windows", "map", "channels"),
     *("simulator", "left_out", "warnings", "notes", "name", "absent"),
-    *("rating", "statements", "agreement", "costs", "contrasts", "distances"),
+    *("rating", "statements", "agreement", "assumed", "costs", "contrasts", "distances"),
     "clouds",
 }
 
@@ -161,6 +162,9 @@ def test_a_cause_that_the_simulator_has_already_is_joined_with_it(late, tmp_path
     write_simulator(improved, tmp_path / "simulator.toml")
     assert read_simulator(tmp_path / "simulator.toml").pos.windows == (window,)
     assert as_believed(survey, improved)[0].pos.windows == (window,)
+    bare = replace(simulator, pos=replace(simulator.pos, assumed=("position_sigma",)))
+    assert with_cause(bare, survey, worse).pos.assumed == ()  # twice the default was found
+    assert with_cause(bare, survey, outage).pos.assumed == ("position_sigma",)
 
 
 @pytest.mark.long
@@ -304,3 +308,48 @@ def test_costs_below_zero_are_refused(street, cost):
     "Of a false alarm that pays, or has no size, no label is the cheapest one"
     with pytest.raises(ValueError, match="each cost is a finite number from 0 on"):
         mlscorr.diagnose(mlscorr.read_survey(street), costs=Costs(false_alarm=cost))
+
+
+@pytest.fixture(scope="module")
+def unstated(tmp_path_factory):
+    "A street on which the POS loses GNSS, and of whose accuracy no file states anything"
+    folder = tmp_path_factory.mktemp("unstated") / "survey"
+    scenario = Scenario(
+        drive={"duration": 50.0},
+        pos={"processing": "filtered", "outages": [[12.0, 25.0]]},
+        targets={"control": 16, "check": 3},
+        scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    )
+    simulate(scenario, np.random.default_rng(5)).write(folder)
+    table = (folder / "trajectory.csv").read_text().splitlines()
+    table = [line.rsplit(",", 6)[0] for line in table]
+    (folder / "trajectory.csv").write_text("\n".join(table) + "\n")
+    content = tomlkit.parse((folder / "survey.toml").read_text())
+    del content["pos"]
+    del content["scanner"]["range_noise"]
+    (folder / "survey.toml").write_text(tomlkit.dumps(content))
+    return folder
+
+
+@pytest.mark.long
+def test_a_default_is_no_statement(unstated, tmp_path):
+    "Decimeters of drift where nobody stated a sigma: assumed, neither unknown nor beyond stated"
+    found = mlscorr.diagnose(mlscorr.read_survey(unstated))
+    told = found.write(tmp_path / "out")
+    assert not undocumented(told)
+    rows = {row["key"]: row for row in told["assumed"]}
+    assert set(rows) == {
+        *("pos.position_sigma", "pos.attitude_sigma", "pos.correlation_time"),
+        "scanner.range_noise",
+    }
+    position = rows["pos.position_sigma"]
+    assert (position["value"], position["unit"]) == (0.02, "m")
+    off = max(part["rms_mm"] for part in told["agreement"])
+    assert 1e3 * position["estimate"] == pytest.approx(off, rel=1.5)
+    assert position["estimate"] > 0.03
+    assert told["verdict"]["label"] == "none" and told["verdict"]["excess"] == ""
+    assert "range_noise" in told["left_out"] and "roughness" not in told["channels"]
+    sentences = " ".join(row["sentence"] for row in told["statements"])
+    assert "as accurate as stated" not in sentences and "less accurate" not in sentences
+    written = (tmp_path / "out" / "simulator.toml").read_text()
+    assert "position_sigma" not in written and "range_noise" not in written

@@ -54,7 +54,8 @@ def test_the_document_has_its_parts_in_order():
     assert list(content) == [
         *("name", "crs", "notes", "targets", "control", "check", "accuracy", "model"),
         "datum",
-        *("coverage", "ties", "weak", "drift", "position_sigma", "next_control"),
+        *("coverage", "ties", "weak", "drift", "position_sigma", "assumed"),
+        "next_control",
         *("files", "inputs", "outputs"),
     ]
     assert list(content["targets"][0])[:4] == ["name", "pass", "gps_time", "role"]

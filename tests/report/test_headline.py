@@ -11,6 +11,7 @@ from mlscorr.estimate.support import DRIFT, NO_CONTROL, REASONS
 from mlscorr.evaluate.datum import DatumDifference
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.report.headline import first_screen, headline, statements
+from mlscorr.survey import Assumption
 from tests.beds.reports import START, drive, fabricate, page, report_of, words
 
 
@@ -192,6 +193,18 @@ def test_a_sigma_beyond_what_the_pos_states_is_amber():
         (row,) = (row for row in rows if row.what == "Sigma")
         assert row.rating == rating
         assert ("The POS states 3.0 cm" in row.sentence) == (rating == "amber")
+
+
+def test_a_sigma_that_nobody_stated_is_called_assumed():
+    "It is green, for control points show better, and nowhere does the POS state it"
+    report = fabricate(drive())[2]
+    assert "Assumed" not in [row.what for row in statements(report)]
+    assumed = (Assumption("pos.position_sigma", 0.02, "m"),)
+    rows = {row.what: row for row in statements(replace(report, assumed=assumed))}
+    assert rows["Assumed"].rating == "green"
+    assert rows["Assumed"].items == (("Position of the POS", "2.0 cm assumed"),)
+    assert "1 accuracy that nobody stated is assumed" in rows["Assumed"].sentence
+    assert replace(report, assumed=assumed).document()["assumed"][0]["value"] == 0.02
 
 
 def test_a_drive_without_control_of_its_own_is_not_held_by_it():

@@ -99,6 +99,22 @@ def test_what_is_left_out_is_as_in_survey_toml(tmp_path):
     assert turn.magnitude() < 1e-12
 
 
+def test_what_nobody_stated_is_not_written_as_stated(tmp_path):
+    "A default stays one from file to file; a number that was given is written"
+    path = tmp_path / "simulator.toml"
+    path.write_text("[pos]\nposition_sigma = 0.02\n[scanner]\nangle_noise = 0.002\n")
+    simulator = read_simulator(path)
+    assert simulator.pos.assumed == ("attitude_sigma", "correlation_time")
+    assert simulator.scanner.assumed == ("range_noise",)
+    write_simulator(simulator, path)
+    text = path.read_text()
+    assert "position_sigma = 0.02" in text and "angle_noise = 0.002" in text
+    assert "attitude_sigma" not in text and "range_noise" not in text
+    again = read_simulator(path)
+    assert_same(again, simulator)
+    assert again.pos.assumed == simulator.pos.assumed
+
+
 def test_effects_act_in_their_order_however_they_are_listed(tmp_path):
     "As in scenario.toml"
     path = tmp_path / "simulator.toml"

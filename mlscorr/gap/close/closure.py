@@ -91,6 +91,13 @@ class Closure:
     gap: Gap
     over_sigma: OverSigma
 
+    @property
+    def is_within_noise(self) -> bool:
+        """Whether chance alone makes a gap as large as that before: there is nothing to close."""
+        low, high = self.null_band
+        is_lost = self.kind == "returns" and self.before < low  # below it fewer pulses return
+        return self.effect != "none" and self.before <= high and not is_lost
+
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def close_gap(

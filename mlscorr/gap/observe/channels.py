@@ -75,11 +75,12 @@ def roughness(
     -------
     tuple of four (p,) arrays
         Log variance ratio, its variance, the believed variance (m^2), and which patches count:
-        none that is curved does, whatever the noise.
+        none that is curved does, whatever the noise, nor any where the scanner's noise is assumed.
     """
     believed = _believed_variance(survey, patches)
     ratio, variance = log_roughness(patches.variance, believed, patches.points)
-    return ratio, variance, believed, patches.ripple <= SETTINGS.largest_ripple
+    flat = patches.ripple <= SETTINGS.largest_ripple
+    return ratio, variance, believed, flat & (not survey.scanner.assumed)
 
 
 def beside_seen_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:

@@ -81,6 +81,9 @@ class Signature:
         return self.kind(magnitude=magnitude, **self.fixed)
 
 
+UNSTATED = "does not state how large it is"  # so that none is larger than stated
+
+
 def signatures(
     rows: Rows,
     survey: Survey,
@@ -113,6 +116,9 @@ def signatures(
     for kind in known_effects() if effects is None else effects:
         if kind.needs_mounting() and survey.mounting is None:
             left_out[kind.name] = f"It acts on the {kind.stage}, {NO_MOUNTING}."
+            continue
+        if kind.name in survey.scanner.assumed:
+            left_out[kind.name] = f"survey.toml {UNSTATED}: [scanner] {kind.name}."
             continue
         bank = _tried(bench, kind, _bank(kind, rows, survey), rng)
         if isinstance(bank, str):

@@ -78,9 +78,14 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
         added += as_believed(survey, replace(simulator, effects=()))[1]
     effects = reduce(joined, added, list(simulator.effects))
     scale, pos = cause.model.scale, simulator.pos
-    if not cause.parts or scale != 1.0:
-        attitude = np.asarray(pos.attitude_sigma) * scale
-        pos = replace(pos, position_sigma=pos.position_sigma * scale, attitude_sigma=attitude)
+    if scale != 1.0:  # what was found is no default any more
+        sigmas = "position_sigma", "attitude_sigma"
+        pos = replace(
+            pos,
+            position_sigma=pos.position_sigma * scale,
+            attitude_sigma=np.asarray(pos.attitude_sigma) * scale,
+            assumed=tuple(name for name in pos.assumed if name not in sigmas),
+        )
     pos = replace(pos, windows=(*pos.windows, *cause.model.windows))
     mounting = beliefs_of(survey).mounting
     return replace(simulator, mounting=mounting, pos=pos, effects=in_order(effects))

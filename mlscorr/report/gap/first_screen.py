@@ -6,13 +6,21 @@ from itertools import groupby
 from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import joined
 from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.signatures.signatures import NO_MOUNTING
+from mlscorr.gap.signatures.signatures import NO_MOUNTING, UNSTATED
+from mlscorr.report.assumed import assumed_statement, has_assumed_sigma
 from mlscorr.report.gap.channels import channel_statements
 from mlscorr.report.gap.verdict import facts, is_named, verdict
 from mlscorr.report.headline import Statement, statements_section, warning_statements
 from mlscorr.report.tables import length_in_words
 
 RATINGS = {"good": "green", "open": "amber", "bad": "red"}  # by the tone of a verdict
+TIMES = [time for _, time, _ in SETTINGS.shapes]
+USES = {  # of defaults that are not estimated
+    "pos.attitude_sigma": "how much larger or smaller it is, is open",
+    "pos.correlation_time": f"{min(TIMES):g} to {max(TIMES):g} times as long is possible, too",
+    "scanner.range_noise": "how rough surfaces are is not compared with it",
+    "scanner.angle_noise": "how rough surfaces are is not compared with it",
+}
 THINGS = {  # what a residual is of, in words
     "target": "Surveyed targets",
     "surface": "Reference surface",
@@ -37,7 +45,9 @@ def gap_screen(document: dict) -> dict[str, object]:
     answer = Statement("Unmodelled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
     warnings = warning_statements(document["warnings"])
     beside = (*channel_statements(document), *unjudged(document))
-    return statements_section([*accuracy(document), answer, *beside, *warnings])
+    judged = ", and nothing is judged by that"
+    assumed = assumed_statement(document["assumed"], judged, "amber", USES)
+    return statements_section([*accuracy(document), answer, *assumed, *beside, *warnings])
 
 
 def accuracy(document: dict) -> Iterator[Statement]:
@@ -49,7 +59,11 @@ def accuracy(document: dict) -> Iterator[Statement]:
         The content of gap.json.
     """
     parts = document["agreement"]
+    less = ", less what the simulator has in it," if document["simulator"]["effects"] else ""
     if not parts:
+        return
+    if has_assumed_sigma(document["assumed"]):
+        yield _unstated_accuracy(document, less)
         return
     is_worse = [part["rms_mm"] > SETTINGS.quantile * part["stated_mm"] for part in parts]
     answer = "less accurate than" if any(is_worse) else "as accurate as"
@@ -60,8 +74,20 @@ def accuracy(document: dict) -> Iterator[Statement]:
         states = f"{stated} by what POS, survey and extraction state (worse from {limit} on)"
         sizes.append((THINGS[part["channel"]], f"off by {residual} (RMS per axis), {states}"))
     rating, items = "amber" if any(is_worse) else "green", (*sizes, *_moved(document))
-    less = ", less what the simulator has in it," if document["simulator"]["effects"] else ""
     yield Statement("Accuracy", rating, f"The recorded cloud{less} is {answer} stated.", items)
+
+
+def _unstated_accuracy(document, less):
+    """How far off the recorded cloud is, where nobody stated how far the POS may be off."""
+    sizes = [
+        (THINGS[part["channel"]], f"off by {length_in_words(part['rms_mm'] / 1e3)} (RMS per axis)")
+        for part in document["agreement"]
+    ]
+    sentence = (
+        f"The recorded cloud{less} can't be compared with a stated accuracy: no sigma of the POS "
+        "is stated."
+    )
+    return Statement("Accuracy", "amber", sentence, (*sizes, *_moved(document)))
 
 
 def _moved(document):
@@ -90,5 +116,5 @@ def unjudged(document: dict) -> Iterator[Statement]:
         judged = [rung["label"] for rung in document["evidence"] if "+" not in rung["label"]]
         total = len(left) + len({*judged} - {"none", "unknown"})
         sentence = f"{len(left)} of {total} kinds of error can be neither named nor ruled out here."
-        is_mendable = any(NO_MOUNTING in why for _, why in left)
+        is_mendable = any(NO_MOUNTING in why or UNSTATED in why for _, why in left)
         yield Statement("Not judged", "amber" if is_mendable else "green", sentence, items)

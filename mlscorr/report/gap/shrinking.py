@@ -11,6 +11,7 @@ GAPS = {  # by the kind of gap that a closure measures
     "scatter": "Scatter beyond the stated one",
     "returns": "Returns beyond the expected ones",
 }
+NOTHING_TO_CLOSE = "Before, it was no larger than chance makes it: there is nothing to close."
 AXES = {"E": "easting", "N": "northing", "H": "height"}
 
 
@@ -31,7 +32,7 @@ def is_closed(document: dict) -> bool:
         The content of gap.json.
     """
     closure = document["closure"]
-    return closure["effect"] not in (None, "", "none") and known(closure["shrink"])
+    return closure["effect"] not in (None, "", "none") and known(closure["before"])
 
 
 def is_within(
@@ -70,7 +71,9 @@ def shrinking(document: dict) -> Fact:
         nearest = f"With the nearest known effect, {lowered(title(closure['effect']))},"
         return Fact(f"{nearest} in the simulator", pair, shrunk(closure))
     more, left = "", (closure["after"], closure["null_band"], closure.get("kind"))
-    if is_within(*left, is_left=True):
+    if not known(closure["shrink"]):
+        more = ""
+    elif is_within(*left, is_left=True):
         chance = " What is left is what chance leaves when nothing is wrong."
         more = "" if not_closed(closure) else chance
     elif is_within(*left):
@@ -92,6 +95,8 @@ def shrunk(closure: dict) -> str:
         Of gap.json.
     """
     (low, high), share, between = closure["interval"], closure["shrink"], ""
+    if not known(share):
+        return not_closed(closure) + NOTHING_TO_CLOSE
     if known(low) and known(high):
         between = f" (95 %: {percent(low)} to {percent(high)})"
     text = f"{percent(share)} of the squared gap is gone{between}."
@@ -99,8 +104,6 @@ def shrunk(closure: dict) -> str:
         text = f"All of the squared gap is gone{between}."
     elif share < 0:
         text = f"The squared gap did not shrink, it grew{between}."
-    if is_within(closure["before"], closure["null_band"], closure.get("kind")):
-        text += " Before, it was within chance already: the share says little."
     return not_closed(closure) + text
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 from mlscorr.effects.labels import family, lowered, meaning, title
 from mlscorr.effects.wording import DASH, joined, known, size
 from mlscorr.gap.advice import no_cause
+from mlscorr.report.assumed import has_assumed_sigma
 from mlscorr.report.gap.labels import place_of, sentences_of
 from mlscorr.report.gap.shrinking import Fact, is_closed, is_within, shrinking
 
@@ -119,7 +120,9 @@ def _cause(document):
     elif parts > 1:
         kicker = f"{_number_word(parts).capitalize()} things are wrong"
     elif family(label) == "noise":
-        kicker, sentences = "Noisier than stated", [*sentences, SCATTER]
+        is_assumed = label == "position_noise" and has_assumed_sigma(document["assumed"])
+        kicker = "Noisier than assumed" if is_assumed else "Noisier than stated"
+        sentences = [*sentences, SCATTER]
     else:
         kicker = "One thing is wrong" if answer["probability"] >= 0.5 else "Possibly wrong"
     return VerdictBox("bad", kicker, sentences, large)

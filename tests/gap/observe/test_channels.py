@@ -24,6 +24,13 @@ def test_roughness_is_what_the_scanner_is_believed_to_make(survey, targets, patc
     assert np.median(again) == pytest.approx(np.log(4.0), abs=0.1)
 
 
+def test_no_roughness_is_compared_with_a_default(survey, targets, patches):
+    "Where nobody stated the scanner's noise no surface is rough beside it"
+    scanner = replace(survey.scanner, assumed=("range_noise",))
+    bare = replace(survey, scanner=scanner, reference=None)
+    assert "roughness" not in build_rows(bare, *no_targets(targets), patches).rows.channel
+
+
 def test_what_is_curved_does_not_count_as_noisy(survey):
     "Waves of 1 cm height and 0.6 m length are not told as roughness, noise of 1 cm is"
 

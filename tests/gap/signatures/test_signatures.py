@@ -97,6 +97,17 @@ def test_every_effect_has_a_signature_or_a_reason(clean, patches):
     assert len(outliers) == len(np.unique(rows.survey_item))
 
 
+def test_noise_that_nobody_stated_is_not_larger_than_stated(clean, patches):
+    "Without range_noise in survey.toml it is left out, with the reason; angle_noise is judged"
+    survey, rows, *_ = clean
+    rows = Rows.concatenate([rows, patches])
+    bare = replace(survey, scanner=replace(survey.scanner, assumed=("range_noise",)))
+    kinds = [effect_class(name) for name in ("range_noise", "angle_noise")]
+    found, left_out = signatures(rows, bare, kinds)
+    assert [sign.name for sign in found] == ["angle_noise"]
+    assert left_out["range_noise"].endswith("[scanner] range_noise.")
+
+
 def test_without_a_mounting_the_beams_are_not_known(clean):
     "Clock, POS and control effects stay; those of range, angle and mounting are left out, named"
     survey, rows, _, _ = clean

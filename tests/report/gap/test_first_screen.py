@@ -50,3 +50,39 @@ def test_what_could_not_be_judged_is_said_first(left_out, rating):
     row = rows["Not judged"]
     assert row["rating"] == rating and row["sentence"].startswith("1 of ")
     assert row["items"][0]["text"] in left_out.values()
+
+
+ASSUMED = [
+    {"key": "pos.position_sigma", "value": 0.02, "unit": "m", "estimate": 0.2},
+    {"key": "pos.correlation_time", "value": 30.0, "unit": "s", "estimate": None},
+]
+
+
+def test_a_default_is_called_assumed_and_judges_nothing():
+    "12 cm where nobody stated a sigma are neither more nor less than stated"
+    _, rows = facts(gap_document("none", assumed=ASSUMED))
+    accuracy, assumed = rows["Accuracy"], rows["Assumed"]
+    assert accuracy["rating"] == assumed["rating"] == "amber"
+    assert "no sigma of the POS is stated" in accuracy["sentence"]
+    assert accuracy["items"][0]["text"] == "off by 1.4 cm (RMS per axis)"
+    assert assumed["sentence"].startswith("2 accuracies that nobody stated are assumed")
+    items = {item["name"]: item["text"] for item in assumed["items"]}
+    assert items["Position of the POS"] == "2.0 cm assumed; about 20.0 cm by this survey"
+    assert items["Correlation time of the POS"].startswith("30 s assumed; 0.1 to 3 times")
+    assert "Assumed" not in facts(gap_document("none"))[1]
+
+
+def test_a_time_that_is_assumed_leaves_the_accuracy_to_be_judged():
+    "With sigma columns and without [pos] the correlation time alone is assumed: green"
+    _, rows = facts(gap_document("none", assumed=ASSUMED[1:]))
+    assert rows["Assumed"]["rating"] == "green"
+    assert rows["Accuracy"]["sentence"] == "The recorded cloud is as accurate as stated."
+    assert "sigma columns" not in rows["Assumed"]["sentence"]
+
+
+def test_a_noisy_pos_is_not_noisier_than_what_nobody_stated():
+    "The verdict on positions compares them with what is assumed, and says that"
+    document = gap_document("position_noise", 0.97, assumed=ASSUMED)
+    assert "Noisier than assumed" in facts(document)[1]["Unmodelled"]["sentence"]
+    document = gap_document("position_noise", 0.97)
+    assert "Noisier than stated" in facts(document)[1]["Unmodelled"]["sentence"]

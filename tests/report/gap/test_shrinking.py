@@ -3,7 +3,7 @@
 import pytest
 
 from mlscorr.report.gap import diagnosis_page
-from mlscorr.report.gap.shrinking import is_within, shrinking, shrunk
+from mlscorr.report.gap.shrinking import NOTHING_TO_CLOSE, is_within, shrinking, shrunk
 from mlscorr.report.gap.splits import closure_figure
 from tests.beds.gap_documents import gap_document
 from tests.report.gap.test_verdict import summary
@@ -35,6 +35,16 @@ def test_heights_of_eight_sigma_are_not_closed():
     assert shrunk(left).startswith(
         "Not closed: errors are still 8.0 times in height the sigma that the simulator gives them."
     )
+
+
+def test_a_gap_within_chance_is_not_closed_by_a_share():
+    "0.0 mm before, -1.2 mm after: no percentage, but that there is nothing to close"
+    document = gap_document()
+    document["closure"] |= {"before": 0.0, "after": -1.2, "shrink": None, "interval": [None, None]}
+    fact = shrinking(document)
+    assert fact.number == "0.00 mm → −1.2 mm"
+    assert fact.more == NOTHING_TO_CLOSE and "%" not in fact.more
+    assert NOTHING_TO_CLOSE in summary(document)
 
 
 @pytest.mark.parametrize(("value", "within"), [(3.0, True), (4.0, False), (None, False)])
