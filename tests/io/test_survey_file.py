@@ -599,7 +599,7 @@ def test_normals_are_optional_by_point(tmp_path):
         (
             "check",
             "chek",
-            "T02 .* unknown role 'chek'; known are control .*, check .*检查点.\\. Say under",
+            "T02 .* unknown role 'chek'; known are control .*检查点.\\. Say",
         ),
         ("circle,0.6", "circle,600", "T01 .* size 600 m, .*millimetres"),
         ("circle,0.6", "circle,0", "T01 .* size 0 m.* positive"),
