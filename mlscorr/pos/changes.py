@@ -83,9 +83,7 @@ def steady_sigma(trajectory: Trajectory) -> np.ndarray:
     return steady
 
 
-def timely_sigma(
-    trajectory: Trajectory, steady: np.ndarray, steps: Steps
-) -> tuple[np.ndarray, np.ndarray]:
+def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.ndarray]:
     """Sigma (n, 3) of the position as stated, and by the median about each epoch, with the path.
 
     What a trajectory states is often of another rate, or of another filter, than its path: a step
@@ -96,11 +94,10 @@ def timely_sigma(
     ----------
     trajectory : Trajectory
         With sigmas.
-    steady : (n, 3) array
-        As of steady_sigma. Units: m.
     steps : Steps
     """
-    time, sigma, steady = trajectory.gps_time, trajectory.position_sigma.copy(), steady.copy()
+    time, sigma = trajectory.gps_time, trajectory.position_sigma.copy()
+    steady = steady_sigma(trajectory)
     changes = quick_changes(time, np.linalg.norm(steady, axis=1))
     for change, step in _pairs(time[changes].mean(axis=1), steps.middle):
         first, last = changes[change]
@@ -130,7 +127,7 @@ def continuous(
 ) -> np.ndarray:
     """The largest amplitude (n, 3) below a given one that changes at once at breaks alone.
 
-    Elsewhere it changes by no more than a factor of e in SETTINGS.sigma_interval, but for the
+    Elsewhere it changes by no more than a factor of e in SETTINGS.told_within, but for the
     part below ``least``: so drift that grows by a power of time is left as it is.
 
     Parameters
@@ -144,7 +141,7 @@ def continuous(
     breaks : (k,) int array
         First rows after breaks.
     """
-    clock = ((gps_time - gps_time[0]) / SETTINGS.sigma_interval)[:, None]
+    clock = ((gps_time - gps_time[0]) / SETTINGS.told_within)[:, None]
     logarithm = np.log(amplitude + least)
     for first, last in pairwise([0, *np.unique(breaks).tolist(), len(gps_time)]):
         rows = slice(first, last)
@@ -156,9 +153,8 @@ def continuous(
 
 def _pairs(times, others):
     """Numbers (k, 2) of times and others that can be the same, twice as near as to any third."""
-    farthest = SETTINGS.sigma_interval + SETTINGS.step_duration
     back, _ = cKDTree(times[:, None]).query(others[:, None], 2)
     away, number = cKDTree(others[:, None]).query(times[:, None], 2)
     limit = np.minimum(away[:, 1], np.append(back[:, 1], 0.0)[number[:, 0]]) / 2  # 0: no others
-    rows = np.flatnonzero(away[:, 0] < np.minimum(limit, farthest))
+    rows = np.flatnonzero(away[:, 0] < np.minimum(limit, SETTINGS.told_within))
     return np.column_stack([rows, number[rows, 0]])

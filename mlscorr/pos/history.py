@@ -22,7 +22,8 @@ class DriftHistory:
     steps : Steps
         Fall-backs that stand in the recorded path.
     restarts : (k,) array
-        When drift starts anew: at steps and starts of passes. Units: s.
+        When drift starts anew: at steps and starts of passes; at falls of sigma(t) where the path
+        has too few epochs to show a step. Units: s.
     returns : (r,) array
         When drift is back without a step of the path: sigma(t) has sunk gently from the middle of
         an outage, as of a smoother, or has fallen at once. Units: s.
@@ -142,7 +143,7 @@ class DriftHistory:
 
     def _continuous(self, amplitude):
         time, steps = self.trajectory.gps_time, self.steps
-        starts = np.searchsorted(time, self.trajectory.passes[1:, 0])
+        starts = np.searchsorted(time, self.restarts)
         least = self.held if self.is_stated else SETTINGS.gnss
         return continuous(time, amplitude, least, np.append(starts, steps.rows(time)))
 
@@ -171,7 +172,7 @@ def _history(trajectory):
         steady = steady_sigma(trajectory)
         changes = quick_changes(time, np.linalg.norm(steady, axis=1))
         steps = find_steps(trajectory, time[changes].mean(axis=1))
-        stated, steady = timely_sigma(trajectory, steady, steps)
+        stated, steady = timely_sigma(trajectory, steps)
     restarts = np.sort(np.concatenate([trajectory.passes[1:, 0], steps.middle]))
     held = _held(steady)
     level = np.tile(held, (len(time), 1))
@@ -183,7 +184,10 @@ def _history(trajectory):
     falls = _falls(time, size, changes, held, restarts)
     is_raised = np.maximum(steady**2 - held**2, 0.0).sum(axis=1) > held @ held
     returns = _returns(time, size, runs(is_raised), np.sort(np.append(restarts, falls)))
-    returns = np.sort(np.append(returns, falls))
+    if _shows_steps(trajectory):
+        returns = np.sort(np.append(returns, falls))
+    else:
+        restarts = np.sort(np.append(restarts, falls))
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
     grown = [np.inf]
     cuts = np.searchsorted(time, edges)
@@ -202,6 +206,12 @@ def _history(trajectory):
     first = np.array(grown[::-1])[np.searchsorted(grown[::-1], edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
     return DriftHistory(trajectory, steps, restarts, returns, starts, stated, held, level)
+
+
+def _shows_steps(trajectory):
+    """Whether braking moves a path by less in an epoch than a step that counts."""
+    epoch = float(np.median(np.diff(trajectory.gps_time)))
+    return SETTINGS.largest_jerk / 2 * epoch**3 < SETTINGS.smallest_step
 
 
 def _returns(time, size, raised, restarts):

@@ -76,7 +76,8 @@ def find_steps(trajectory: Trajectory, told: np.ndarray = NOWHERE) -> Steps:
     table = [np.empty((0, 6))]
     for first, last in trajectory.passes:
         rows = (trajectory.gps_time >= first) & (trajectory.gps_time <= last)
-        table.append(_steps_of_pass(trajectory.select(rows), np.sort(told)))
+        inside = told[(told >= first) & (told <= last)]
+        table.append(_steps_of_pass(trajectory.select(rows), inside))
     columns = np.vstack(table)
     return Steps(columns[:, 0], columns[:, 1], columns[:, 2:5], columns[:, 5])
 
@@ -131,10 +132,15 @@ def _differences(driven, span, told):
     np.maximum.at(largest, second, length)
     usual = np.median(largest[np.unique(second)])
     jerk = SETTINGS.largest_jerk / 2 * times[span : span + len(size)] ** 3
-    is_told = _distance(start, told) < SETTINGS.sigma_interval + SETTINGS.step_duration
-    smallest = np.where(is_told, 0.0, SETTINGS.smallest_step)
-    limit = np.maximum(jerk, np.maximum(smallest, SETTINGS.step_ratio * usual))
+    limit = np.maximum(jerk, max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual))
     is_step = (length > limit) & (length == largest[second])
+    for time in told:  # one place to look at, not all of a drive: less is no chance
+        rows = np.flatnonzero(
+            np.abs(start + times[span : span + len(size)] / 2 - time) < SETTINGS.told_within
+        )
+        if len(rows):
+            row = rows[np.argmax(length[rows])]
+            is_step[row] |= length[row] > max(jerk[row], SETTINGS.steady_ratio * usual)
     is_step[:span] = is_step[-span:] = False  # half of what a step in the outer span would be
     rows = np.flatnonzero(is_step)
     # what the spans wholly before and after show is no step: filters and resampling ring beside one
@@ -143,10 +149,3 @@ def _differences(driven, span, told):
     return [
         (start[i], gps_time[i + 2 * span], *size[i], s) for i, s in zip(rows, sigma, strict=True)
     ]
-
-
-def _distance(times, others):
-    """Time (n,) from each to the nearest of the others, which are sorted; infinite: none."""
-    bounded = np.concatenate([[-np.inf], others, [np.inf]])
-    after = np.searchsorted(bounded, times)
-    return np.minimum(times - bounded[after - 1], bounded[after] - times)
