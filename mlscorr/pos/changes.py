@@ -148,7 +148,7 @@ def continuous(
         onward = np.minimum.accumulate(logarithm[rows] - clock[rows], axis=0) + clock[rows]
         back = np.minimum.accumulate((onward + clock[rows])[::-1], axis=0)[::-1] - clock[rows]
         logarithm[rows] = back
-    return np.maximum(np.exp(logarithm) - least, 0.0)
+    return np.clip(np.exp(logarithm) - least, 0.0, amplitude)
 
 
 def _pairs(times, others):
