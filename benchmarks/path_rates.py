@@ -5,10 +5,11 @@
 Corrected - recorded position may change at once only where the recorded path does. Each drive is
 estimated at the rate of its recording. Prints for each kind of POS the largest rate of corrected -
 recorded, beyond that of the true error over two seconds, outside the steps of the recorded path and
-the gaps between passes, the epochs at which it is beyond 0.2 m/s, and the largest difference between a jump that is applied and the step of
-the path there; then the worst drives. Twelve kinds of five seeds are 60 drives: demo, car, boat and canyon;
-MEMS and tactical units, filtered and smoothed, with outages; the demo smoothed, and without
-sigma(t); a POS whose GNSS loses its fixed solution, and one that drifts unstated.
+the gaps between passes, the epochs at which it is beyond 0.2 m/s, and the largest difference
+between a jump that is applied and the step of the path there; then the worst drives. Twelve kinds
+of five seeds are 60 drives: demo, car, boat and canyon; MEMS and tactical units, filtered and
+smoothed, with outages; the demo smoothed, and without sigma(t); a POS whose GNSS loses its fixed
+solution, and one that drifts unstated.
 """
 
 import argparse
