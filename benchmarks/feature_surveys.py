@@ -93,8 +93,8 @@ def scenarios():
     return found
 
 
-def feature_survey(scenario, seed):
-    """FeatureSurvey of a scenario."""
+def feature_survey(scenario, seed, rate=RATE):
+    """FeatureSurvey of a scenario, at a rate of the trajectory in Hz; None: as recorded."""
     simulated = simulate(scenario, np.random.default_rng(seed))
     rng = np.random.default_rng([seed, 1])
     pairs = list(zip(simulated.true_passes, simulated.passes, strict=True))
@@ -114,8 +114,8 @@ def feature_survey(scenario, seed):
     )
     is_check = simulated.is_check
     return FeatureSurvey(
-        Trajectory.concatenate([_thinned(true) for true, _ in pairs]),
-        Trajectory.concatenate([_thinned(recorded) for _, recorded in pairs]),
+        Trajectory.concatenate([_thinned(true, rate) for true, _ in pairs]),
+        Trajectory.concatenate([_thinned(recorded, rate) for _, recorded in pairs]),
         _points(targets, np.flatnonzero(~is_check), targets.position),
         observations[~is_check[target]],
         _points(targets, np.flatnonzero(is_check), simulated.true_centre),
@@ -142,8 +142,10 @@ def _observe(simulated, true, recorded, number, rng):
     return np.array(target), np.full(len(target), number), np.array(time), np.array(observed)
 
 
-def _thinned(trajectory):
-    step = max(round(1.0 / RATE / np.median(np.diff(trajectory.gps_time))), 1)
+def _thinned(trajectory, rate):
+    if rate is None:
+        return trajectory
+    step = max(round(1.0 / rate / np.median(np.diff(trajectory.gps_time))), 1)
     rows = np.unique(np.append(np.arange(0, len(trajectory), step), len(trajectory) - 1))
     stated = (trajectory.position_sigma, trajectory.attitude_sigma)
     sigmas = (None if sigma is None else sigma[rows] for sigma in stated)

@@ -15,6 +15,7 @@ what they leave open of them is a part of the stated sigmas.
 
 from mlscorr.estimate.calibration import Calibration, mounted_corrections
 from mlscorr.estimate.guards import COMPONENTS, few_targets, guards_of
+from mlscorr.estimate.jumps import Jump, find_jumps
 from mlscorr.estimate.mounting import believed_mounting, control_fault, estimate_mounting
 from mlscorr.estimate.mounting_check import find_mounting_error, mounting_warnings, scanner_warnings
 from mlscorr.estimate.mounting_estimate import corrected_mounting

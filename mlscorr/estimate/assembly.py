@@ -10,7 +10,6 @@ import numpy as np
 from mlscorr.collocation import Noise
 from mlscorr.estimate.equations import NO_TREND, Equations
 from mlscorr.frames import mounting_partials, partials_by_scanner, pose_partials
-from mlscorr.pos import SETTINGS as POS_SETTINGS
 from mlscorr.pos import Steps, stated_sigma
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos, Trajectory
 
@@ -43,9 +42,10 @@ def position_equations(
 def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
     """The equations, and below them three rows for each fall-back of the POS.
 
-    After it the POS errs as GNSS lets it; so what the recorded position moves is the drift of the
-    epoch before, but for jitter before and after. Where GNSS holds it much worse on a step's other
-    side, it is all of the error there. It tells nothing of attitude and trend.
+    The errors of GNSS at its best run on, so what the recorded position moves is the drift of the
+    epoch before, or what another solution adds in the epoch after: the larger one, as far as the
+    smaller one is known. Where nothing is stated, drift starts anew with the errors that GNSS has.
+    It tells nothing of attitude and trend.
 
     Parameters
     ----------
@@ -57,20 +57,24 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
     if len(steps) == 0:
         return equations
     before, after = (_stated(equations, times) for times in (steps.before, steps.after))
-    is_after = _is_much_larger(after.gnss, before.position)
-    shown = is_after | _is_much_larger(before.gnss, after.position)
+    if before.history.is_stated:
+        turns = before.history.turns
+        shown = np.searchsorted(turns, steps.after) > np.searchsorted(turns, steps.before)
+        added = before.added**2, after.added**2
+        ends = [side.drift**2 + shown[:, None] * side.added**2 for side in (before, after)]
+        hidden = np.where(shown[:, None], 0.0, added[0] + added[1])
+    else:
+        shown = np.zeros(len(steps), bool)
+        ends = [before.drift**2, np.zeros_like(after.drift)]
+        hidden = before.gnss**2 + after.gnss**2
+    is_after = ends[1].sum(axis=1) > ends[0].sum(axis=1)
+    hidden = hidden + np.where(is_after[:, None], *ends)
     times = np.where(is_after, steps.after, steps.before)
     size = np.where(is_after[:, None], -steps.size, steps.size)
-    other = np.where(is_after[:, None], before.position, after.position)
-    hidden = np.where(shown[:, None], other**2, before.gnss**2 + after.gnss**2)
     variance = (steps.sigma[:, None] ** 2 + hidden)[:, :, None] * np.eye(3)
     inserted = times, size, variance, np.tile(np.eye(3, 6), (len(steps), 1, 1))
-    return replace(_insert(equations, len(equations.gps_time), *inserted), shown=shown)
-
-
-def _is_much_larger(sigma, other):
-    size, least = (np.linalg.norm(values, axis=1) for values in (sigma, other))
-    return size > POS_SETTINGS.steady_ratio * least
+    complete = _insert(equations, len(equations.gps_time), *inserted)
+    return replace(complete, shown=shown)
 
 
 def mounting_equations(

@@ -59,7 +59,7 @@ class Equations(Summary):
     trajectory : Trajectory
     pos : Pos
     shown : (h,) bool array
-        Which of the last h epochs, fall-backs, show what GNSS holds the POS to, beside its drift.
+        Which of the last h epochs, fall-backs, show what another solution of GNSS adds.
     ties : TieEquations, optional
         Of what two passes both saw.
     trend_span : (float, float), optional
@@ -250,7 +250,8 @@ class Equations(Summary):
         ----------
         parameters : SignalParameters
         """
-        signals = drift_alone(pose_signals(self.stated, parameters, self.partials), self.shown)
+        signals = pose_signals(self.stated, parameters, self.partials)
+        signals = drift_alone(signals, parameters, self.shown)
         times = self.gps_time[:, None]
         control = SparseRows(times, self.misclosure, self.noise, self.design, signals)
         if self.ties is None:

@@ -43,7 +43,8 @@ class GridPredictions:
         """
         trajectory, n = self.equations.trajectory, len(self.equations.trajectory)
         history = self.equations.stated.history
-        steps = np.concatenate([history.steps.before, history.steps.after, history.restarts])
+        starts = history.edges[1:-1]
+        steps = np.concatenate([history.steps.before, history.steps.after, starts])
         edges = np.searchsorted(trajectory.gps_time, [*trajectory.gaps.ravel(), *steps])
         control = np.searchsorted(trajectory.gps_time, self.equations.observed)
         time, begins = trajectory.gps_time, np.isin(trajectory.gps_time, trajectory.gaps[:, 1])

@@ -48,7 +48,10 @@ class SignalParameters:
 def pose_signals(
     stated: StatedSigma, parameters: SignalParameters, partials: np.ndarray
 ) -> tuple[Signal, ...]:
-    """Signals as they enter three axes of n points: drift first, then jitter, bias, attitude.
+    """Signals as they enter three axes of n points: drift first, GNSS and attitude last.
+
+    The errors of GNSS at its best run on all along, so that their sigma never changes at once.
+    What another solution adds to them comes and goes with it.
 
     Parameters
     ----------
@@ -60,18 +63,37 @@ def pose_signals(
     """
     position, rotation = partials[:, :, :3], partials[:, :, 3:]
     family = "matern32" if parameters.family == INTEGRATED else parameters.family
-    gnss = position * stated.gnss_by(parameters.level_scale)[:, None]
-    clock = stated.gnss_clock
+    least = position * stated.least[:, None]
     jitter = Covariance("exponential", parameters.jitter_time)
+    bias = Covariance(family, parameters.bias_time)
+    added = ()
+    if stated.history.added.any():
+        clock = stated.gnss_clock
+        raised = parameters.level_scale * position * stated.added[:, None]
+        added = (
+            Signal(parameters.jitter_scale * raised, jitter, clock),
+            Signal(parameters.bias_scale * raised, bias, clock),
+        )
     return (
         *_drift(stated, parameters, position),
-        Signal(parameters.jitter_scale * gnss, jitter, clock),
-        Signal(parameters.bias_scale * gnss, Covariance(family, parameters.bias_time), clock),
+        *added,
+        Signal(parameters.jitter_scale * least, jitter),
+        Signal(parameters.bias_scale * least, bias),
         Signal(
             parameters.attitude_scale * rotation @ stated.attitude,
             Covariance(family, parameters.attitude_time),
         ),
     )
+
+
+def drift_signals(parameters: SignalParameters) -> int:
+    """Number of the signals, the first of pose_signals, that are drift.
+
+    Parameters
+    ----------
+    parameters : SignalParameters
+    """
+    return 2 if parameters.family == INTEGRATED else 1
 
 
 def _drift(stated, parameters, position):
@@ -89,22 +111,26 @@ def _drift(stated, parameters, position):
     )
 
 
-def drift_alone(signals: tuple[Signal, ...], shown: np.ndarray) -> tuple[Signal, ...]:
-    """The signals, of which the last rows show drift, and jitter and bias where they are shown.
+def drift_alone(
+    signals: tuple[Signal, ...], parameters: SignalParameters, shown: np.ndarray
+) -> tuple[Signal, ...]:
+    """The signals, of which the last rows show drift, and another solution where it is shown.
 
     Parameters
     ----------
     signals : tuple of Signal
-        As pose_signals gives them: jitter, bias and attitude are the last three.
+        As pose_signals gives them: the last three run on across steps.
+    parameters : SignalParameters
     shown : (h,) bool array
         Of the last h rows.
     """
-    rows = len(shown)
+    rows, first = len(shown), drift_signals(parameters)
     if rows == 0:
         return signals
-    hidden = []
-    for signal, stays in zip(signals[-3:], (shown, shown, np.zeros(rows)), strict=True):
+    changed = []
+    for number, signal in enumerate(signals[first:], first):
         mixing = signal.mixing.copy()
-        mixing[-rows:] *= np.reshape(stays, (-1, 1, 1))
-        hidden.append(replace(signal, mixing=mixing))
-    return (*signals[:-3], *hidden)
+        is_added = number < len(signals) - 3
+        mixing[-rows:] *= np.reshape(shown & is_added, (-1, 1, 1))
+        changed.append(replace(signal, mixing=mixing))
+    return (*signals[:first], *changed)

@@ -9,10 +9,9 @@ import numpy as np
 from mlscorr.collocation import Collocation
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters, pose_signals
+from mlscorr.estimate.signals import SignalParameters, drift_signals, pose_signals
 from mlscorr.survey import SAME_EPOCH, Trajectory
 
-ERROR_SIGNALS = 3  # jitter, bias and attitude, the last of pose_signals; those before are drift
 REASONS = (
     "control points hold it",
     "its pass has no control point",
@@ -183,7 +182,7 @@ def _is_drift_open(equations, solved, parameters, corrected):
     parts = parameters.trend_sigma * trend, *mixings
     whole = sum((part[:, :3] ** 2).sum(axis=(1, 2)) for part in parts)
     is_open = (corrected.position_sigma**2).sum(axis=1) > SETTINGS.determined_ratio * whole
-    for number in range(len(mixings) - ERROR_SIGNALS, len(mixings)):
+    for number in range(drift_signals(parameters), len(mixings)):
         mixings[number] = np.zeros_like(mixings[number])
     clocks = [signal.clock for signal in signals]
     covariance = solved.predict(time, np.zeros_like(trend), mixings, clocks)[1]
@@ -196,7 +195,7 @@ def _is_drifting(equations, parameters):
     """Where (n,) the drift that may have come since it began is larger than the noise of GNSS."""
     stated = equations.stated_epochs
     partials = np.broadcast_to(np.eye(3, 6), (len(stated.gps_time), 3, 6))
-    drift = pose_signals(stated, parameters, partials)[:-ERROR_SIGNALS]
+    drift = pose_signals(stated, parameters, partials)[: drift_signals(parameters)]
     size = sum((signal.mixing**2).sum(axis=(1, 2)) for signal in drift)
     return size > (stated.gnss**2).sum(axis=1)
 

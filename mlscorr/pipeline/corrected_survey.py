@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlscorr.correction import PointSigma
-from mlscorr.estimate import Estimate, NextControl, Support, place_control
+from mlscorr.estimate import Estimate, NextControl, Support, find_jumps, place_control
 from mlscorr.evaluate.datum import DatumDifference
 from mlscorr.evaluate.model import largest_sigma, model_section
 from mlscorr.evaluate.rows import PointCounts, Score, TargetRow
@@ -292,7 +292,8 @@ class CorrectedSurvey(Summary):
             control=self._control, check=self._check, accuracy=self.accuracy,
             model=model_section(self.estimate, self.warnings),
             coverage=Coverage(self.estimate.span, end - start),
-            support=self.estimate.support, ties=self.tie_section,
+            support=self.estimate.support, jumps=find_jumps(self.estimate.correction),
+            ties=self.tie_section,
             position_sigma=largest_sigma(self.trajectory, self.survey), datum=self.datum,
             assumed=self.survey.assumed_pos if self.survey.has_assumed_position else (),
         )  # fmt: skip

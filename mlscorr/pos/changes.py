@@ -1,4 +1,10 @@
-"""What sigma(t) states, free of the noise of epochs, and in time with the recorded path."""
+"""What sigma(t) states, free of the noise of epochs, and in time with the recorded path.
+
+The error of a position can't change at once where the recorded path doesn't. So the sigmas of its
+parts change at once at steps of the path alone, and elsewhere no quicker than GNSS can tell.
+"""
+
+from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -58,6 +64,25 @@ def runs(flags: np.ndarray, cuts: np.ndarray | tuple = ()) -> list[tuple[int, in
     return list(zip(*(row.astype(int) for row in rows), strict=True))
 
 
+def steady_sigma(trajectory: Trajectory) -> np.ndarray:
+    """Stated sigma (n, 3) of the position by the median about each epoch. Units: m.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        With sigmas.
+    """
+    time, sigma = trajectory.gps_time, trajectory.position_sigma
+    steady = np.empty_like(sigma)
+    for first, last in np.searchsorted(time, trajectory.passes):
+        own = slice(first, last + 1)
+        step = np.median(np.diff(time[max(first - 1, 0) : last + 2]))  # sessions differ in rate
+        beside = round(SETTINGS.step_duration / float(step))
+        for axis, stated in enumerate(sigma.T):
+            steady[own, axis] = median_filter(stated[own], 2 * beside + 1, mode="nearest")
+    return steady
+
+
 def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.ndarray]:
     """Sigma (n, 3) of the position as stated, and by the median about each epoch, with the path.
 
@@ -72,27 +97,64 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.n
     steps : Steps
     """
     time, sigma = trajectory.gps_time, trajectory.position_sigma.copy()
-    steady = np.empty_like(sigma)
-    for first, last in np.searchsorted(time, trajectory.passes):
-        own = slice(first, last + 1)
-        step = np.median(np.diff(time[max(first - 1, 0) : last + 2]))  # sessions differ in rate
-        beside = round(SETTINGS.step_duration / float(step))
-        for axis, stated in enumerate(sigma.T):
-            steady[own, axis] = median_filter(stated[own], 2 * beside + 1, mode="nearest")
+    steady = steady_sigma(trajectory)
     changes = quick_changes(time, np.linalg.norm(steady, axis=1))
     for change, step in _pairs(time[changes].mean(axis=1), steps.middle):
-        (first, last), row = changes[change], np.searchsorted(time, steps.middle[step])
-        before, after = steady[[first, last]]
+        first, last = changes[change]
+        row = np.searchsorted(time, steps.middle[step])
         for values in (sigma, steady):
-            values[first:row], values[row:last] = before, after
+            first_low, last_low = _whole_change(time, values, first, last)
+            values[first_low:row] = values[first_low]
+            values[row:last_low] = values[last_low]
     return sigma, steady
+
+
+def _whole_change(gps_time, values, first, last):
+    """Rows of a change from where values (n, 3) are largest: a filter's variance falls slowly."""
+    size = np.linalg.norm(values, axis=1)
+    sooner, later = _beside(
+        gps_time, np.array([first, last]), np.array([-1, 1]) * SETTINGS.step_duration
+    )
+    if size[last] < size[first]:
+        first = sooner + int(np.argmax(size[sooner : first + 1]))
+    else:
+        last += int(np.argmax(size[last : later + 1]))
+    return first, last
+
+
+def continuous(
+    gps_time: np.ndarray, amplitude: np.ndarray, least: np.ndarray, breaks: np.ndarray
+) -> np.ndarray:
+    """The largest amplitude (n, 3) below a given one that changes at once at breaks alone.
+
+    Elsewhere it changes by no more than a factor of e in SETTINGS.told_within, but for the
+    part below ``least``: so drift that grows by a power of time is left as it is.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    amplitude : (n, 3) array
+        Units: m.
+    least : (3,) array
+        What GNSS holds the POS to. Units: m.
+    breaks : (k,) int array
+        First rows after breaks.
+    """
+    clock = ((gps_time - gps_time[0]) / SETTINGS.told_within)[:, None]
+    logarithm = np.log(amplitude + least)
+    for first, last in pairwise([0, *np.unique(breaks).tolist(), len(gps_time)]):
+        rows = slice(first, last)
+        onward = np.minimum.accumulate(logarithm[rows] - clock[rows], axis=0) + clock[rows]
+        back = np.minimum.accumulate((onward + clock[rows])[::-1], axis=0)[::-1] - clock[rows]
+        logarithm[rows] = back
+    return np.clip(np.exp(logarithm) - least, 0.0, amplitude)
 
 
 def _pairs(times, others):
     """Numbers (k, 2) of times and others that can be the same, twice as near as to any third."""
-    farthest = SETTINGS.sigma_interval + SETTINGS.step_duration
     back, _ = cKDTree(times[:, None]).query(others[:, None], 2)
     away, number = cKDTree(others[:, None]).query(times[:, None], 2)
     limit = np.minimum(away[:, 1], np.append(back[:, 1], 0.0)[number[:, 0]]) / 2  # 0: no others
-    rows = np.flatnonzero(away[:, 0] < np.minimum(limit, farthest))
+    rows = np.flatnonzero(away[:, 0] < np.minimum(limit, SETTINGS.told_within))
     return np.column_stack([rows, number[rows, 0]])

@@ -6,7 +6,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from mlscorr.pos.changes import quick_changes, runs, timely_sigma
+from mlscorr.pos.changes import continuous, quick_changes, runs, steady_sigma, timely_sigma
 from mlscorr.pos.settings import SETTINGS
 from mlscorr.pos.steps import Steps, find_steps
 from mlscorr.survey import Trajectory
@@ -22,10 +22,11 @@ class DriftHistory:
     steps : Steps
         Fall-backs that stand in the recorded path.
     restarts : (k,) array
-        When drift starts anew: at steps, starts of passes, falls of sigma(t). Units: s.
+        When drift starts anew: at steps and starts of passes; at falls of sigma(t) where the path
+        has too few epochs to show a step. Units: s.
     returns : (r,) array
-        When a smoothed drift is back, as sigma(t) has sunk gently from the middle of an outage.
-        Units: s.
+        When drift is back without a step of the path: sigma(t) has sunk gently from the middle of
+        an outage, as of a smoother, or has fallen at once. Units: s.
     starts : (k + r + 1,) array
         When it begins to grow after the start, each restart and each return: where sigma(t) says
         so, never (infinite) where it says that it doesn't, else at once. Units: s.
@@ -36,7 +37,8 @@ class DriftHistory:
         it from the part that grows. Units: m.
     level : (n, 3) array
         The same at each epoch of the trajectory, larger where sigma(t) is raised at once, as by a
-        solution that is not fixed: the smallest since it was raised. Units: m.
+        solution that is not fixed: the smallest since it was raised, until it is raised again.
+        Units: m.
     """
 
     trajectory: Trajectory
@@ -105,22 +107,45 @@ class DriftHistory:
 
     @cached_property
     def turns(self) -> np.ndarray:
-        """Times (j,) at which the level changes at once: another solution, of other errors. s."""
+        """Times (j,) at which the level changes at once: another solution, of other errors. s.
+
+        At a step of the path, or where one of the two solutions is GNSS at its best.
+        """
         time, size = self.trajectory.gps_time, np.linalg.norm(self.level, axis=1)
         # where the change is over: what is on the way is no larger than what was before
         rows = quick_changes(time, size)[:, 1]
-        return (time[rows - 1] + time[rows]) / 2
+        beside = np.linalg.norm([self.added[rows - 1], self.added[rows]], axis=2).min(axis=0)
+        is_turn = np.isin(rows, self.steps.rows(time)) | (beside < np.linalg.norm(self.held))
+        return ((time[rows - 1] + time[rows]) / 2)[is_turn]
 
-    def level_at(self, gps_time: np.ndarray) -> np.ndarray:
-        """The level (n, 3) of the epochs at or before times. Units: m.
+    @cached_property
+    def least(self) -> np.ndarray:
+        """Sigma (n, 3) to which GNSS holds the POS at its best: changes at steps alone. Units: m.
 
-        Parameters
-        ----------
-        gps_time : (n,) array
-            Units: s.
+        Zero where nothing is stated.
         """
-        rows = np.searchsorted(self.trajectory.gps_time, gps_time, side="right") - 1
-        return self.level[np.maximum(rows, 0)]
+        if self.is_stated:
+            return np.tile(self.held, (len(self.sigma), 1))
+        return self._continuous(np.minimum(self.sigma, SETTINGS.gnss))
+
+    @cached_property
+    def added(self) -> np.ndarray:
+        """The level's part (n, 3) beyond what GNSS holds the POS to at its best. Units: m.
+
+        It changes at once at steps alone, as drift does.
+        """
+        return self._continuous(np.sqrt(np.maximum(self.level**2 - self.held**2, 0.0)))
+
+    @cached_property
+    def drift(self) -> np.ndarray:
+        """The part (n, 3) of the stated sigma that grows where GNSS is missing. Units: m."""
+        return self._continuous(np.sqrt(np.maximum(self.sigma**2 - self.level**2, 0.0)))
+
+    def _continuous(self, amplitude):
+        time, steps = self.trajectory.gps_time, self.steps
+        starts = np.searchsorted(time, self.restarts)
+        least = self.held if self.is_stated else SETTINGS.gnss
+        return continuous(time, amplitude, least, np.append(starts, steps.rows(time)))
 
 
 _KNOWN: WeakValueDictionary[int, DriftHistory] = WeakValueDictionary()
@@ -142,10 +167,13 @@ def drift_history(trajectory: Trajectory) -> DriftHistory:
 
 def _history(trajectory):
     time, steps = trajectory.gps_time, find_steps(trajectory)
-    restarts = np.sort(np.concatenate([trajectory.passes[1:, 0], steps.middle]))
     stated = steady = np.zeros((len(time), 3))
     if trajectory.position_sigma is not None:
+        steady = steady_sigma(trajectory)
+        changes = quick_changes(time, np.linalg.norm(steady, axis=1))
+        steps = find_steps(trajectory, time[changes].mean(axis=1))
         stated, steady = timely_sigma(trajectory, steps)
+    restarts = np.sort(np.concatenate([trajectory.passes[1:, 0], steps.middle]))
     held = _held(steady)
     level = np.tile(held, (len(time), 1))
     if not held.any():
@@ -153,24 +181,37 @@ def _history(trajectory):
         return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, stated, held, level)
     size = np.linalg.norm(steady, axis=1)
     changes = quick_changes(time, size)
-    restarts = np.sort(np.append(restarts, _falls(time, size, changes, held, restarts)))
+    falls = _falls(time, size, changes, held, restarts)
     is_raised = np.maximum(steady**2 - held**2, 0.0).sum(axis=1) > held @ held
-    returns = _returns(time, size, runs(is_raised), restarts)
+    returns = _returns(time, size, runs(is_raised), np.sort(np.append(restarts, falls)))
+    if _shows_steps(trajectory):
+        returns = np.sort(np.append(returns, falls))
+    else:
+        restarts = np.sort(np.append(restarts, falls))
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
     grown = [np.inf]
     cuts = np.searchsorted(time, edges)
+    following = len(time)
     for first, last in reversed(runs(is_raised, cuts)):
         at_once = changes[(changes[:, 0] <= first) & (first <= changes[:, 1]), 1]
         settled = min(at_once.max(initial=first), last - 1)
         if first in cuts or len(at_once):
-            level[settled:last] = np.minimum.accumulate(steady[settled:last], axis=0)
+            lowest = np.minimum.accumulate(steady[settled:following], axis=0)
+            level[settled:following] = np.maximum(lowest, held)
             level[first:settled] = level[settled]
         # what is raised at once and goes back is no drift, but what GNSS holds the POS to
         if np.any((steady[settled:last] ** 2 - 2 * level[settled:last] ** 2).sum(axis=1) > 0):
             grown.append(time[first])
+        following = first
     first = np.array(grown[::-1])[np.searchsorted(grown[::-1], edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
     return DriftHistory(trajectory, steps, restarts, returns, starts, stated, held, level)
+
+
+def _shows_steps(trajectory):
+    """Whether braking moves a path by less in an epoch than a step that counts."""
+    epoch = float(np.median(np.diff(trajectory.gps_time)))
+    return SETTINGS.largest_jerk / 2 * epoch**3 < SETTINGS.smallest_step
 
 
 def _returns(time, size, raised, restarts):

@@ -26,6 +26,11 @@ class Settings:
     gnss_sigma: tuple[float, float, float] = (0.02, 0.02, 0.03)
 
     @property
+    def told_within(self) -> float:
+        """How far from an event sigma(t) may tell of it: interval and spread. Units: s."""
+        return self.sigma_interval + self.step_duration
+
+    @property
     def gnss(self) -> np.ndarray:
         """gnss_sigma as an array (3,). Units: m."""
         return np.array(self.gnss_sigma)

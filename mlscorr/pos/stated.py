@@ -35,6 +35,9 @@ class StatedSigma:
         The n recorded attitudes R_P^G.
     largest : (3,) array
         The position's largest sigma on the whole trajectory. Units: m.
+    least, added, drift : (n, 3) array
+        Parts of the position's sigma: to which GNSS holds the POS at its best, by which another
+        solution is worse, and what grows where GNSS is missing. Units: m.
     history : DriftHistory
         Of the whole trajectory.
     starts : (k,) array
@@ -46,46 +49,26 @@ class StatedSigma:
     angles: np.ndarray
     rotation: Rotation
     largest: np.ndarray
+    least: np.ndarray
+    added: np.ndarray
+    drift: np.ndarray
     history: DriftHistory
     starts: np.ndarray
-
-    @cached_property
-    def held(self) -> np.ndarray:
-        """The part (n, 3) of the position's sigma to which GNSS holds the POS. Units: m."""
-        return self.history.level_at(self.gps_time)
 
     @cached_property
     def attitude(self) -> np.ndarray:
         """Square root (n, 3, 3) of the attitude's covariance about the map axes. Units: rad."""
         return map_root(self.rotation, self.angles)
 
-    @cached_property
-    def drift(self) -> np.ndarray:
-        """The part (n, 3) of the position's sigma that grows where GNSS is missing. Units: m."""
-        return np.sqrt(np.maximum(self.position**2 - self.held**2, 0.0))
+    @property
+    def held(self) -> np.ndarray:
+        """The part (n, 3) of the position's sigma that stays; zero where none is told. Units: m."""
+        return self.gnss if self.history.is_stated else np.zeros_like(self.gnss)
 
     @property
-    def jitter(self) -> np.ndarray:
-        """The part (n, 3) of the position's sigma that stays. Units: m."""
-        return np.minimum(self.position, self.held)
-
-    @cached_property
     def gnss(self) -> np.ndarray:
         """Sigma (n, 3) of a POS that GNSS holds: the stated one, else that of RTK. Units: m."""
-        return np.minimum(self.position, self.held if self.history.is_stated else SETTINGS.gnss)
-
-    def gnss_by(self, scale: float) -> np.ndarray:
-        """As gnss (n, 3), where what sigma(t) is raised by at once is taken by a scale. Units: m.
-
-        Parameters
-        ----------
-        scale : float
-            Of the level's part beyond what GNSS holds the POS to at its best.
-        """
-        if self.gnss_clock is None:
-            return self.gnss
-        best = np.minimum(self.gnss, self.history.held)
-        return np.sqrt(best**2 + scale**2 * (self.gnss**2 - best**2))
+        return np.hypot(self.least, self.added)
 
     @cached_property
     def since(self) -> np.ndarray:
@@ -152,6 +135,9 @@ class StatedSigma:
             position=self.position[rows],
             angles=self.angles[rows],
             rotation=self.rotation[rows],
+            least=self.least[rows],
+            added=self.added[rows],
+            drift=self.drift[rows],
         )
 
 
@@ -183,9 +169,11 @@ def stated_sigma(
     history = drift_history(trajectory)
     shape = (len(pose.gps_time), 3)
     position, angles = np.full(shape, pos.position_sigma), pose.attitude_sigma
+    least, added, drift = np.minimum(position, SETTINGS.gnss), np.zeros(shape), position
     if trajectory.position_sigma is not None:
-        position = np.column_stack(
-            [np.interp(pose.gps_time, trajectory.gps_time, column) for column in history.sigma.T]
+        parts = (history.sigma, history.least, history.added, history.drift)
+        position, least, added, drift = (
+            _at(pose.gps_time, trajectory.gps_time, part) for part in parts
         )
     if angles is None:
         angles = np.broadcast_to(pos.attitude_sigma, shape)
@@ -194,5 +182,11 @@ def stated_sigma(
         largest = history.sigma.max(axis=0)
     return StatedSigma(
         gps_time=pose.gps_time, position=position, angles=angles, rotation=pose.attitude,
-        largest=largest, history=history, starts=history.starts if starts is None else starts,
+        largest=largest, least=least, added=added, drift=drift, history=history,
+        starts=history.starts if starts is None else starts,
     )  # fmt: skip
+
+
+def _at(times, gps_time, values):
+    """Values (n, 3) of epochs, linear in time between them."""
+    return np.column_stack([np.interp(times, gps_time, column) for column in values.T])

@@ -8,6 +8,8 @@ from mlscorr.pos.settings import SETTINGS
 from mlscorr.survey import Trajectory
 from mlscorr.survey.columns import Columns
 
+NOWHERE = np.empty(0)  # s
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Steps(Columns):
@@ -33,8 +35,21 @@ class Steps(Columns):
         """Times (k,) between before and after. Units: s."""
         return (self.before + self.after) / 2
 
+    def rows(self, gps_time: np.ndarray) -> np.ndarray:
+        """Rows of the epochs inside steps and at their ends, each the first after a change.
 
-def find_steps(trajectory: Trajectory) -> Steps:
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        """
+        number = np.searchsorted(self.before, gps_time, side="left") - 1  # steps don't overlap
+        is_after = number >= 0
+        is_after[is_after] = gps_time[is_after] <= self.after[number[is_after]]
+        return np.flatnonzero(is_after)
+
+
+def find_steps(trajectory: Trajectory, told: np.ndarray = NOWHERE) -> Steps:
     """Steps of the recorded position against the speed before and after them.
 
     Over three equal spans the middle one's way is half of both others', straight on or turned with
@@ -44,6 +59,9 @@ def find_steps(trajectory: Trajectory) -> Steps:
     Parameters
     ----------
     trajectory : Trajectory
+    told : (t,) array, optional
+        When sigma(t) changes at once: there a step counts that is smaller than any by chance.
+        Units: s.
 
     Examples
     --------
@@ -58,19 +76,20 @@ def find_steps(trajectory: Trajectory) -> Steps:
     table = [np.empty((0, 6))]
     for first, last in trajectory.passes:
         rows = (trajectory.gps_time >= first) & (trajectory.gps_time <= last)
-        table.append(_steps_of_pass(trajectory.select(rows)))
+        inside = told[(told >= first) & (told <= last)]
+        table.append(_steps_of_pass(trajectory.select(rows), inside))
     columns = np.vstack(table)
     return Steps(columns[:, 0], columns[:, 1], columns[:, 2:5], columns[:, 5])
 
 
-def _steps_of_pass(driven):
+def _steps_of_pass(driven, told):
     """Rows (k, 6) of the steps of one pass: before, after, size, sigma."""
     gps_time = driven.gps_time
     if len(gps_time) < 2:
         return np.empty((0, 6))
     epochs = max(round(SETTINGS.step_duration / float(np.median(np.diff(gps_time)))), 1)
     spans = {1, *(epochs // part for part in (4, 2, 1))} - {0}
-    candidates = [row for span in spans for row in _differences(driven, span)]
+    candidates = [row for span in spans for row in _differences(driven, span, told)]
     steps = []
     while candidates:
         largest = max(candidates, key=_length)
@@ -92,7 +111,7 @@ def _is_near(row, other):
     return row[0] < other[1] + 1.0 and row[1] > other[0] - 1.0
 
 
-def _differences(driven, span):
+def _differences(driven, span, told):
     """Rows (before, after, size, sigma): seconds' largest differences, if far above others'."""
     gps_time = driven.gps_time
     if len(gps_time) <= 3 * span + 1:
@@ -115,6 +134,13 @@ def _differences(driven, span):
     jerk = SETTINGS.largest_jerk / 2 * times[span : span + len(size)] ** 3
     limit = np.maximum(jerk, max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual))
     is_step = (length > limit) & (length == largest[second])
+    for time in told:  # one place to look at, not all of a drive: less is no chance
+        rows = np.flatnonzero(
+            np.abs(start + times[span : span + len(size)] / 2 - time) < SETTINGS.told_within
+        )
+        if len(rows):
+            row = rows[np.argmax(length[rows])]
+            is_step[row] |= length[row] > max(jerk[row], SETTINGS.steady_ratio * usual)
     is_step[:span] = is_step[-span:] = False  # half of what a step in the outer span would be
     rows = np.flatnonzero(is_step)
     # what the spans wholly before and after show is no step: filters and resampling ring beside one

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field, replace
 import numpy as np
 
 from mlscorr.estimate import NextControl, Support
+from mlscorr.estimate.jumps import Jump
 from mlscorr.estimate.support import DRIFT, REASONS
 from mlscorr.evaluate.datum import DatumDifference
 from mlscorr.evaluate.rows import PointCounts, Score, Statistics, TargetRow
@@ -104,6 +105,8 @@ class CorrectionReport:
         The corrected clouds, what was read, and what else was written.
     support : Support
         What holds the correction along the drive.
+    jumps : tuple of Jump
+        Of the correction, in time.
     next_control : tuple of NextControl
         Where more control points would help most, the best first.
     ties : dict or None
@@ -130,6 +133,7 @@ class CorrectionReport:
     inputs: tuple[FileRow, ...] = ()
     outputs: tuple[FileRow, ...] = ()
     support: Support = field(default_factory=Support)
+    jumps: tuple[Jump, ...] = ()
     next_control: tuple[NextControl, ...] = ()
     ties: dict | None = None
     position_sigma: dict[str, float] | None = None
@@ -158,6 +162,7 @@ class CorrectionReport:
                 "outages": [list(outage) for outage in self.support.outages],
                 "steps": list(self.support.steps),
             },
+            "jumps": [jump.document() for jump in self.jumps],
             "position_sigma": self.position_sigma,
             "assumed": [vars(row) for row in self.assumed],
             "next_control": [place.document() for place in self.next_control],

@@ -100,5 +100,17 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
         "Points flagged as noise (not measured, corrected like all others)": points(noise),
         "Time and way whose correction is extrapolated": f"{seconds} s, {metres} m",
         "Gaps of the trajectory (nothing is interpolated across them)": len(gaps),
+        "Jumps of the correction, at steps of the recorded path": _jumps(report),
     }
     return list(values.items())
+
+
+def _jumps(report):
+    """Number of jumps, and the largest: 3D size and time."""
+    if not report.jumps:
+        return "none"
+    largest = max(report.jumps, key=lambda jump: jump.length)
+    return (
+        f"{len(report.jumps)} (largest {number(largest.length, 3)} m "
+        f"at gps_time {number(largest.time, 3)} s)"
+    )

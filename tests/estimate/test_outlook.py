@@ -36,7 +36,7 @@ def observed_at(equations, row):
     epoch = equations.stated_epochs.at(np.array([row]))
     added = {
         name: np.insert(getattr(stated, name), n, getattr(epoch, name), axis=0)
-        for name in ("gps_time", "position", "angles")
+        for name in ("gps_time", "position", "angles", "least", "added", "drift")
     }
     turned = Rotation.concatenate([stated.rotation[:n], epoch.rotation, stated.rotation[n:]])
     noise = equations.noise

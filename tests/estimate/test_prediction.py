@@ -100,8 +100,8 @@ def test_the_last_epoch_of_an_outage_has_its_own_sigma():
     case = Case(EPOCHS, waves(rng, 0.01), even(8), rng, sigma)
     equations = with_drift_history(case.equations())
     history = equations.stated.history
-    assert len(history.steps) == 0 and len(history.restarts) == 1
-    last = np.searchsorted(case.recorded.gps_time, history.restarts) - 1
+    assert len(history.steps) == len(history.restarts) == 0 and len(history.returns) == 1
+    last = np.searchsorted(case.recorded.gps_time, history.returns) - 1
     posterior = choose_parameters(equations, points=8)
     mean, square = 0.0, 0.0
     for chosen, weight in posterior.mixture:

@@ -69,7 +69,8 @@ def test_jitter_and_bias_are_free_where_sigma_has_two_parts(kind):
     free = {NAMES[i] for i in position_prior(equations).free}
     is_split = bool(np.any(equations.stated.gnss))
     assert (set(SPLIT) <= free) == is_split and (not set(SPLIT) & free) == (not is_split)
-    hidden = replace(equations, stated=replace(equations.stated, position=np.zeros((5, 3))))
+    nothing = replace(equations.stated, least=np.zeros((5, 3)), added=np.zeros((5, 3)))
+    hidden = replace(equations, stated=nothing)
     assert not set(SPLIT) & {NAMES[i] for i in position_prior(hidden).free}
 
 

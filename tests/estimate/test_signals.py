@@ -84,9 +84,9 @@ def test_drift_that_a_smoother_ties_down_is_a_walk_that_is_known_at_its_end():
 def test_fall_backs_show_nothing_but_drift(stated):
     "In the last rows jitter, bias and attitude are hidden, in the others they stay"
     signals = pose_signals(stated, PARAMETERS, partials(len(TIME)))
-    drift, *others = drift_alone(signals, np.zeros(2, bool))
+    drift, *others = drift_alone(signals, PARAMETERS, np.zeros(2, bool))
     assert drift.mixing[-2:].any()
     for shown, signal in zip(others, signals[1:], strict=True):
         assert not shown.mixing[-2:].any()
         assert np.array_equal(shown.mixing[:-2], signal.mixing[:-2])
-    assert drift_alone(signals, np.zeros(0, bool)) is signals
+    assert drift_alone(signals, PARAMETERS, np.zeros(0, bool)) is signals

@@ -69,7 +69,7 @@ def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
         Units: m.
     """
     sigma = stated_sigma(survey.trajectory, survey.pos, gps_time)
-    size = SETTINGS.gate_sigmas * np.linalg.norm(sigma.drift + sigma.jitter, axis=1)
+    size = SETTINGS.gate_sigmas * np.linalg.norm(sigma.drift + sigma.held, axis=1)
     return np.clip(size, SETTINGS.least_gate, SEARCH_RADIUS)
 
 
