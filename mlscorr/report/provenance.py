@@ -6,6 +6,7 @@ from mlscorr.correction import Correction
 from mlscorr.report.correction_report import CorrectionReport, FileRow
 from mlscorr.report.tables import number, thousands
 from mlscorr.survey import Survey
+from mlscorr.survey.clouds import WEEK
 
 FRAMES = {
     "Frame: map": "easting, northing, height in m, as the files have them",
@@ -22,7 +23,9 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
     trajectory, time = survey.trajectory, survey.trajectory.gps_time
     crs = survey.crs or "not stated in survey.toml; coordinates are taken as E, N, H in m"
     pairs = [("Coordinate reference system", crs), *FRAMES.items()]
-    pairs.append(("Time of the trajectory", f"gps_time {time[0]:.3f} to {time[-1]:.3f} s"))
+    week_end = "" if trajectory.weeks is None else ", counted on over the end of the GPS week"
+    span = f"gps_time {time[0]:.3f} to {time[-1]:.3f} s{week_end}"
+    pairs.append(("Time of the trajectory", span))
     pairs += dict.fromkeys((f"Time of {cloud.path.name}", _time(cloud)) for cloud in survey.clouds)
     rate = 1 / np.median(np.diff(time))
     pairs.append(("Epochs of the trajectory", f"{thousands(len(time))} at {rate:.4g} Hz"))
@@ -42,6 +45,8 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
 
 def _time(cloud):
     system = TIMES.get(cloud.time_system, cloud.time_system)
+    if cloud.new_week > -np.inf:
+        system += f", counted on where they start again (+{WEEK:.0f} s)"
     if not cloud.time_constant:
         return f"{system}, as the trajectory's"
     return f"{system}; {cloud.time_constant:+.3f} s gives the trajectory's"
