@@ -64,6 +64,12 @@ class _Case:
         """The pairs in order of their control points."""
         return np.argsort(self.pairs.control, kind="stable")
 
+    def pairs_of(self, column):
+        """The pairs (k,) of a control point, and the rows of their observations."""
+        span = np.searchsorted(self.pairs.control, [column, column + 1], sorter=self.by_control)
+        pairs = self.by_control[slice(*span)]
+        return pairs, np.searchsorted(self.pairs.first, pairs, side="right") - 1
+
     def when(self, row):
         return f"{self.observations.gps_time[row]:.1f} s"
 
@@ -147,7 +153,7 @@ def explain(
         key = control.name[column], int(observations.pass_number[row])
         refusals.setdefault(key, (reasons[row], float(observations.gps_time[row])))
     refused = [Refusal(*key, *refusal) for key, refusal in refusals.items()]
-    return (*refused, *_without_observation(case, refused)), reasons
+    return (*refused, *_without_observation(case, refused, reasons)), reasons
 
 
 def _of_another_kind(case, row):
@@ -225,26 +231,24 @@ def _doubt(case, row):
 def _rival(case, row, column):
     """The other observation of the pass that most probably is this control point, or None."""
     number, marginals = case.observations.pass_number, case.decision.marginals
-    span = np.searchsorted(case.pairs.control, [column, column + 1], sorter=case.by_control)
-    others = case.by_control[slice(*span)]
-    rows = np.searchsorted(case.pairs.first, others, side="right") - 1
+    others, rows = case.pairs_of(column)
     chance = marginals.sound[others] + marginals.moved[others]
     near = (rows != row) & (number[rows] == number[row]) & (chance >= SETTINGS.smallest_rival)
     return int(rows[near][np.argmax(chance[near])]) if near.any() else None
 
 
 def _not_there(case, row):
-    """(control points, sentence) where a free one is near, but not where the neighbours say."""
+    """(control points, sentence) where a free one is near, but not where the neighbours say.
+
+    An object as far from it as no target is moved says nothing of it.
+    """
     column, _, same = case.of_pairs(row)
-    near = [
-        c
-        for c in column[same]
-        if case.free(row, [c])[0] and case.off(row, c) <= 3 * SETTINGS.moved_sigma
-    ]
-    if not near:
+    free = column[same & case.free(row, column)]
+    if len(free) == 0:
         return None
-    point = min(near, key=lambda c: case.off(row, c))
-    return [point], (
+    point = min(free, key=lambda c: case.off(row, c))
+    claimed = [point] if case.off(row, point) <= 3 * SETTINGS.moved_sigma else []
+    return claimed, (
         f"{case.name(point)} lies {case.off(row, point):.2f} m from where the observation at "
         f"{case.when(row)} says once corrected; {case.corrected(row)}. This is another object "
         f"(misclosure {np.linalg.norm(case.misclosure(row, point)):.2f} m, "
@@ -267,19 +271,46 @@ def _without_point(case, row, tree):
     )
 
 
-def _without_observation(case, refused):
+def _without_observation(case, refused, reasons):
     """Refusals for the control points that no pass observed."""
     column = case.decision.column
     known = {case.name(c) for c in column[column >= 0]} | {refusal.name for refusal in refused}
     missing = [i for i, name in enumerate(case.control.name) if name not in known]
     if len(case.observations) == 0:
         return [Refusal(case.name(i), None, "No target was found in the cloud.") for i in missing]
-    distance, near = cKDTree(case.observations.position).query(case.control.position[missing])
-    refusals = []
-    for point, away, row in zip(missing, distance, near, strict=True):
-        nearest = f"the nearest one found, at {case.when(row)}, lies {away:.2f} m away"
-        if column[row] >= 0:
-            nearest += f" and is {case.name(column[row])}"
-        reason = f"No target is left for it; {nearest} ({case.limit})."
-        refusals.append(Refusal(case.name(point), None, reason))
-    return refusals
+    tree = cKDTree(case.observations.position)
+    return [Refusal(case.name(i), None, _why_missing(case, i, reasons, tree)) for i in missing]
+
+
+def _why_missing(case, point, reasons, tree):
+    """The sentences for a control point: of its like, what is near was refused, has another name,
+    or isn't there.
+    """
+    like = f"{case.control.kind[point]} of {case.control.size[point]:.2f} m"
+    pairs, rows = case.pairs_of(point)
+    rows = rows[case.pairs.same[pairs]]
+    away = np.linalg.norm(case.observations.position[rows] - case.control.position[point], axis=1)
+    rows = rows[np.argsort(away, kind="stable")]
+    refused = [row for row in rows if case.decision.column[row] < 0]
+    if refused:
+        row = refused[0]
+        return f"The nearest {like} without a name {_whereabouts(case, point, row)}. {reasons[row]}"
+    if len(rows):
+        return (
+            f"Each {like} found near it ({case.limit}) is another surveyed point; the nearest "
+            f"{_whereabouts(case, point, rows[0])}."
+        )
+    row = tree.query(case.control.position[point])[1]
+    return (
+        f"No {like} was found near it ({case.limit}). The nearest target, a "
+        f"{case.observations.kind[row]} of {case.observations.size[row]:.2f} m, "
+        f"{_whereabouts(case, point, row)}."
+    )
+
+
+def _whereabouts(case, point, row):
+    """When an observation was made, how far from a control point, and its name if it has one."""
+    away = np.linalg.norm(case.observations.position[row] - case.control.position[point])
+    column = case.decision.column[row]
+    name = f" and is {case.name(column)}" if column >= 0 else ""
+    return f"was found at {case.when(row)}, {away:.2f} m away{name}"

@@ -43,16 +43,16 @@ class Candidates:
 
 
 def search_radius(survey: Survey, points: ControlPoints) -> np.ndarray:
-    """Radius (n,) about surveyed points in which their images must lie. Units: m.
+    """Radius (n,) about surveyed points in which their images and edges must lie. Units: m.
 
-    The survey's, and the target's own half diagonal.
+    The survey's, the target's own half diagonal, and as much for what lies about its edges.
 
     Parameters
     ----------
     survey : Survey
     points : ControlPoints
     """
-    return survey.search_radius + points.size / np.sqrt(2)
+    return survey.search_radius + points.size * np.sqrt(2)
 
 
 class PointsInBalls:

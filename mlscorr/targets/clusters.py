@@ -1,7 +1,9 @@
-"""Bright components of a piece of cloud at several levels of intensity, as in a component tree.
+"""Bright components of a piece of cloud at every level of intensity: a component tree.
 
 A target is brighter than what surrounds it, but intensity falls with range and incidence, so no
-single threshold serves. Each component at each level is a candidate; the shape decides.
+single threshold serves. Each component at each level is a candidate; the shape decides. Levels are
+absolute and a component is judged by itself: what else a piece holds, as a bright wall some meters
+away, hides none (Najman and Couprie 2006).
 """
 
 from collections.abc import Iterator
@@ -11,6 +13,9 @@ import numpy as np
 from numba import njit
 
 from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets.voxels import neighbours, number_voxels
+
+OCTAVE = 2  # levels of intensity: a step is the least by which dark and bright are told apart
 
 
 def bright_components(
@@ -31,25 +36,115 @@ def bright_components(
     ------
     level : float
     rows : (k,) int array
-        A component that stays the same over levels comes once, at the highest.
+        A component that stays the same over levels comes once, at the highest. One that reaches
+        farther than a target and its post is none of them.
     """
-    low, high = np.percentile(intensity, 1), intensity.max()
-    background = max(SETTINGS.cheap_count, len(intensity) / 4)
-    known, last = set(), 0
-    levels = np.geomspace(max(high, 1.0), max(low, 1.0), SETTINGS.intensity_steps + 1)
-    for level in levels[1:]:
-        bright = np.flatnonzero(intensity >= level)
-        if len(bright) < SETTINGS.smallest_count or len(bright) == last:
-            continue
-        if len(bright) > background:
-            return
-        last = len(bright)
-        for share in SETTINGS.link_shares:
-            for part in components(xyz[bright], share * size):
-                rows = bright[part]
-                if (key := (rows[0], rows[-1], len(rows))) not in known:
-                    known.add(key)
-                    yield float(level), rows
+    level = np.floor(OCTAVE * np.log2(np.maximum(intensity, 1.0))).astype(np.int16)
+    known = set()
+    for share in SETTINGS.link_shares:
+        for number, rows in _component_tree(xyz, level, share * size):
+            if (key := (rows[0], rows[-1], len(rows))) not in known:
+                known.add(key)
+                yield float(2.0 ** (number / OCTAVE)), rows
+
+
+def _component_tree(xyz, level, link):
+    """(level, rows in order) of the components of points (n, 3) that a link (m) connects."""
+    if len(xyz) == 0:
+        return
+    edge = link / 2
+    low = np.array([column.min() for column in xyz.T])
+    low = (np.floor(low / edge) - 1) * edge  # the same cells whatever else there is
+    voxel, keys_of, *table = number_voxels(xyz, low, edge)
+    brightest_first = np.argsort(-level, kind="stable")
+    limits = SETTINGS.smallest_count, 2 * SETTINGS.near_radius
+    entries, place = _grow(xyz, level, brightest_first, voxel, keys_of, *table, limits)
+    order = np.argsort(place[voxel], kind="stable")
+    sorted_place = place[voxel[order]]
+    for number, first, count in entries:
+        start, end = np.searchsorted(sorted_place, (first, first + count))
+        rows = order[start:end]
+        yield number, np.sort(rows[level[rows] >= number])
+
+
+@njit(cache=True)
+def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
+    """Components as voxels join them from the brightest level down.
+
+    A component is a run of voxels in the order of their places, as joining two puts one's voxels
+    behind the other's: its level, its first place and its number of voxels (k, 3) describe it.
+    Places (v,) of the voxels come too.
+    """
+    smallest, largest = limits
+    count = len(keys_of)
+    parent = np.full(count, -1)
+    chain = np.full(count, -1), np.arange(count)  # the voxel behind each, the last of each root
+    sums = np.zeros((2, count), np.int64)  # voxels and points of each root
+    box = np.full((3, count), np.inf), np.full((3, count), -np.inf)
+    touched = np.full(count, -1)
+    entries = np.empty((len(xyz), 3), np.int64)  # each has a point that none before it has
+    length, start, n = 0, 0, len(brightest_first)
+    while start < n:
+        now, end = level[brightest_first[start]], start
+        while end < n and level[brightest_first[end]] == now:
+            row = brightest_first[end]
+            new = voxel[row]
+            if parent[new] < 0:
+                parent[new], sums[0, new] = new, 1
+                for near in neighbours(keys_of[new], keys, number):
+                    if parent[near] >= 0:
+                        _join(parent, chain, sums, box, new, near)
+            root = root_of(parent, new)
+            sums[1, root] += 1
+            for axis in range(3):
+                box[0][axis, root] = min(box[0][axis, root], xyz[row, axis])
+                box[1][axis, root] = max(box[1][axis, root], xyz[row, axis])
+            end += 1
+        for k in range(start, end):
+            root = root_of(parent, voxel[brightest_first[k]])
+            extent = (box[1][:, root] - box[0][:, root]).max()
+            if touched[root] != now and sums[1, root] >= smallest and extent <= largest:
+                entries[length, 0] = now
+                entries[length, 1] = root
+                entries[length, 2] = sums[0, root]
+                length += 1
+            touched[root] = now
+        start = end
+    place = _places(parent, chain[0])
+    for entry in range(length):  # a root is its component's first voxel
+        entries[entry, 1] = place[entries[entry, 1]]
+    return entries[:length].copy(), place
+
+
+@njit(cache=True)
+def _join(parent, chain, sums, box, voxel, beside):
+    """Join the components of two voxels, the smaller's voxels behind the larger's."""
+    a, b = root_of(parent, voxel), root_of(parent, beside)
+    if a == b:
+        return
+    if sums[0, a] < sums[0, b]:
+        a, b = b, a
+    behind, last = chain
+    parent[b] = a
+    behind[last[a]] = b
+    last[a] = last[b]
+    sums[:, a] += sums[:, b]
+    for axis in range(3):
+        box[0][axis, a] = min(box[0][axis, a], box[0][axis, b])
+        box[1][axis, a] = max(box[1][axis, a], box[1][axis, b])
+
+
+@njit(cache=True)
+def _places(parent, behind):
+    """Place (v,) of each voxel when all components follow each other."""
+    place_of, place = np.empty(len(parent), np.int64), 0
+    for root in range(len(parent)):
+        member = root if parent[root] == root else -1
+        while member >= 0:
+            place_of[member] = place
+            place += 1
+            member = behind[member]
+    return place_of
 
 
 def components(points: np.ndarray, link: float) -> list[np.ndarray]:

@@ -8,8 +8,11 @@ from mlscorr.survey import PointCloud, Survey, TargetObservations
 from mlscorr.targets.balls import Neighbourhoods
 from mlscorr.targets.candidates import search_radius
 from mlscorr.targets.fit import FittedTarget, fit_targets
+from mlscorr.targets.intensity import why_useless
 from mlscorr.targets.scanner_path import ScannerPath
+from mlscorr.targets.search import fit_piece, pieces
 from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets.shapes import BY_EDGES
 from mlscorr.targets.visits import motion_covariance, split_visits
 
 PassTarget = tuple[int, FittedTarget]  # number of a pass, or of its segment, and a target of it
@@ -36,22 +39,40 @@ def fit_near_control(
     list of (segment, FittedTarget)
         Of one target several fits, by what was looked at.
     """
-    surveyed, seed = survey.surveyed, rng.integers(2**63)  # alike for each: none needs another
+    surveyed = survey.surveyed
+    place = surveyed.position[index]
     shape = surveyed.kind[index], float(surveyed.size[index])
-    targets, place = [], surveyed.position[index]
+    seed = rng.integers(2**63)  # alike for each look: none needs another
+    by_edges = shape[0] in BY_EDGES or why_useless(cloud.intensity) is not None
     whole = search_radius(survey, surveyed)[index]
-    near = min(SETTINGS.near_radius + shape[1] / np.sqrt(2), whole)
-    for radius in dict.fromkeys((near, whole)):
+    radii = [whole]
+    if by_edges:  # of a small plate, flat patches of streets and walls farther off come first
+        radii.insert(0, min(SETTINGS.near_radius + shape[1] * np.sqrt(2), whole))
+    targets: list[PassTarget] = []
+    for radius in dict.fromkeys(radii):
         ball = Neighbourhoods(np.zeros((1, 3)), np.array([radius]))
         some = cloud if radius == whole else cloud[ball.contains(cloud.xyz)]
         for segment, visit in split_visits(some, survey):
-            path, generator = ScannerPath.of(survey, visit.gps_time), np.random.default_rng(seed)
+            path = ScannerPath.of(survey, visit.gps_time)
             known = [f for _, f in targets if visit.gps_time[0] <= f.gps_time <= visit.gps_time[-1]]
+            generator = np.random.default_rng(seed)
             fits = fit_targets(
                 visit, path, [shape], survey.scanner, generator, origin=place, known=known
             )
+            if not by_edges:
+                fits += _as_without_control(visit, place, survey, shape, generator, fits)
             targets += [(segment, fit) for fit in fits]
     return _with_motion(targets, survey)
+
+
+def _as_without_control(visit, place, survey, shape, rng, known):
+    """FittedTargets that a search of the whole cloud finds in a visit of a place."""
+    visit = replace(visit, xyz=visit.xyz + place)
+    return [
+        target
+        for piece, path, region in pieces(visit, survey)
+        for target in fit_piece(piece, path, region, [shape], survey.scanner, rng, known)
+    ]
 
 
 def _with_motion(targets, survey):

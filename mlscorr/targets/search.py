@@ -5,10 +5,10 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from mlscorr.matching import SETTINGS as MATCHING
-from mlscorr.survey import PointCloud, Survey
+from mlscorr.survey import PointCloud, Scanner, Survey
 from mlscorr.targets.balls import Neighbourhoods
 from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
-from mlscorr.targets.regions import bright_regions
+from mlscorr.targets.regions import BrightRegion, bright_regions
 from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.visits import split_visits
@@ -44,18 +44,30 @@ def search_targets(
     for chunk in chunks:
         whole = chunk if carried is None else PointCloud.concatenate([carried, chunk])
         targets = []
-        for piece in _pieces(whole, survey):
-            targets += _fit_piece(*piece, shapes, survey.scanner, rng)
+        for piece in pieces(whole, survey):
+            targets += fit_piece(*piece, shapes, survey.scanner, rng)
         yield chunk, targets
         carried = _end_of(chunk)
 
 
-def _fit_piece(cloud, path, region, shapes, scanner, rng):
-    """FittedTarget of the shape that fits a region best, each fitted to the end, in a list."""
+def fit_piece(
+    cloud: PointCloud, path: ScannerPath, region: BrightRegion,
+    shapes: Sequence[tuple[str, float | None]], scanner: Scanner, rng: np.random.Generator,
+    known: Sequence[FittedTarget] = (),
+) -> list[FittedTarget]:  # fmt: skip
+    """The FittedTarget of the shape that fits a region best, each fitted to the end, in a list.
+
+    Parameters
+    ----------
+    cloud, path, region
+        A piece as of ``pieces``.
+    shapes, scanner, rng, known
+        As fit_targets takes them.
+    """
     targets = [
         target
         for shape in shapes
-        for target in fit_targets(cloud, path, [shape], scanner, rng, region)
+        for target in fit_targets(cloud, path, [shape], scanner, rng, region, known=known)
         if target.size <= SETTINGS.largest_size
     ]
     return distinct(targets)
@@ -67,8 +79,17 @@ def _end_of(chunk):
     return chunk[first:][chunk.gps_time[first:] > chunk.gps_time.max() - MATCHING.pause / 2]
 
 
-def _pieces(cloud, survey):
-    """(PointCloud, ScannerPath, BrightRegion) about each bright region, by pass and visit."""
+def pieces(
+    cloud: PointCloud, survey: Survey
+) -> Iterator[tuple[PointCloud, ScannerPath, BrightRegion]]:
+    """What lies about each bright region, by pass and visit.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    survey : Survey
+        Its trajectory and lever arm.
+    """
     regions = bright_regions(cloud.xyz, cloud.intensity)[: SETTINGS.largest_fits]
     centre = np.array([region.centre for region in regions]).reshape(-1, 3)
     radius = 2 * np.array([region.radius for region in regions])  # what lies behind its edges

@@ -12,16 +12,14 @@ class Settings:
     """
 
     # Candidates and visits
-    near_radius: float = 2.0  # m; looked at first: what is bright farther off can't hide a target
+    near_radius: float = 2.0  # m; within which a post holds a target, and plates are sought first
     piece_points: int = 20_000  # points; bounds the time for one piece
     turn_step: float = 0.5  # m; a vehicle that moved less may stand and shake, not turn back
 
     # Clusters and seeds
     smallest_count: int = 20  # points; on fewer, plane and outline can't both be held
     smallest_levels: int = 4  # intensities; fewer are a flag or a class, not an intensity
-    intensity_steps: int = 16  # steps; equal ratios between the darkest and the brightest point
     link_shares: tuple[float, float] = (0.2, 0.4)  # size; beside a bright post, and wide scan lines
-    cheap_count: int = 1500  # points; looked at though they are most of a piece: a plate alone
     thickness: float = 0.03  # m; off a plane: less than a post's or a frame's depth
     plane_trials: int = 100  # triples; find a plane of a third of the points with 0.98
     size_guesses: tuple[float, float, float] = (0.2, 0.4, 0.8)  # m; half to twice of each

@@ -31,7 +31,44 @@ def test_unseen_control_has_a_reason_with_the_nearest_find():
     found = match(observations(PLACES[:1]), control_points(PLACES[:2]), trajectory())
     (refusal,) = found.refusals
     assert (refusal.name, refusal.pass_number) == ("T02", None)
-    assert "the nearest one found, at 357705.0 s, lies 100.00 m away and is T01" in refusal.reason
+    assert refusal.reason.startswith("No circle of 0.60 m was found near it")
+    assert "was found at 357705.0 s, 100.00 m away and is T01" in refusal.reason
+
+
+def test_a_find_that_is_another_point_is_named():
+    "Two circles surveyed 4 m apart, of which one was seen: the other learns that it is the first"
+    places = np.vstack([PLACES, PLACES[4] + 4.0 * EAST])
+    found = match(observations(PLACES), control_points(places), trajectory())
+    (refusal,) = found.refusals
+    assert refusal.name == "T11" and refusal.pass_number is None
+    assert refusal.reason.startswith("Each circle of 0.60 m found near it (search radius 10.00 m)")
+    assert "was found at 357745.0 s, 4.00 m away and is T05" in refusal.reason
+
+
+def test_a_find_that_was_refused_says_why():
+    "A circle 6 m from an unseen point, where its neighbours are 0.1 m off: found, but another one"
+    seen = PLACES + 0.1
+    seen[4] = PLACES[4] + 6.0 * EAST
+    found = match(observations(seen), control_points(PLACES), stated(0.05))
+    assert "T05" not in found.matched.name and len(found.matched) == 9
+    (refusal,) = found.refusals
+    assert refusal.name == "T05"
+    assert "circle of 0.60 m without a name was found at 357745.0 s, 6.00 m away" in refusal.reason
+    assert refusal.reason.endswith(found.reasons[0])
+    assert "This is another object (misclosure 6.00 m" in found.reasons[0]
+
+
+def test_a_find_of_another_kind_is_no_find_of_a_point():
+    "A square 8 m from an unseen circle: no circle was found, and the square is the nearest target"
+    seen = np.vstack([PLACES[:4], PLACES[4:5] + 8.0 * EAST])
+    kinds = ("circle",) * 4 + ("square",)
+    found = match(observations(seen, kinds), control_points(PLACES[:5]), trajectory())
+    (refusal,) = found.refusals
+    assert refusal.name == "T05"
+    assert refusal.reason.startswith("No circle of 0.60 m was found near it")
+    assert (
+        "The nearest target, a square of 0.60 m, was found at 357745.0 s, 8.00 m" in refusal.reason
+    )
 
 
 def test_nothing_observed_gives_every_control_a_reason():
@@ -154,7 +191,7 @@ def test_a_refused_point_says_when_and_in_which_pass():
     assert by_name["T11"].pass_number == 1
     assert by_name["T11"].gps_time == pytest.approx(seen.gps_time[10])
     assert by_name["T21"].pass_number is None and by_name["T21"].gps_time is None
-    assert by_name["T21"].reason.startswith("No target is left for it; the nearest one found, at")
+    assert by_name["T21"].reason.startswith("No circle of 0.60 m was found near it")
 
 
 def test_neighbours_are_named_with_their_times():

@@ -20,13 +20,13 @@ def straight(sigma=None):
     return Trajectory(START + elapsed, path, still, sigmas)
 
 
-def test_search_radius_is_the_surveys_and_half_a_diagonal():
+def test_search_radius_is_the_surveys_and_a_diagonal():
     "10 m where survey.toml says nothing, whatever the POS states; 3 m where it says so"
     control = control_point(ORIGIN + np.array([5.0, 100.0, 1.0]), "square")
     survey = survey_of(straight(lambda t: np.full(len(t), 0.01)), control)
-    half = SIZE / np.sqrt(2)
-    assert search_radius(survey, control) == pytest.approx([10.0 + half])  # m
-    assert search_radius(replace(survey, search_radius=3.0), control) == pytest.approx([3.0 + half])
+    diagonal = SIZE * np.sqrt(2)
+    assert search_radius(survey, control) == pytest.approx([10.0 + diagonal])  # m
+    assert search_radius(replace(survey, search_radius=3.0), control) == pytest.approx([3.0 + diagonal])
 
 
 def near(survey, read):

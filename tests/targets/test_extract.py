@@ -164,8 +164,9 @@ def survey_of(trajectory, control, clouds=(None,)):
     return Survey("street", None, None, tuple(clouds), trajectory, None, control, check, SCANNER)
 
 
-def find(view):
+def find(view, search_radius=10.0):
     survey = survey_of(view.trajectory, view.control)
+    survey = replace(survey, search_radius=search_radius)
     return as_observations(fit_while_reading(survey, lambda _: [view.cloud])[0])
 
 
@@ -337,6 +338,21 @@ def test_an_irregular_patch_is_no_target(what):
         return [*arms, Patch(centre - 1e-3 * np.cross(*axes), axes, (0.6, 0.6), 0.06)]
 
     assert sum(len(find(view(what, seed, patches=blob))) for seed in range(6)) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wall_brighter_than_a_target_hides_none(seed):
+    "A disc on a dark board 0.8 m before a wall twice as bright, within any radius: to 15 mm"
+
+    def before_a_wall(what, centre, axes):
+        wall = Patch(centre + 0.8 * ACROSS, np.array([ADVANCE, UP]), (50.0, 50.0), 0.9)
+        return [*paint(what, centre, axes, white=0.45), wall]
+
+    seen = view("disc on a board", seed, patches=before_a_wall)
+    for radius in (1.0, 2.0, 8.0, 15.0, 25.0):
+        found = find(seen, radius)
+        assert len(found) == 1, f"{len(found)} targets within {radius:g} m"
+        assert np.linalg.norm(found.position[0] - seen.centre) < 0.015  # m
 
 
 def test_without_contrast_there_is_no_target():

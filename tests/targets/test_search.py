@@ -9,7 +9,7 @@ import pytest
 from mlscorr.frames import attitude_from_angles
 from mlscorr.survey import ControlPoints, PointCloud, Survey, Trajectory
 from mlscorr.targets import distinct, search_targets
-from mlscorr.targets.search import _end_of, _pieces
+from mlscorr.targets.search import _end_of, pieces
 from mlscorr.targets.settings import SETTINGS
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
@@ -102,9 +102,9 @@ def test_two_visits_are_two_pieces(cloud, survey):
     first = cloud[rows]
     again = replace(first, gps_time=first.gps_time + 3.0)
     both = PointCloud.concatenate([first, again])
-    pieces = list(_pieces(both, survey))
-    assert len(pieces) == 2
-    spans = [np.ptp(piece.gps_time) for piece, _, _ in pieces]
+    parts = list(pieces(both, survey))
+    assert len(parts) == 2
+    spans = [np.ptp(piece.gps_time) for piece, _, _ in parts]
     assert max(spans) < 1.0
     assert len(found([both], survey)) == 2
 
@@ -115,7 +115,7 @@ def test_a_stop_before_a_target_is_cut_in_its_middle(cloud, survey):
     dense = PointCloud.concatenate([
         replace(cloud[rows], gps_time=cloud.gps_time[rows] + 0.01 * k) for k in range(12)
     ])  # fmt: skip
-    (piece, path, _), *_ = _pieces(dense, survey)
+    (piece, path, _), *_ = pieces(dense, survey)
     assert len(piece) <= SETTINGS.piece_points
     place = survey.trajectory.at(piece.gps_time).position
     np.testing.assert_allclose(path.at(piece.gps_time), place, atol=0.06)
@@ -124,7 +124,7 @@ def test_a_stop_before_a_target_is_cut_in_its_middle(cloud, survey):
 def test_a_dark_cloud_has_no_piece(cloud, survey):
     "Nothing bright: nothing to fit"
     plain = replace(cloud, intensity=np.full(len(cloud), 3_000.0))
-    assert list(_pieces(plain, survey)) == [] and found([plain], survey) == []
+    assert list(pieces(plain, survey)) == [] and found([plain], survey) == []
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
