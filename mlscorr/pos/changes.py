@@ -127,7 +127,7 @@ def continuous(
 ) -> np.ndarray:
     """The largest amplitude (n, 3) below a given one that changes at once at breaks alone.
 
-    Elsewhere it changes by no more than a factor of e in SETTINGS.told_within, but for the
+    Elsewhere it changes by no more than a factor of e in SETTINGS.change_interval, but for the
     part below ``least``: so drift that grows by a power of time is left as it is.
 
     Parameters
@@ -141,7 +141,7 @@ def continuous(
     breaks : (k,) int array
         First rows after breaks.
     """
-    clock = ((gps_time - gps_time[0]) / SETTINGS.told_within)[:, None]
+    clock = ((gps_time - gps_time[0]) / SETTINGS.change_interval)[:, None]
     logarithm = np.log(amplitude + least)
     for first, last in pairwise([0, *np.unique(breaks).tolist(), len(gps_time)]):
         rows = slice(first, last)
@@ -156,5 +156,5 @@ def _pairs(times, others):
     back, _ = cKDTree(times[:, None]).query(others[:, None], 2)
     away, number = cKDTree(others[:, None]).query(times[:, None], 2)
     limit = np.minimum(away[:, 1], np.append(back[:, 1], 0.0)[number[:, 0]]) / 2  # 0: no others
-    rows = np.flatnonzero(away[:, 0] < np.minimum(limit, SETTINGS.told_within))
+    rows = np.flatnonzero(away[:, 0] < np.minimum(limit, SETTINGS.change_interval))
     return np.column_stack([rows, number[rows, 0]])

@@ -26,7 +26,7 @@ class Settings:
     gnss_sigma: tuple[float, float, float] = (0.02, 0.02, 0.03)
 
     @property
-    def told_within(self) -> float:
+    def change_interval(self) -> float:
         """How far from an event sigma(t) may tell of it: interval and spread. Units: s."""
         return self.sigma_interval + self.step_duration
 

@@ -49,7 +49,7 @@ class Steps(Columns):
         return np.flatnonzero(is_after)
 
 
-def find_steps(trajectory: Trajectory, told: np.ndarray = NOWHERE) -> Steps:
+def find_steps(trajectory: Trajectory, changes: np.ndarray = NOWHERE) -> Steps:
     """Steps of the recorded position against the speed before and after them.
 
     Over three equal spans the middle one's way is half of both others', straight on or turned with
@@ -59,7 +59,7 @@ def find_steps(trajectory: Trajectory, told: np.ndarray = NOWHERE) -> Steps:
     Parameters
     ----------
     trajectory : Trajectory
-    told : (t,) array, optional
+    changes : (t,) array, optional
         When sigma(t) changes at once: there a step counts that is smaller than any by chance.
         Units: s.
 
@@ -76,20 +76,20 @@ def find_steps(trajectory: Trajectory, told: np.ndarray = NOWHERE) -> Steps:
     table = [np.empty((0, 6))]
     for first, last in trajectory.passes:
         rows = (trajectory.gps_time >= first) & (trajectory.gps_time <= last)
-        inside = told[(told >= first) & (told <= last)]
+        inside = changes[(changes >= first) & (changes <= last)]
         table.append(_steps_of_pass(trajectory.select(rows), inside))
     columns = np.vstack(table)
     return Steps(columns[:, 0], columns[:, 1], columns[:, 2:5], columns[:, 5])
 
 
-def _steps_of_pass(driven, told):
+def _steps_of_pass(driven, changes):
     """Rows (k, 6) of the steps of one pass: before, after, size, sigma."""
     gps_time = driven.gps_time
     if len(gps_time) < 2:
         return np.empty((0, 6))
     epochs = max(round(SETTINGS.step_duration / float(np.median(np.diff(gps_time)))), 1)
     spans = {1, *(epochs // part for part in (4, 2, 1))} - {0}
-    candidates = [row for span in spans for row in _differences(driven, span, told)]
+    candidates = [row for span in spans for row in _differences(driven, span, changes)]
     steps = []
     while candidates:
         largest = max(candidates, key=_length)
@@ -111,7 +111,7 @@ def _is_near(row, other):
     return row[0] < other[1] + 1.0 and row[1] > other[0] - 1.0
 
 
-def _differences(driven, span, told):
+def _differences(driven, span, changes):
     """Rows (before, after, size, sigma): seconds' largest differences, if far above others'."""
     gps_time = driven.gps_time
     if len(gps_time) <= 3 * span + 1:
@@ -134,9 +134,9 @@ def _differences(driven, span, told):
     jerk = SETTINGS.largest_jerk / 2 * times[span : span + len(size)] ** 3
     limit = np.maximum(jerk, max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual))
     is_step = (length > limit) & (length == largest[second])
-    for time in told:  # one place to look at, not all of a drive: less is no chance
+    for time in changes:  # one place to look at, not a whole drive
         rows = np.flatnonzero(
-            np.abs(start + times[span : span + len(size)] / 2 - time) < SETTINGS.told_within
+            np.abs(start + times[span : span + len(size)] / 2 - time) < SETTINGS.change_interval
         )
         if len(rows):
             row = rows[np.argmax(length[rows])]
