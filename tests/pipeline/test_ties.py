@@ -83,9 +83,10 @@ def test_a_good_survey_has_nothing_to_warn_of():
 
 
 def test_a_single_pass_says_why_it_has_no_ties():
-    "One pass: the sentence counts passes and says what to drive"
-    (sentence,) = of_features(street.features(1, 1)).warnings
-    assert sentence.startswith("No tie was found: 1 pass with")
+    "One pass: the sentence counts what was seen and says what to drive"
+    features = street.features(1, 1)
+    (sentence,) = of_features(features).warnings
+    assert sentence.startswith(f"No tie was found: none of {len(features)} planes, poles and")
     assert "Drive the street twice" in sentence
 
 

@@ -164,7 +164,7 @@ def test_passes_that_never_meet_are_named():
     apart = replace(features, centre=features.centre + of_second(features, [0.0, 500.0, 0.0]))
     estimate = tied_street(apart)
     assert estimate.ties is None
-    number = f"0 of {len(features)} planes, poles and markings of 2 passes"
+    number = f"0 of {len(features)} planes, poles and markings lie within"
     assert f"twice, or hardly: {number}" in estimate.untied
     assert estimate.untied not in estimate.warnings
 
