@@ -26,7 +26,9 @@ def test_search_radius_is_the_surveys_and_a_diagonal():
     survey = survey_of(straight(lambda t: np.full(len(t), 0.01)), control)
     diagonal = SIZE * np.sqrt(2)
     assert search_radius(survey, control) == pytest.approx([10.0 + diagonal])  # m
-    assert search_radius(replace(survey, search_radius=3.0), control) == pytest.approx([3.0 + diagonal])
+    assert search_radius(replace(survey, search_radius=3.0), control) == pytest.approx(
+        [3.0 + diagonal]
+    )
 
 
 def near(survey, read):
