@@ -152,7 +152,7 @@ def test_the_view_holds_what_a_figure_shows():
     assert shown.outline.covariance.shape == (2, 2)
 
 
-@pytest.mark.parametrize("seed", [129, 930, 1058])
+@pytest.mark.parametrize("seed", [184, 653, 1265])
 def test_a_twig_whose_plane_turns_away_from_it_is_no_target(seed):
     "A bright thin twig that a beam grazes: on the plane through its points none is left, nor found"
     rng = np.random.default_rng(seed)
