@@ -79,8 +79,8 @@ def _copies(paths: list[Path]) -> dict[Path, Path]:
     for number, each in enumerate(points):
         limit = (steps + steps[number])[:, None, :]  # both bounds are rounded to their steps
         is_same = np.isclose(boxes, boxes[number], rtol=0.0, atol=limit, equal_nan=True)
-        alike = np.flatnonzero(is_first & is_same.all(axis=(1, 2)))
-        first = next((points[i] for i in alike if each.are_those_of(points[i])), None)
+        candidates = np.flatnonzero(is_first & is_same.all(axis=(1, 2)))
+        first = next((points[i] for i in candidates if each.are_those_of(points[i])), None)
         if first is None:
             is_first[number] = True
         else:
