@@ -43,10 +43,11 @@ def read_windows(
         yield from read_chunks(file)
         return
     places, records = spread_records(layout)
-    times = records["gps_time"]
-    is_timed = ~lacks_time(times)
-    places = places[is_timed]
-    times = file.counted(times[is_timed])
+    times = file.counted(records["gps_time"])
+    if not (np.diff(times) >= 0).all():  # because of points without a time, perhaps
+        is_timed = ~lacks_time(records["gps_time"])
+        places = places[is_timed]
+        times = times[is_timed]
     if len(times) < 2 or not (np.diff(times) >= 0).all():
         raise ValueError(
             f"The points of {file.path.name} are not in order of time: where a time stands in it "

@@ -135,7 +135,7 @@ def test_the_solution_is_the_dense_one(family):
     parameters = objective.parameters(family, objective.initial)
     solved = complete.solve(parameters)
     signals = pose_signals(complete.stated, parameters, complete.partials)
-    signals = drift_alone(signals, complete.shown)
+    signals = drift_alone(signals, parameters, complete.shown)
     rows = SparseRows(
         complete.gps_time[:, None], complete.misclosure, complete.noise, complete.design, signals
     )

@@ -111,6 +111,8 @@ def test_a_copc_over_the_end_of_a_week_counts_on(tmp_path):
     las = laspy.read(laz)
     counted = np.linspace(604_790.0, 604_810.0, 4_000)
     las.gps_time = counted % 604_800.0
+    las.withheld[:] = 0
+    las.classification[:] = 2
     las.write(laz)
     copc = write_copc(laz, tmp_path / "in.copc.laz")
     files = [CloudFile(path, 4_000, 0.0, "week", new_week=302_400.0) for path in (laz, copc)]

@@ -54,7 +54,7 @@ def test_the_document_has_its_parts_in_order():
     assert list(content) == [
         *("name", "crs", "notes", "targets", "control", "check", "accuracy", "model"),
         "datum",
-        *("coverage", "ties", "weak", "drift", "position_sigma", "assumed"),
+        *("coverage", "ties", "weak", "drift", "jumps", "position_sigma", "assumed"),
         "next_control",
         *("files", "inputs", "outputs"),
     ]

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.pipeline.finding import fit_while_reading
-from mlscorr.survey import ControlPoints, PointCloud, Scanner, Survey, Trajectory
+from mlscorr.survey import ControlPoints, Mounting, PointCloud, Scanner, Survey, Trajectory
 from mlscorr.targets import as_observations
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
@@ -21,6 +21,9 @@ HEIGHT = 2.0  # m of the scanner above the road
 WINDOW = 1.5  # m about the target that is simulated
 SIZE = 0.6  # m
 NUMBER = 10  # views of each kind and share hidden
+MOUNTING = Mounting(  # at the navigation centre, Z across the scan plane
+    np.zeros(3), Rotation.from_matrix(np.column_stack([ACROSS, UP, -ADVANCE]))
+)
 SCANNER = Scanner(range_noise=0.004, angle_noise=np.radians(0.002), lines_per_second=LINES)
 OTHER = {"circle": "square", "square": "circle"}
 SUPPORTS = ("disc on a board", "plate in the air", "plate on the road")
@@ -159,9 +162,10 @@ def view(what, seed, hidden=0.0, patches=paint, origin=ORIGIN):
 
 
 def survey_of(trajectory, control, clouds=(None,)):
-    "A survey without mounting and check points"
+    "A survey without check points"
     check = control[[]]
-    return Survey("street", None, None, tuple(clouds), trajectory, None, control, check, SCANNER)
+    nouns = tuple(clouds), trajectory, MOUNTING, control, check, SCANNER
+    return Survey("street", None, None, *nouns)
 
 
 def find(view, search_radius=10.0):
