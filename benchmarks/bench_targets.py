@@ -23,8 +23,8 @@ from sklearn.cluster import DBSCAN
 from sklearn.metrics import adjusted_rand_score
 
 import mlscorr
-from mlscorr.io.control import NO_POINTS
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import PointCloud
 from mlscorr.targets import collect

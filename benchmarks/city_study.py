@@ -28,8 +28,8 @@ from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.control import NO_POINTS
-from mlscorr.io.task_store import TaskStore
+from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.matching import Matches
 from mlscorr.pipeline.finding import Finding
 from mlscorr.pipeline.project.city import in_turn, project_drives

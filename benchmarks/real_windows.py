@@ -12,7 +12,7 @@ from mlscorr.estimate.prediction import predict_under
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.pos_error_series import read_pos_error_series
+from mlscorr.io.trajectories.pos_error_series import read_pos_error_series
 from mlscorr.survey import ControlPoints, Matched, Pos, TargetObservations, Trajectory
 
 WINDOW, USED = 248.0, 357_881.0  # s: the windows' length; where a shared survey took its own

@@ -14,7 +14,7 @@ import numpy as np
 from target_rays import SCANNER, TARGETS, view
 
 import mlscorr
-from mlscorr.io.control import NO_POINTS
+from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.targets import fit_targets
 

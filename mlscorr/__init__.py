@@ -8,7 +8,7 @@ from mlscorr.compiled_loops import choose_folder
 
 if TYPE_CHECKING:  # what editors and type checkers see of the names that are loaded when used
     from mlscorr import simulate
-    from mlscorr.io.survey_file import read_survey
+    from mlscorr.io.surveys.survey_file import read_survey
     from mlscorr.pipeline.applying import apply
     from mlscorr.pipeline.calibration import calibrate
     from mlscorr.pipeline.checking import check
@@ -29,7 +29,7 @@ __all__ = [
 ]  # fmt: skip
 _READERS = {
     "read_simulator": "mlscorr.simulate.simulator_file",
-    "read_survey": "mlscorr.io.survey_file",
+    "read_survey": "mlscorr.io.surveys.survey_file",
 }
 
 _HOME = os.path.expanduser("~")

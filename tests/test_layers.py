@@ -188,7 +188,7 @@ def test_the_package_loads_nothing_until_it_is_used():
 
 def test_workbooks_load_openpyxl_alone():
     "Reading tables does not load openpyxl: a survey without .xlsx never pays for it"
-    assert "openpyxl" not in loaded_by("import mlscorr.io.survey_file")
+    assert "openpyxl" not in loaded_by("import mlscorr.io.surveys.survey_file")
 
 
 def test_the_simulator_does_not_know_the_estimator():

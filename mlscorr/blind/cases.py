@@ -14,7 +14,7 @@ from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.gap.train.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
 from mlscorr.gap.train.sizing import Ruler
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.simulate.mechanisms import Described, described, load_mechanisms
 
 TRUTH = ("truth.json", "truth.npz")

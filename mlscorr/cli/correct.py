@@ -66,10 +66,10 @@ def correct(
     """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.evaluate.quality import failures, read_gate
-        from mlscorr.io.extra_bytes import add_sigma_fields
-        from mlscorr.io.las_checks import read_layout
-        from mlscorr.io.project_file import is_project
-        from mlscorr.io.trajectory_exports import check_exports
+        from mlscorr.io.clouds.extra_bytes import add_sigma_fields
+        from mlscorr.io.clouds.las_checks import read_layout
+        from mlscorr.io.surveys.project_file import is_project
+        from mlscorr.io.trajectories.trajectory_exports import check_exports
 
         check_exports(trajectory)
         gates = [read_gate(text) for text in fail_if]

@@ -38,7 +38,7 @@ def correct_drives(
         Where something failed.
     """
     from mlscorr.evaluate.quality import failures
-    from mlscorr.io.project_file import read_project, stated_project
+    from mlscorr.io.surveys.project_file import read_project, stated_project
     from mlscorr.pipeline.project import check_engine, check_project_output, correct_project
 
     with terminal.exit_code(terminal.Exit.USAGE):

@@ -31,7 +31,7 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.evaluate.settings import SETTINGS
-from mlscorr.io.projection import MapFactors, map_factors
+from mlscorr.io.trajectories.projection import MapFactors, map_factors
 from mlscorr.matching.settings import SETTINGS as MATCHING
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Matched, Pos, Trajectory

@@ -13,11 +13,11 @@ from mlscorr.correction import Correction
 from mlscorr.effects import Effect
 from mlscorr.effects.wording import joined
 from mlscorr.estimate.mounting_estimate import corrected_mounting
-from mlscorr.io.conversion import written_name
-from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.io.survey_copy import write_survey_copy
-from mlscorr.io.survey_file import FILE_NAME
-from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.io.clouds.conversion import written_name
+from mlscorr.io.store.output import document, output_folder, write_json
+from mlscorr.io.surveys.survey_copy import write_survey_copy
+from mlscorr.io.surveys.survey_file import FILE_NAME
+from mlscorr.io.trajectories.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import CLOCK, DATUM, MOUNTING, TAKEN_OUT, FoundEffects

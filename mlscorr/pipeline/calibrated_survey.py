@@ -16,11 +16,11 @@ from mlscorr.evaluate.rows import TargetRow
 from mlscorr.evaluate.scores import score
 from mlscorr.evaluate.target_rows import surveyed_rows
 from mlscorr.evaluate.ties import misfit_section
-from mlscorr.io.conversion import written_name
-from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.io.survey_copy import mounting_values, write_survey_copy
-from mlscorr.io.survey_file import FILE_NAME
-from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.io.clouds.conversion import written_name
+from mlscorr.io.store.output import document, output_folder, write_json
+from mlscorr.io.surveys.survey_copy import mounting_values, write_survey_copy
+from mlscorr.io.surveys.survey_file import FILE_NAME
+from mlscorr.io.trajectories.trajectory import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import cloud_rows

@@ -13,7 +13,7 @@ from mlscorr.estimate import Calibration
 from mlscorr.evaluate.rows import SEEN_BY_OTHERS
 from mlscorr.evaluate.target_rows import unseen_rows
 from mlscorr.evaluate.ties import misfit_section
-from mlscorr.io.las import sample_gps_times
+from mlscorr.io.clouds.las import sample_gps_times
 from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
 from mlscorr.pipeline.near_points import remounting_fault, reuse_warnings

@@ -10,15 +10,15 @@ from mlscorr.estimate import SETTINGS, few_targets
 from mlscorr.estimate.inputs import checked_inputs
 from mlscorr.evaluate.beams import outside_warnings
 from mlscorr.evaluate.datum import DatumDifference, datum_differences
-from mlscorr.io.conversion import read_in_part
-from mlscorr.io.las import timed_records
-from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_crs import cloud_box, crs_conflict, stated_crs
-from mlscorr.io.nearness import far_cloud
-from mlscorr.io.noise import counted_noise
-from mlscorr.io.preparation import glance
-from mlscorr.io.projection import crs_code, crs_name
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.clouds.conversion import read_in_part
+from mlscorr.io.clouds.las import timed_records
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds.las_crs import cloud_box, crs_conflict, stated_crs
+from mlscorr.io.clouds.noise import counted_noise
+from mlscorr.io.store.preparation import glance
+from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.tables.nearness import far_cloud
+from mlscorr.io.trajectories.projection import crs_code, crs_name
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pipeline import needs
 from mlscorr.pipeline.faults import Fault, Faults, find_faults

@@ -10,9 +10,9 @@ import numpy as np
 
 from mlscorr.correction import Correction, PointSigma
 from mlscorr.estimate import Support
-from mlscorr.io.conversion import written_name
-from mlscorr.io.las import sha256
-from mlscorr.io.las_copy import CorrectedPart, write_parts
+from mlscorr.io.clouds.conversion import written_name
+from mlscorr.io.clouds.las import sha256
+from mlscorr.io.clouds.las_copy import CorrectedPart, write_parts
 from mlscorr.survey import Correcting, Survey
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mlscorr.evaluate.rows import TargetRow
 from mlscorr.evaluate.target_rows import surveyed_rows
-from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.store.output import document, output_folder, write_json
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.methods import method_named

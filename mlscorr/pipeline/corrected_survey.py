@@ -18,12 +18,12 @@ from mlscorr.evaluate.rows import PointCounts, Score, TargetRow
 from mlscorr.evaluate.scores import accuracy, score
 from mlscorr.evaluate.target_rows import surveyed_rows
 from mlscorr.evaluate.ties import tie_section
-from mlscorr.io.las import sha256
-from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.io.result_tables import write_targets_csv
-from mlscorr.io.trajectory import write_trajectory_csv
-from mlscorr.io.trajectory_exports import check_exports, export_trajectory
-from mlscorr.io.weak_files import write_weak
+from mlscorr.io.clouds.las import sha256
+from mlscorr.io.store.output import document, output_folder, write_json
+from mlscorr.io.tables.result_tables import write_targets_csv
+from mlscorr.io.trajectories.trajectory import write_trajectory_csv
+from mlscorr.io.trajectories.trajectory_exports import check_exports, export_trajectory
+from mlscorr.io.trajectories.weak_files import write_weak
 from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Survey, Trajectory

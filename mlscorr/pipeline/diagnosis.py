@@ -20,7 +20,7 @@ from mlscorr.gap.observe import Absence, Rows, background
 from mlscorr.gap.open_scale import likely_scale, open_sigmas, with_scale
 from mlscorr.gap.plan import NextData, next_data
 from mlscorr.gap.signatures import Signature, as_believed, curvature, select, signatures, with_cause
-from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.store.output import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import cloud_rows

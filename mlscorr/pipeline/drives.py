@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from pyproj import Transformer
 
-from mlscorr.io.folder_roles import FileRole
-from mlscorr.io.las import spread_records
-from mlscorr.io.las_layout import LasLayout
-from mlscorr.io.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion, places_of
-from mlscorr.io.poses import utm_zone
-from mlscorr.io.survey_sections import TrajectorySection
-from mlscorr.io.time_systems import TimeMatch, lacks_time, match_times
-from mlscorr.io.trajectory_sessions import (
+from mlscorr.io.clouds.las import spread_records
+from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.store.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion, places_of
+from mlscorr.io.surveys.folder_roles import FileRole
+from mlscorr.io.trajectories.poses import utm_zone
+from mlscorr.io.trajectories.time_systems import TimeMatch, lacks_time, match_times
+from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+from mlscorr.io.trajectories.trajectory_sessions import (
     SessionFile,
     Sessions,
     across_week_end,

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mlscorr.io.las import read_chunks
-from mlscorr.io.output import document, output_folder, write_json
-from mlscorr.io.result_tables import write_extracted_csv
+from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.store.output import document, output_folder, write_json
+from mlscorr.io.tables.result_tables import write_extracted_csv
 from mlscorr.pipeline.beam_origin import with_beam_origin
 from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, silent, unmatched
 from mlscorr.pipeline.settings import SETTINGS

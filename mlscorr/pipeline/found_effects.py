@@ -10,7 +10,7 @@ import numpy as np
 from mlscorr.effects import Effect, effect_class, make_effect
 from mlscorr.effects.wording import joined
 from mlscorr.estimate.calibration import sigma_note
-from mlscorr.io.identity import FileIdentity
+from mlscorr.io.store.identity import FileIdentity
 from mlscorr.survey import Survey
 
 CLOCK = "time_offset"

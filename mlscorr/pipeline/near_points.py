@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.evaluate.beams import BeamCheck
-from mlscorr.io.project_file import ProjectParts
+from mlscorr.io.surveys.project_file import ProjectParts
 from mlscorr.pipeline.beam_origin import with_beam_origin
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import CloudFile, PointCloud, Survey, SurveyFileError

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from time import perf_counter
 
 from mlscorr.evaluate.beams import BeamCheck
-from mlscorr.io.conversion import recorded_points
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.conversion import recorded_points
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.io.settings import SETTINGS as IO
 from mlscorr.pipeline.quick_look import QuickLook
 from mlscorr.pipeline.settings import SETTINGS

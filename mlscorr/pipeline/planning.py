@@ -17,7 +17,7 @@ from mlscorr.gap.infer import Observations, Separability, compare_signatures
 from mlscorr.gap.observe import Rows, background
 from mlscorr.gap.plan import NextData, event_sizes, next_data, planned_rows
 from mlscorr.gap.signatures import signatures
-from mlscorr.io.output import document, output_folder, write_json
+from mlscorr.io.store.output import document, output_folder, write_json
 from mlscorr.survey import Matched, Survey, TargetObservations, check_survey
 from mlscorr.survey.data_frame import rows_frame
 from mlscorr.survey.summary import Summary

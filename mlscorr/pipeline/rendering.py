@@ -10,8 +10,8 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.output import check_output, document, output_folder
-from mlscorr.io.trajectory import read_trajectory
+from mlscorr.io.store.output import check_output, document, output_folder
+from mlscorr.io.trajectories.trajectory import read_trajectory
 from mlscorr.pipeline.correction import correct
 from mlscorr.survey import Survey, check_survey
 

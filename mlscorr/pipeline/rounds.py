@@ -11,7 +11,7 @@ from mlscorr.gap.advice import no_cause
 from mlscorr.gap.close import LoneEffect, lone_effects
 from mlscorr.gap.document import cause_document, windows_document
 from mlscorr.gap.infer import Costs
-from mlscorr.io.output import document
+from mlscorr.io.store.output import document
 from mlscorr.pipeline.compared_rows import NEXT_RUN
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
 from mlscorr.pipeline.settings import SETTINGS

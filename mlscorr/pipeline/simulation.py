@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.output import check_output, document, output_folder
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.store.output import check_output, document, output_folder
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.pipeline.correction import correct
 
 

@@ -14,25 +14,26 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.control import holds_points, read_control
-from mlscorr.io.control_lists import AxesError
-from mlscorr.io.conversion import is_foreign, recorded_points
-from mlscorr.io.copies import find_copies
-from mlscorr.io.folder_roles import SIMULATED, FileRole, sort_files
-from mlscorr.io.las import read_chunks
-from mlscorr.io.las_checks import read_layout
-from mlscorr.io.open_places import (
+from mlscorr.io.clouds.conversion import is_foreign, recorded_points
+from mlscorr.io.clouds.copies import find_copies
+from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.store.open_places import (
     PLACE_OF_CRS,
     OpenPlace,
     OpenQuestion,
     places_of,
 )
-from mlscorr.io.output import output_file
-from mlscorr.io.preparation import glance
-from mlscorr.io.storage import files_like
-from mlscorr.io.survey_file import FILE_NAME, read_survey
-from mlscorr.io.survey_sections import ControlSection, PlannedSurveyFile
-from mlscorr.io.toml_file import validate
+from mlscorr.io.store.output import output_file
+from mlscorr.io.store.preparation import glance
+from mlscorr.io.store.storage import files_like
+from mlscorr.io.store.toml_file import validate
+from mlscorr.io.surveys.folder_roles import SIMULATED, FileRole, sort_files
+from mlscorr.io.surveys.survey_file import FILE_NAME, read_survey
+from mlscorr.io.surveys.survey_sections import PlannedSurveyFile
+from mlscorr.io.tables.control import holds_points, read_control
+from mlscorr.io.tables.control_lists import AxesError
+from mlscorr.io.tables.table_sections import ControlSection
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pipeline.choice import choose_control, choose_crs
 from mlscorr.pipeline.drives import Cloud, choose_accuracy, choose_trajectory

@@ -19,7 +19,7 @@ from mlscorr.estimate import (
     with_ties,
 )
 from mlscorr.estimate.inputs import check_order
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.survey import Matched, Survey, TieFeatures, Ties, time_spans
 from mlscorr.ties import (

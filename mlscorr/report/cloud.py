@@ -11,7 +11,7 @@ import numpy as np
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.report import tables
 from mlscorr.report.correction_report import ordered
 from mlscorr.report.pages import data_uri

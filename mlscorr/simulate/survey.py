@@ -10,7 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.effects import Reference, apply_effects, effect_streams
-from mlscorr.io.projection import check_crs
+from mlscorr.io.trajectories.projection import check_crs
 from mlscorr.simulate import recording
 from mlscorr.simulate.drive import drive
 from mlscorr.simulate.scan import MeasuredPulses, Platform, Surfaces, pulses_of_a_pass, shoot

@@ -12,11 +12,11 @@ import numpy as np
 import tomlkit
 
 from mlscorr.frames import angles_from_attitude
-from mlscorr.io.las_writer import cloud_writer
-from mlscorr.io.npz import NpzWriter
-from mlscorr.io.output import output_folder
-from mlscorr.io.ply import write_ply
-from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.io.clouds.las_writer import cloud_writer
+from mlscorr.io.clouds.ply import write_ply
+from mlscorr.io.store.npz import NpzWriter
+from mlscorr.io.store.output import output_folder
+from mlscorr.io.trajectories.trajectory import write_trajectory_csv
 from mlscorr.simulate.survey import SimulatedSurvey
 from mlscorr.survey import Pos
 

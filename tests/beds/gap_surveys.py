@@ -9,7 +9,7 @@ from mlscorr.gap.close.surroundings import Surroundings
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import PatchCollector
 from mlscorr.gap.observe.patches import Patches
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces
 
 

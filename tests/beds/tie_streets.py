@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.control import NO_POINTS
+from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.survey import CloudFile, PointCloud, Scanner, Survey, Trajectory
 from mlscorr.ties import TieCollector
 

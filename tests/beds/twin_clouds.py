@@ -8,8 +8,8 @@ import mlscorr
 from mlscorr.gap.contrast import SampleCollector
 from mlscorr.gap.observe import PatchCollector
 from mlscorr.gap.observe.covariates import scanner_origin
-from mlscorr.io.las import read_chunks
-from mlscorr.io.simulated_clouds import simulated_survey
+from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.surveys.simulated_clouds import simulated_survey
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.recording import (
     recorded_passes,

@@ -12,7 +12,7 @@ from mlscorr.frames import attitude_from_angles, mounting_partials, pose_partial
 from mlscorr.survey import Mounting, Scanner, Trajectory
 from tests.beds.copies import write_corrected
 from tests.beds.shared import shared
-from tests.io.test_las import cloud_of, covering, write_street
+from tests.io.clouds.test_las import cloud_of, covering, write_street
 
 START = 357_900.0  # s of week
 CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # m, UTM

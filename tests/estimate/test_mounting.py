@@ -25,9 +25,9 @@ from mlscorr.frames import (
     mounting_partials,
     to_scanner,
 )
-from mlscorr.io.survey_copy import mounting_values, write_survey_copy
-from mlscorr.io.survey_file import read_survey_file
-from mlscorr.io.survey_sections import CalibratedMountingSection
+from mlscorr.io.surveys.survey_copy import mounting_values, write_survey_copy
+from mlscorr.io.surveys.survey_file import read_survey_file
+from mlscorr.io.surveys.survey_sections import CalibratedMountingSection
 from mlscorr.pipeline.calibration import warn_of_scanners
 from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.simulate import Scenario, simulate

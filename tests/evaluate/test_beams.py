@@ -8,8 +8,8 @@ import pytest
 
 from mlscorr.evaluate.beams import BeamCheck
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.las import read_chunks
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.survey import PointCloud, Trajectory
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.evaluate.datum import TERMS, UNITS, DatumDifference, datum_differences
-from mlscorr.io.projection import map_factors
+from mlscorr.io.trajectories.projection import map_factors
 from mlscorr.survey import Pos
 from tests.beds.streets import observed, targets, trajectory
 

@@ -6,7 +6,7 @@ import pytest
 
 import mlscorr
 from mlscorr.evaluate.beams import BeamCheck
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from tests.beds.missing_times import write_survey
 
 

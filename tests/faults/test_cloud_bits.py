@@ -6,11 +6,11 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.las import read_records, sample_gps_times
-from mlscorr.io.las_checks import read_layout
+from mlscorr.io.clouds.las import read_records, sample_gps_times
+from mlscorr.io.clouds.las_checks import read_layout
 from mlscorr.survey import CloudFile
 from tests.beds.copies import write_corrected
-from tests.io.test_las import START, correction, write_street
+from tests.io.clouds.test_las import START, correction, write_street
 
 POINTS = 300
 HEADER = 430  # bytes: that of LAS 1.4 and the first VLR

@@ -9,16 +9,16 @@ import warnings
 import numpy as np
 import pytest
 
-from mlscorr.io.control import read_control
-from mlscorr.io.las import read_records, sample_gps_times
-from mlscorr.io.las_checks import read_layout
-from mlscorr.io.survey_sections import SurveyFile
-from mlscorr.io.toml_file import read_toml
-from mlscorr.io.trajectory import read_trajectory
+from mlscorr.io.clouds.las import read_records, sample_gps_times
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.store.toml_file import read_toml
+from mlscorr.io.surveys.survey_sections import SurveyFile
+from mlscorr.io.tables.control import read_control
+from mlscorr.io.trajectories.trajectory import read_trajectory
 from mlscorr.survey import CloudFile
 from tests.beds.copies import write_corrected
 from tests.faults.sizes import IS_FULL, tries
-from tests.io.test_las import START, correction, write_street
+from tests.io.clouds.test_las import START, correction, write_street
 
 LIMIT = 2.0  # s of the processor, for one file
 POINTS = 100

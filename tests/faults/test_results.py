@@ -13,10 +13,10 @@ import pytest
 import typer
 
 from mlscorr.cli.terminal import Exit, exit_code
-from mlscorr.io import folders, output
-from mlscorr.io.inputs import check_unchanged, input_file
-from mlscorr.io.output import check_output, output_folder
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.store import folders, output
+from mlscorr.io.store.inputs import check_unchanged, input_file
+from mlscorr.io.store.output import check_output, output_folder
+from mlscorr.io.surveys.survey_file import read_survey
 from tests.beds.places import ROOT
 
 
@@ -76,7 +76,7 @@ def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path):
     "The folder of a killed process goes, that of a living one stays"
     out = tmp_path / "out"
     code = (
-        "import sys, time; from mlscorr.io.output import output_folder\n"
+        "import sys, time; from mlscorr.io.store.output import output_folder\n"
         "with output_folder(sys.argv[1]) as folder:\n"
         "    (folder / 'half').write_text('x'); print('begun', flush=True); time.sleep(60)"
     )

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.crs_checks import check_area, check_scale, crs_notes
-from mlscorr.io.projection import check_crs, convergence_at
-from mlscorr.io.sbet import read_sbet
+from mlscorr.io.surveys.crs_checks import check_area, check_scale, crs_notes
+from mlscorr.io.trajectories.projection import check_crs, convergence_at
+from mlscorr.io.trajectories.sbet import read_sbet
 from mlscorr.survey import Trajectory
 
 START = 357_700.0  # s of week

@@ -8,15 +8,15 @@ import lazrs
 import numpy as np
 import pytest
 
-from mlscorr.io.control import read_control
-from mlscorr.io.las_checks import read_layout
-from mlscorr.io.sbet import read_sbet
-from mlscorr.io.survey_sections import SurveyFile
-from mlscorr.io.toml_file import read_toml
-from mlscorr.io.trajectory import read_trajectory
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.store.toml_file import read_toml
+from mlscorr.io.surveys.survey_sections import SurveyFile
+from mlscorr.io.tables.control import read_control
+from mlscorr.io.trajectories.sbet import read_sbet
+from mlscorr.io.trajectories.trajectory import read_trajectory
 from tests.faults.sizes import tries
 from tests.faults.test_times_and_places import recorded
-from tests.io.test_las import write_street
+from tests.io.clouds.test_las import write_street
 
 CLOUDS = (("a.las", 1), ("b.las", 6), ("c.laz", 1), ("d.laz", 6))  # and their point formats
 TEXTS = (

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mlscorr.blind.mix import causes
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.pipeline.blind import make_blind, run_blind, score_blind
 from mlscorr.simulate import Scenario, simulate
 from tests.beds import own_effects

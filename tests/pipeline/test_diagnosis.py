@@ -18,7 +18,7 @@ from mlscorr.gap.infer.error_models import STATED
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.gap.signatures.simulators import as_believed, with_cause
 from mlscorr.gap.train.cases import RANDOM
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.pipeline.found_effects import read_effects
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator

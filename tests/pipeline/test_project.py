@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.project_file import read_project
+from mlscorr.io.surveys.project_file import read_project
 from mlscorr.pipeline.project import Options, check_project, correct_project, project_status
 from mlscorr.pipeline.project.stages import tile_tasks
 from mlscorr.pipeline.project.tasks import carry_out
@@ -105,8 +105,10 @@ def test_each_drive_has_results_of_its_own(project, corrected):
     assert not undocumented(result.document)
     assert json.loads((out / "project.json").read_text()) == result.document
     for drive in ("first", "second"):
-        recorded = mlscorr.io.trajectory.read_trajectory(project.parent / drive / "trajectory.csv")
-        path = mlscorr.io.trajectory.read_trajectory(out / drive / "trajectory.csv")
+        recorded = mlscorr.io.trajectories.trajectory.read_trajectory(
+            project.parent / drive / "trajectory.csv"
+        )
+        path = mlscorr.io.trajectories.trajectory.read_trajectory(out / drive / "trajectory.csv")
         assert np.array_equal(path.gps_time, recorded.gps_time)
         report = json.loads((out / drive / "report.json").read_text())
         assert not undocumented(report)

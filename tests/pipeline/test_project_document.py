@@ -7,8 +7,8 @@ import pytest
 
 from mlscorr.estimate import Support
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.identity import FileIdentity
-from mlscorr.io.task_store import TaskStore, digest
+from mlscorr.io.store.identity import FileIdentity
+from mlscorr.io.store.task_store import TaskStore, digest
 from mlscorr.pipeline.project.document import _reason, older_results
 from mlscorr.pipeline.project.tasks import Written
 from mlscorr.report.headline import first_screen

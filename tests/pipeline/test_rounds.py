@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.pipeline.diagnosis import diagnose
 from mlscorr.pipeline.rounds import DiagnosedRounds
 from mlscorr.simulate.simulator_file import read_simulator

@@ -18,7 +18,7 @@ from mlscorr.correction import PointSigma
 from mlscorr.estimate import believed_correction
 from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.evaluate.beams import BeamCheck
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.pipeline.tying import tie_passes
 from mlscorr.report.provenance import systems
 from mlscorr.ties import TieCollector

@@ -76,7 +76,7 @@ def test_runs_without_a_pause_are_passes_of_their_own(street, tmp_path):
     folder = cut(street, tmp_path / "cut", [slice(0, gap // 2), slice(gap // 2, None)])
     assert len(mlscorr.read_survey(folder).trajectory.passes) == 3
     out = corrected(folder)
-    again = mlscorr.io.trajectory.read_trajectory(out / "trajectory.csv")
+    again = mlscorr.io.trajectories.trajectory.read_trajectory(out / "trajectory.csv")
     assert len(again.passes) == 3
     passes = {row["pass"] for row in json.loads((out / "report.json").read_text())["targets"]}
     assert max(passes) == 3

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.output import document
+from mlscorr.io.store.output import document
 from mlscorr.report.correction_report import FileRow, ordered, recomputed
 from tests.beds.reports import drive, fabricate
 from tests.beds.street_of_points import ORIGIN, shifted, target

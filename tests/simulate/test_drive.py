@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.poses import read_poses
-from mlscorr.io.trajectory import write_trajectory_csv
+from mlscorr.io.trajectories.poses import read_poses
+from mlscorr.io.trajectories.trajectory import write_trajectory_csv
 from mlscorr.simulate.drive.pace import Pace
 from mlscorr.simulate.drive.passes import drive
 from mlscorr.simulate.drive.path import u_turn_path

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.pos_error_series import PosErrorSeries, read_pos_error_series
+from mlscorr.io.trajectories.pos_error_series import PosErrorSeries, read_pos_error_series
 from mlscorr.simulate.pos import alignment, gnss, inertial, kalman, navigation
 from mlscorr.simulate.pos.errors import given_error, pos_error, record
 from mlscorr.simulate.pos.inertial import GRADES, GRAVITY, MEMS, TACTICAL

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.displacement import DisplacedSurvey
 from mlscorr.simulate.random_survey import random_scenario, random_survey

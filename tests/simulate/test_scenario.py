@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.simulate import simulate
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scenario_file import read_scenario, scenario_files

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.effects import EFFECTS, in_order, make_effect
-from mlscorr.io.survey_file import read_survey
-from mlscorr.io.survey_sections import PosSection, ScannerSection
+from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.surveys.survey_sections import PosSection, ScannerSection
 from mlscorr.simulate.simulator_file import Simulator, beliefs_of, read_simulator, write_simulator
 from mlscorr.survey import Mounting, Pos, Scanner
 

@@ -76,7 +76,7 @@ def build_rows(
 
     >>> import numpy as np, tempfile
     >>> from mlscorr.gap.observe.patch_search import find_patches
-    >>> from mlscorr.io.survey_file import read_survey
+    >>> from mlscorr.io.surveys.survey_file import read_survey
     >>> from mlscorr.pipeline.finding import find_targets
     >>> from mlscorr.simulate import Scenario, simulate
     >>> folder = tempfile.mkdtemp()

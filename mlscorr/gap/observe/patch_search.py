@@ -11,7 +11,7 @@ import numpy as np
 from mlscorr.gap.observe.patches import Patches
 from mlscorr.gap.observe.plane_fit import block_chance, fit_patches, place_key
 from mlscorr.gap.observe.settings import SETTINGS
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.survey import CloudFile, PointCloud, Survey
 from mlscorr.targets import NO_POINTS, number_passes
 

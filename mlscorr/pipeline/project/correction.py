@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.identity import FileIdentity
-from mlscorr.io.output import check_output, output_file, write_json
-from mlscorr.io.project_file import ProjectParts, read_project
-from mlscorr.io.project_sections import SHARED_TILES
-from mlscorr.io.publishing import check_store_output, remove_files
-from mlscorr.io.storage import as_path, is_folder, is_remote
-from mlscorr.io.task_store import TaskStore, digest
-from mlscorr.io.trajectory_exports import check_exports
+from mlscorr.io.store.identity import FileIdentity
+from mlscorr.io.store.output import check_output, output_file, write_json
+from mlscorr.io.store.publishing import check_store_output, remove_files
+from mlscorr.io.store.storage import as_path, is_folder, is_remote
+from mlscorr.io.store.task_store import TaskStore, digest
+from mlscorr.io.surveys.project_file import ProjectParts, read_project
+from mlscorr.io.surveys.project_sections import SHARED_TILES
+from mlscorr.io.trajectories.trajectory_exports import check_exports
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.project import stages
 from mlscorr.pipeline.project.city import project_drives

@@ -9,9 +9,9 @@ from posixpath import normpath
 import numpy as np
 
 from mlscorr.evaluate.model import largest_sigma
-from mlscorr.io.output import document
-from mlscorr.io.project_file import ProjectParts
-from mlscorr.io.task_store import TaskStore
+from mlscorr.io.store.output import document
+from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.surveys.project_file import ProjectParts
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.corrected import STATES, DriveState

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.identity import FileIdentity
-from mlscorr.io.las import count_sources
-from mlscorr.io.las_checks import read_layout
-from mlscorr.io.las_crs import cloud_box
-from mlscorr.io.publishing import make_folder, publish
-from mlscorr.io.survey_file import cloud_file
-from mlscorr.io.task_store import TaskStore
+from mlscorr.io.clouds.las import count_sources
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds.las_crs import cloud_box
+from mlscorr.io.store.identity import FileIdentity
+from mlscorr.io.store.publishing import make_folder, publish
+from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.surveys.survey_file import cloud_file
 from mlscorr.pipeline.clouds import WrittenClouds, write_counted
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.file_finding import FileFinding, find_in_file

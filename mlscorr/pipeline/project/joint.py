@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlscorr.io.task_store import digest
-from mlscorr.io.trajectory_sessions import join_sessions, with_sigmas
+from mlscorr.io.store.task_store import digest
+from mlscorr.io.trajectories.trajectory_sessions import join_sessions, with_sigmas
 from mlscorr.pipeline.finding import Finding
 from mlscorr.survey import (
     ControlPoints,

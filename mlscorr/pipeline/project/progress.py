@@ -9,9 +9,9 @@ from pathlib import Path
 from time import monotonic
 from typing import TextIO
 
-from mlscorr.io.output import output_file
-from mlscorr.io.publishing import appended
-from mlscorr.io.spool import telling_space
+from mlscorr.io.store.output import output_file
+from mlscorr.io.store.publishing import appended
+from mlscorr.io.store.spool import telling_space
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task
 from mlscorr.survey.summary import counted

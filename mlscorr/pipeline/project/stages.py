@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.identity import FileIdentity
-from mlscorr.io.project_file import DriveParts, ProjectParts
-from mlscorr.io.project_sections import SHARED_TILES
-from mlscorr.io.storage import resolved
-from mlscorr.io.task_store import TaskStore, digest
+from mlscorr.io.store.identity import FileIdentity
+from mlscorr.io.store.storage import resolved
+from mlscorr.io.store.task_store import TaskStore, digest
+from mlscorr.io.surveys.project_file import DriveParts, ProjectParts
+from mlscorr.io.surveys.project_sections import SHARED_TILES
 from mlscorr.pipeline.near_points import check_control
 from mlscorr.pipeline.project import file_tasks
 from mlscorr.pipeline.project.city import AreaInput, stored_results

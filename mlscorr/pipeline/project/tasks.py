@@ -10,9 +10,9 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from mlscorr.io.identity import FileIdentity
-from mlscorr.io.spool import telling_space
-from mlscorr.io.task_store import TaskStore
+from mlscorr.io.store.identity import FileIdentity
+from mlscorr.io.store.spool import telling_space
+from mlscorr.io.store.task_store import TaskStore
 
 VERSION = version("mlscorr")  # results of another one are made again
 

@@ -9,7 +9,7 @@ import numpy as np
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
 from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.report.correction_report import recomputed
 from mlscorr.report.render.picture import Picture
 from mlscorr.report.render.quantities import COLOURS, CloudPair, point_sigma

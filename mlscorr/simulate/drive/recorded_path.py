@@ -5,7 +5,7 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Slerp
 
-from mlscorr.io.poses import read_poses
+from mlscorr.io.trajectories.poses import read_poses
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.survey import GAP_FACTOR

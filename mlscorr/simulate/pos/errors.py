@@ -10,7 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.pos_error_series import PosErrorSeries, read_pos_error_series
+from mlscorr.io.trajectories.pos_error_series import PosErrorSeries, read_pos_error_series
 from mlscorr.simulate.pos.inertial import GRADES
 from mlscorr.simulate.pos.navigation import PosError, interpolate, navigate
 from mlscorr.simulate.scenario import PosScenario

@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.effects import make_effect
 from mlscorr.gap.observe.rows import Rows
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.gap_closure import Bed
 from tests.beds.gap_surveys import beams_of, read_once, rows_of, write_reference

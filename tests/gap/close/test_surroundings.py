@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.gap.close.sightings import sightings_of
 from mlscorr.gap.close.surroundings import Surroundings
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.simulate.scan.replay import recorded_platform
 
 

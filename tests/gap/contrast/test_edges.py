@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.contrast.edges import EdgeCollector, edges_of
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 from mlscorr.survey import PointCloud
 
 ORIGIN = np.array([532000.0, 3374000.0, 0.0])

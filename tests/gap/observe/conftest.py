@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
-from mlscorr.io.survey_file import read_survey
+from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.pipeline.finding import find_targets
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.gap_surveys import write_reference

@@ -8,7 +8,7 @@ import pytest
 from mlscorr.gap.observe.channels import beside_seen_noise, loss_variance, return_rate, roughness
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 
 
 def test_roughness_is_what_the_scanner_is_believed_to_make(survey, targets, patches, pairing):

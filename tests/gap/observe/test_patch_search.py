@@ -8,7 +8,7 @@ import pytest
 
 from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.gap.observe.settings import SETTINGS
-from mlscorr.io.las import read_chunks
+from mlscorr.io.clouds.las import read_chunks
 
 
 def test_little_memory_is_enough_for_any_cloud(survey):

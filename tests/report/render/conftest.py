@@ -24,7 +24,7 @@ def estimated(survey):
 def chunk(survey):
     "All points of the street"
     return PointCloud.concatenate(
-        [c for file in survey.clouds for c in mlscorr.io.las.read_chunks(file)]
+        [c for file in survey.clouds for c in mlscorr.io.clouds.las.read_chunks(file)]
     )
 
 

@@ -1,0 +1,247 @@
+"""Clouds of other formats, put into a LAZ once, from where all is as with LAS.
+
+The LAZ stands in a folder for temporary files (which TMPDIR names), and goes when the program ends.
+What is corrected is written as LAZ.
+"""
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from mlscorr.io.clouds.cloud_sources import CloudSource
+from mlscorr.io.clouds.e57 import open_e57
+from mlscorr.io.clouds.las_writer import INTEGER_LIMIT, cloud_writer
+from mlscorr.io.clouds.ply_clouds import open_ply
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.opening import open_file
+from mlscorr.io.store.preparation import looked_points, progress_of, temporary_folder
+from mlscorr.io.store.storage import file_state, is_remote
+from mlscorr.io.trajectories.time_systems import ADJUSTMENT, NO_TIMES, lacks_time
+from mlscorr.survey import CloudFile, PointCloud
+from mlscorr.survey.clouds import WEEK
+
+OPENERS: dict[str, Callable[[Path], CloudSource]] = {".e57": open_e57, ".ply": open_ply}
+RESOLUTION = 1e-4  # m, of coordinates: a tenth of what scanners resolve, and 214 km in 32 bits
+LARGEST = np.iinfo(np.uint16).max  # of an intensity or a colour
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A LAZ that was made of another file.
+
+    Parameters
+    ----------
+    path : Path
+    source : CloudSource
+    points : int
+        In the LAZ.
+    is_part : bool
+        Whether they are the first ones only.
+    note : str
+        A sentence.
+    """
+
+    path: Path
+    source: CloudSource
+    points: int
+    is_part: bool
+    note: str
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a cloud's suffix is that of another format than LAS.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    return path.suffix.lower() in OPENERS
+
+
+def written_name(path: Path) -> str:
+    """Name of the file that a corrected cloud is written to: its own, or the LAZ of its stem.
+
+    Parameters
+    ----------
+    path : Path
+
+    Examples
+    --------
+    >>> written_name(Path("a/scan.las")), written_name(Path("a/scan.e57"))
+    ('scan.las', 'scan.laz')
+    """
+    return path.with_suffix(".laz").name if is_foreign(path) else path.name
+
+
+def converted(path: Path) -> Converted:
+    """The LAZ of an E57 or PLY, made when it is first asked for.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    ValueError
+        For files that can't be read, or have no times.
+    OSError
+        When the disk refuses.
+    """
+    return _converted(path.absolute(), *file_state(path), looked_points())
+
+
+def read_in_part(path: Path) -> bool:
+    """Whether only the first points of a cloud are read, as within a glance.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    return is_foreign(path) and converted(path).is_part
+
+
+def recorded_points(file: CloudFile) -> int:
+    """Number of points of a cloud, also where only the first are read.
+
+    Parameters
+    ----------
+    file : CloudFile
+    """
+    return converted(file.path).source.points if read_in_part(file.path) else file.points
+
+
+@cache
+def _converted(path, size, changed, limit):
+    source = OPENERS[path.suffix.lower()](_on_disk(path))
+    if limit is not None and source.points <= limit:
+        return _converted(path, size, changed, None)
+    target = Path(tempfile.mkdtemp(dir=temporary_folder())) / written_name(path)
+    return _convert(source, target, limit)
+
+
+def _on_disk(path):
+    """A file, or the copy of one in a store: what reads it needs a disk."""
+    if not is_remote(path):
+        return path
+    copy = Path(tempfile.mkdtemp(dir=temporary_folder())) / path.name
+    with open_file(path) as source, open(copy, "wb") as target:
+        shutil.copyfileobj(source, target, SETTINGS.copied_bytes)
+    return copy
+
+
+def _convert(source, target, limit):
+    """Write a source's points, or the first of them, as LAZ."""
+    size, end = SETTINGS.chunk_points, limit or source.points
+    base, gain, scaled = _scale(source, size, end)
+    blocks = _first(source.blocks(size), end)
+    first = next((block for block in blocks if len(block.xyz)), None)
+    if first is None:
+        raise ValueError(f"{source.path} holds no valid points.")
+    is_standard, taken = _time_system(source.path, first.gps_time)
+    crs, crs_note = _known_crs(source.crs)
+    done, count = progress_of(f"Reading {source.path.name}", end), 0
+    has_colours = first.colours is not None
+    with cloud_writer(target, first.xyz[0], crs, RESOLUTION, None, is_standard, has_colours) as laz:
+        for block in chain([first], blocks):
+            number = len(block.xyz)
+            _check_extent(source.path, block.xyz - first.xyz[0])
+            intensity = np.zeros(number) if block.intensity is None else block.intensity
+            intensity = _in_16_bits((np.nan_to_num(intensity) - base) * gain)
+            is_timed = ~np.isin(block.gps_time, NO_TIMES)
+            cloud = PointCloud(block.xyz, block.gps_time - taken * is_timed, intensity)
+            colours = np.zeros((number, 3)) if block.colours is None else block.colours
+            colours = _in_16_bits(colours * (LARGEST / source.colour_limit))
+            laz.write(cloud, colours=colours if has_colours else None)
+            count += number
+            done(number + block.invalid)
+    note = _note(source, count, limit, scaled + crs_note)
+    return Converted(target, source, count, limit is not None, note)
+
+
+def _check_extent(path, way):
+    """Refuse points so far from the first one (n, 3; m) that a LAS can't hold both."""
+    limit = RESOLUTION * (INTEGER_LIMIT - 1 / RESOLUTION)  # the header's offset is in whole metres
+    if count := int((np.abs(way) > limit).any(axis=1).sum()):
+        raise ValueError(
+            f"{path} has {count} points more than {limit / 1e3:.0f} km from its first one, up to "
+            f"{np.abs(way).max() / 1e3:.0f} km: one of them may be a pulse without an echo, as at "
+            "0, 0, 0. Export it without such points, in metres."
+        )
+
+
+def _in_16_bits(values):
+    return np.rint(values).clip(0, LARGEST).astype(np.uint16)
+
+
+def _first(blocks, end):
+    """Blocks until so many points are there."""
+    count = 0
+    for block in blocks:
+        yield block
+        count += len(block.xyz) + block.invalid
+        if count >= end:
+            return
+
+
+def _scale(source, size, end):
+    """What brings intensities into 16 bits: base, gain, and a phrase on it."""
+    low, high, count = np.inf, -np.inf, 0
+    for values in source.intensities(size):
+        low, high = np.fmin(low, np.fmin.reduce(values)), np.fmax(high, np.fmax.reduce(values))
+        if (count := count + len(values)) >= end:
+            break
+    if not np.isfinite([low, high]).all():
+        return 0.0, 1.0, "; it has no intensity, by which targets are seen"
+    if low >= 0 and 1 < high <= LARGEST:
+        return 0.0, 1.0, ""
+    base, top = (0.0, 1.0) if low >= 0 and high <= 1 else (min(low, 0.0), high)
+    gain = LARGEST / max(top - base, np.finfo(float).tiny)
+    return base, gain, f"; intensities of {low:g} to {high:g} as {gain:.5g} (value - {base:g})"
+
+
+def _time_system(path, times):
+    """Whether times are written as adjusted standard GPS time, and what is taken off them (s)."""
+    times = times[np.isfinite(times)]
+    if not len(times):
+        raise ValueError(f"{path} has points whose times are no numbers.")
+    if np.abs(times).max() > SETTINGS.microseconds:
+        raise ValueError(
+            f"{path} has times of {np.abs(times).max():.6g}, which count milli-, micro- or "
+            "nanoseconds: export them in seconds."
+        )
+    if not lacks_time(times).all():
+        times = times[~lacks_time(times)]
+    is_week = times.min() >= 0 and times.max() <= 2 * WEEK
+    return not is_week, ADJUSTMENT if times.min() >= ADJUSTMENT else 0.0
+
+
+def _known_crs(wkt):
+    """A CRS that can be written, and a phrase where there is another."""
+    if wkt is None:
+        return None, ""
+    try:
+        CRS.from_user_input(wkt).to_wkt("WKT1_GDAL")
+    except CRSError:
+        return None, "; its coordinateMetadata is no CRS that is known"
+    return wkt, ""
+
+
+def _note(source, count, limit, phrases):
+    """The sentence on a conversion."""
+    taken = f"the first {count} points of {source.points}" if limit else f"{count} points"
+    invalid = 0 if limit else source.points - count
+    left = f"; {invalid} invalid points were left out" if invalid else ""
+    dropped = f"; without its {', '.join(source.dropped)}" if source.dropped else ""
+    return (
+        f"{source.path.name} was read through LAZ at {RESOLUTION * 1e3:g} mm, {taken} "
+        f"{source.parts}{phrases}{left}{dropped}. What is corrected is written as "
+        f"{written_name(source.path)}."
+    )

@@ -1,0 +1,161 @@
+"""Clouds that hold the same points as another one, in whatever format, order or time system.
+
+Headers tell most clouds apart: their number of points and their bounds. Only where these agree are
+times of points read: a few at the same places of both files, and all of them where these differ,
+as in a COPC beside a LAZ.
+"""
+
+import struct
+from collections import defaultdict
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.clouds.conversion import OPENERS, is_foreign, read_in_part
+from mlscorr.io.clouds.las import records_at
+from mlscorr.io.clouds.las_checks import HEADER_SIZES, read_layout
+from mlscorr.io.clouds.las_crs import cloud_box
+from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.clouds.las_points import read_records
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.opening import open_file
+from mlscorr.io.store.storage import is_remote
+from mlscorr.io.trajectories.time_systems import ADJUSTMENT, WEEK
+
+
+def find_copies(paths: Iterable[Path]) -> dict[Path, Path]:
+    """Clouds with the same points as one before them, each with that one.
+
+    Files without points that can be read are no copies; they are refused where they are read.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+
+    Returns
+    -------
+    dict
+        From a copy to the first of the files that holds its points.
+    """
+    of_count = defaultdict(list)
+    for path in dict.fromkeys(paths):
+        with suppress(OSError, ValueError):
+            of_count[_announced_points(path)].append(path)
+    copies = {}
+    for count, group in of_count.items():
+        if count and len(group) > 1:
+            copies |= _copies(group)
+    return copies
+
+
+def _announced_points(path: Path) -> int:
+    """Number of points by the header alone; zero where it can't tell."""
+    if is_foreign(path):
+        return 0 if is_remote(path) else OPENERS[path.suffix.lower()](path).points
+    with open_file(path, is_scattered=True) as file:
+        head = file.read(HEADER_SIZES[-1])
+    if head[:4] != b"LASF" or len(head) < HEADER_SIZES[0]:
+        return 0
+    minor = head[25]
+    if minor < 4:
+        return struct.unpack_from("<I", head, 107)[0]
+    return struct.unpack_from("<Q", head, 247)[0] if len(head) >= HEADER_SIZES[4] else 0
+
+
+def _copies(paths: list[Path]) -> dict[Path, Path]:
+    """Copies among files with one number of points."""
+    points = []
+    for path in paths:
+        with suppress(OSError, ValueError):
+            if not read_in_part(path):
+                points.append(_Points(path, read_layout(path)))
+    boxes = np.array([cloud_box(each.layout) for each in points])
+    steps = np.array([each.layout.scale for each in points])
+    is_first = np.zeros(len(points), bool)
+    copies: dict[Path, Path] = {}
+    for number, each in enumerate(points):
+        limit = (steps + steps[number])[:, None, :]  # both bounds are rounded to their steps
+        is_same = np.isclose(boxes, boxes[number], rtol=0.0, atol=limit, equal_nan=True)
+        candidates = np.flatnonzero(is_first & is_same.all(axis=(1, 2)))
+        first = next((points[i] for i in candidates if each.are_those_of(points[i])), None)
+        if first is None:
+            is_first[number] = True
+        else:
+            copies[each.path] = first.path
+    return copies
+
+
+@dataclass
+class _Points:
+    """The points of a cloud by their times, which are read when they are asked for.
+
+    Parameters
+    ----------
+    path : Path
+    layout : LasLayout
+    """
+
+    path: Path
+    layout: LasLayout
+    _moments: np.ndarray | None = None
+
+    def are_those_of(self, other: "_Points") -> bool:
+        """Whether both clouds hold the same times, in one order or another; not if undecodable."""
+        if self.layout.points != other.layout.points:  # some of an E57 are invalid
+            return False
+        with suppress(OSError, ValueError):
+            return self._have_times_of(other)
+        return False
+
+    def _have_times_of(self, other):
+        places = np.linspace(0, self.layout.points - 1, SETTINGS.sampled_points).astype(np.int64)
+        own, others = (
+            records_at(points.layout, places)["gps_time"] + points.layout.time_offset
+            for points in (self, other)
+        )
+        if _differ_by_system(own - others):
+            return True
+        own, others = self.moments(), other.moments()
+        is_alike = np.abs(own[1:] - others[1:]).max() <= SETTINGS.single_time_step
+        return bool(is_alike) and _differ_by_system(own[:1] - others[:1])
+
+    def moments(self) -> np.ndarray:
+        """First time; last, mean and root mean square (4,) since then, whatever the order."""
+        if self._moments is None:
+            self._moments = _time_moments(self.layout)
+        return self._moments
+
+
+def _time_moments(layout: LasLayout) -> np.ndarray:
+    """First time; last, mean and root mean square (4,) since then of all points. Units: s."""
+    origin = records_at(layout, [0])["gps_time"][0]
+    first, last, count = np.inf, -np.inf, 0
+    total = np.zeros(2)  # of times since the origin, and of their squares
+    for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
+        since = records["gps_time"] - origin
+        since = since[np.isfinite(since)]
+        if not len(since):
+            continue
+        first = min(first, since.min())
+        last = max(last, since.max())
+        total += since.sum(), np.square(since).sum()
+        count += len(since)
+    if not count:
+        raise ValueError(f"{layout.cloud} has points whose times are no numbers.")
+    mean, square = total / count
+    about_first = square - 2.0 * first * mean + first**2
+    start = origin + first + layout.time_offset
+    return np.array([start, last - first, mean - first, np.sqrt(max(about_first, 0.0))])
+
+
+def _differ_by_system(difference: np.ndarray) -> bool:
+    """Whether times differ by nothing, or all by what two time systems differ by. Units: s."""
+    limit = SETTINGS.single_time_step
+    if not np.isfinite(difference).all() or np.ptp(difference) > limit:
+        return False
+    constants = np.array([0.0, ADJUSTMENT, -ADJUSTMENT])
+    remainder = (difference[0] - constants) % WEEK
+    return bool((np.minimum(remainder, WEEK - remainder) <= limit).any())

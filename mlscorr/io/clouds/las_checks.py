@@ -1,0 +1,275 @@
+"""LAS and LAZ files, checked against their bytes before their points are read."""
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import lazrs
+import numpy as np
+from laspy import PointFormat, supported_point_formats
+
+from mlscorr.io.clouds.conversion import converted, is_foreign
+from mlscorr.io.clouds.copc import check_hierarchy
+from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.clouds.las_points import decoding
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.opening import open_file
+from mlscorr.io.store.storage import as_path, file_state, is_there
+
+HEADER_SIZES = (227, 227, 227, 235, 375, 393)  # bytes, of LAS 1.0 to 1.5
+COPC_FORMATS = (6, 7, 8)  # COPC 1.0
+EVLR_HEADER = struct.Struct("<2x16sHQ32s")  # owner, record, length of data, description
+
+
+def read_layout(path: str | Path) -> LasLayout:
+    """LasLayout of a LAS 1.0-1.5 or LAZ file with gps_time, checked; of an E57 or PLY its LAZ's.
+
+    Nothing is allocated by a number that was not checked.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    LasLayout
+
+    Raises
+    ------
+    ValueError
+        When the file is missing, is none of these, has no points or no gps_time, or holds less
+        than its header says.
+    """
+    path = as_path(path)
+    if not is_there(path):
+        raise ValueError(f"There is no file {path}. Check cloud.files in survey.toml.")
+    source = path if is_foreign(path) else None
+    path = converted(path).path if source else path
+    size = file_state(path)[0]
+    if not size:
+        raise ValueError(f"{path} is empty (0 bytes): its copying was interrupted. Copy it anew.")
+    with open_file(path, is_scattered=True) as file:
+        head = file.read(HEADER_SIZES[0])
+        if head[:4] != b"LASF" or len(head) < HEADER_SIZES[0]:
+            raise ValueError(
+                f"{path} is not a LAS or LAZ file (or .e57, .ply), or cut off: it has {size} bytes "
+                f"and begins with {head[:4]!r}; a header alone has {HEADER_SIZES[0]}, from b'LASF'."
+            )
+        start = struct.unpack_from("<I", head, 96)[0]
+        if start > size:
+            raise ValueError(_cut_off(path, f"its points start at byte {start} of {size}"))
+        layout = LasLayout(path, head + file.read(max(0, start - len(head))), size, source)
+        _check_header(layout)
+        points_end = _check_chunks(layout, file) if layout.is_compressed else _check_size(layout)
+        _check_tail(layout, file, points_end)
+    return layout
+
+
+def _cut_off(path, evidence):
+    return f"{path} is cut off: {evidence}. Its writing or copying was interrupted; copy it anew."
+
+
+def _check_header(layout):
+    path, (major, minor) = layout.path, layout.version
+    if major != 1 or minor >= len(HEADER_SIZES):
+        raise ValueError(f"{path} is LAS {major}.{minor}; LAS 1.0 to 1.5 can be read.")
+    if not HEADER_SIZES[minor] <= layout.field("H", 94)[0] <= len(layout.head):
+        raise ValueError(
+            f"{path} is damaged: its header has {layout.field('H', 94)[0]} bytes and its points "
+            f"start at byte {len(layout.head)}; LAS 1.{minor} needs {HEADER_SIZES[minor]}."
+        )
+    number = layout.point_format
+    known = number in supported_point_formats()
+    if known and "gps_time" not in PointFormat(number).dimension_names:
+        raise ValueError(
+            f"{path} has point format {number}, which holds no gps_time, so its points cannot be "
+            "placed on the trajectory. Export it in format 1, 3 or 6 to 10."
+        )
+    if not known or layout.extra_bytes < 0:
+        raise ValueError(
+            f"{path} is damaged: point format {number} with records of {layout.record_length} "
+            "bytes does not exist."
+        )
+    numbers = np.abs([layout.scale, layout.offset])
+    if not ((numbers <= SETTINGS.largest_coordinate).all() and (layout.scale > 0).all()):
+        raise ValueError(
+            f"{path} is damaged: scale {layout.scale} m and offset {layout.offset} m of its "
+            f"coordinates must be numbers up to {SETTINGS.largest_coordinate:g} m, the scale above "
+            "zero. Copy the file anew."
+        )
+    old_points = layout.field("I", 107)[0]  # where LAS up to 1.3 has it, zero where not in use
+    if old_points not in (0, layout.points):
+        raise ValueError(
+            f"{path} is damaged: its header announces {layout.points} points, and "
+            f"{old_points} where older versions have their number. Copy the file anew."
+        )
+    if layout.points == 0:
+        raise ValueError(f"{path} holds 0 points; perhaps its writing was interrupted.")
+    _check_kind(layout)
+
+
+def _check_kind(layout):
+    """That a LAS 1.5 or COPC file is what these may be."""
+    path, number = layout.path, layout.point_format
+    if layout.version >= (1, 5) and number < 6:
+        raise ValueError(
+            f"{path} is damaged: LAS 1.5 has point formats 6 to 10, not {number}. Export it anew."
+        )
+    if layout.has_time_offset and not layout.is_standard:
+        raise ValueError(
+            f"{path} states a time offset, and times in seconds of the week, which have none "
+            "(bits 6 and 0 of its global encoding). Export it anew."
+        )
+    if layout.is_copc and number not in COPC_FORMATS:
+        raise ValueError(
+            f"{path} is damaged: a COPC file has points of formats 6 to 8, not {number}. Write it "
+            "anew: pdal translate IN.copc.laz OUT.laz."
+        )
+
+
+def _check_size(layout):
+    """Byte where uncompressed points end."""
+    start, end = len(layout.head), min(layout.tail, layout.size)
+    whole = (end - start) // layout.record_length
+    if whole < layout.points and end == layout.size:
+        evidence = f"{whole} of the {layout.points} points that its header announces fit into"
+        raise ValueError(_cut_off(layout.path, f"{evidence} its {layout.size} bytes"))
+    if whole != layout.points:
+        raise ValueError(_other_count(layout, whole))
+    return start + layout.points * layout.record_length
+
+
+def _other_count(layout, points):
+    return (
+        f"{layout.path} is damaged: its header announces {layout.points} points, and {points} lie "
+        "in it. Its writing may have been interrupted; export it anew."
+    )
+
+
+def _check_chunks(layout, file):
+    """Byte where compressed points end and the chunk table starts."""
+    path, start = layout.path, len(layout.head)
+    _check_laszip(layout)
+    file.seek(start)
+    table = int.from_bytes(file.read(8), "little", signed=True)
+    if not start + 8 <= table <= layout.size - 8:
+        raise ValueError(
+            _cut_off(path, f"its LAZ chunk table should be at byte {table} of {layout.size}")
+        )
+    file.seek(table + 4)
+    count = int.from_bytes(file.read(4), "little")
+    if not 0 < count * layout.record_length <= table - start:  # a chunk starts with a plain point
+        raise ValueError(
+            f"{path} is damaged: {count} LAZ chunks cannot fit into {table} bytes. Copy it anew."
+        )
+    with decoding(f"{path} is damaged: its LAZ chunks cannot be read"):
+        file.seek(start)
+        chunks = lazrs.read_chunk_table(file, lazrs.LazVlr(layout.laszip))
+        layout.decoder(file, threads=False)
+    while len(chunks) > 1 and chunks[-1] == (0, 0):  # which lazrs adds where chunks differ in size
+        chunks.pop()
+    if (used := sum(length for _, length in chunks)) > table - start:
+        raise ValueError(
+            f"{path} is damaged: LAZ chunks of {used} bytes do not lie in {table - start} bytes. "
+            "Copy it anew."
+        )
+    _check_chunk_points(layout, [points for points, _ in chunks])
+    if layout.point_format >= 6:  # chunks of layers say behind their first point how many they are
+        file.seek(start + 8 + used - chunks[-1][1] + layout.record_length)
+        whole = sum(points for points, _ in chunks[:-1])
+        whole += int.from_bytes(file.read(4), "little")
+        if whole != layout.points:
+            raise ValueError(_other_count(layout, whole))
+    if layout.is_copc:
+        check_hierarchy(layout, file, chunks)
+    return table
+
+
+def _check_chunk_points(layout, points):
+    """That chunks of these points (the last may hold fewer) hold the file's, and fit memory."""
+    path, whole, longest = layout.path, sum(points), max(points)
+    if whole < layout.points:
+        evidence = f"its LAZ chunks hold at most {whole} of the {layout.points} points"
+        raise ValueError(_cut_off(path, f"{evidence} that its header announces"))
+    if longest > SETTINGS.largest_chunk:
+        raise ValueError(
+            f"{path} is compressed in chunks of {longest} points (limit "
+            f"{SETTINGS.largest_chunk}), which do not fit into memory. Compress it anew: "
+            "pdal translate IN.laz OUT.laz."
+        )
+    if whole - points[-1] >= layout.points:
+        raise ValueError(_other_count(layout, f"more than {whole - points[-1]}"))
+
+
+def _check_laszip(layout):
+    """That the LASzip VLR describes the points of the header, in a way that lazrs knows."""
+    path, data = layout.path, layout.laszip
+    expected = lazrs.LazVlr.new_for_compression(layout.point_format, layout.extra_bytes)
+    if int.from_bytes(data[:2], "little") == 1:
+        raise ValueError(
+            f"{path} is compressed point by point (LASzip's compressor 1, before "
+            "2011), without the chunks that lazrs reads. Compress it anew: laszip -i IN.laz -o "
+            "OUT.laz, or pdal translate IN.laz OUT.laz."
+        )
+    items, known = (_items(vlr) for vlr in (data, bytes(expected.record_data())))
+    if items != known:
+        raise ValueError(
+            f"{path} is damaged: its LASzip VLR describes other points than format "
+            f"{layout.point_format} with {layout.record_length} bytes a point. Copy it anew."
+        )
+
+
+def _items(laszip):
+    """Number of items in a LASzip VLR, and kind and length of each; their versions left out."""
+    count, rows = laszip[32:34], laszip[34:]
+    return count, [row[:2] for row in struct.iter_unpack("<HHH", rows[: len(rows) // 6 * 6])]
+
+
+def _check_tail(layout, file, points_end):
+    """That EVLRs and waveforms lie between the points and the end of the file."""
+    path, size = layout.path, layout.size
+    if not points_end <= layout.tail <= size:
+        raise ValueError(
+            _cut_off(path, f"data behind the points should be at byte {layout.tail} of {size}")
+        )
+    for number, (position, length) in enumerate(evlrs(layout, file)):
+        if position + length > size:
+            announced = f"{number} of its {layout.field('I', 243)[0]} EVLRs"
+            raise ValueError(_cut_off(path, f"{announced} fit into its {size} bytes"))
+
+
+def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
+    """Position and size of each EVLR. Units: bytes.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    file : binary file
+    """
+    position, count = layout.field("QI", 235) if layout.version >= (1, 4) else (0, 0)
+    for _ in range(count):
+        file.seek(min(position, layout.size))  # of a damaged file it may lie anywhere
+        header = file.read(EVLR_HEADER.size)
+        size = EVLR_HEADER.size + int.from_bytes(header[20:28], "little")
+        yield position, size
+        position += size
+
+
+def variable_records(layout: LasLayout, user: bytes, record: int) -> list[bytes]:
+    """Data of the VLRs and EVLRs of a user and a record.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    user : bytes
+    record : int
+    """
+    data = list(layout.vlr_data(user, record))
+    with open_file(layout.path, is_scattered=True) as file:
+        for position, size in evlrs(layout, file):
+            file.seek(position)
+            owner = EVLR_HEADER.unpack(file.read(EVLR_HEADER.size))
+            if (owner[0].split(b"\0")[0], owner[1]) == (user, record):
+                data.append(file.read(size - EVLR_HEADER.size))
+    return data

@@ -1,0 +1,218 @@
+"""Corrected copies of LAS and LAZ files, in which only what a correction changes is new."""
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.correction.pair import require_fit
+from mlscorr.correction.point_sigma import PointSigma
+from mlscorr.io.clouds.copc_writer import CopcWriter
+from mlscorr.io.clouds.extra_bytes import add_sigma_fields, with_sigmas
+from mlscorr.io.clouds.las import read_records, records_at
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.clouds.las_output import LasOutput, PlainWriter
+from mlscorr.io.clouds.las_writer import INTEGER_LIMIT
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.opening import open_file
+from mlscorr.io.store.output import PART, output_file
+from mlscorr.io.store.storage import is_remote
+from mlscorr.io.trajectories.time_systems import PLACEHOLDERS
+from mlscorr.survey import CloudFile, Correcting, PointCloud
+
+
+@dataclass(frozen=True)
+class CorrectedPart:
+    """Points of a file, and how they are corrected.
+
+    Parameters
+    ----------
+    file : CloudFile
+        All of the file, or those of one of several scanners or drives.
+    correction : Correction, or anything else with ``apply(cloud) -> cloud``
+    sigma : PointSigma, optional
+        Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
+    watch : function, optional
+        Called for each chunk that is done with the gps_time (n,) in the trajectory's system, and
+        with which points are flagged as noise (n,).
+    """
+
+    file: CloudFile
+    correction: Correcting
+    sigma: PointSigma | None = None
+    watch: Callable[[np.ndarray, np.ndarray], object] | None = None
+
+    def move(self, layout: LasLayout, records: np.ndarray, sigmas: np.ndarray | None) -> int:
+        """Correct its points among records in place; returns those outside the trajectory.
+
+        Parameters
+        ----------
+        layout : LasLayout
+        records : (n,) structured array
+        sigmas : (n, 3) array, optional
+            Those of its points are filled in. Units: m.
+        """
+        rows = self.file.rows(records["point_source_id"])
+        some = records[rows]
+        xyz = [some[name] for name in "XYZ"]
+        times = self.file.counted(some["gps_time"])
+        scaled = layout.scale, layout.offset, times, self.file.time_constant
+        shift = getattr(self.correction, "shift_integers", None)
+        try:
+            outside = (shift or partial(_shift_integers, self.correction))(xyz, *scaled)
+        except ValueError as error:
+            raise ValueError(f"{layout.path}: {error}") from None
+        if sigmas is not None and self.sigma is not None:
+            sigmas[rows] = self.sigma.of_integers(xyz, *scaled)
+        if not isinstance(rows, slice):  # which is a view
+            records[rows] = some
+        if self.watch is not None and len(some):
+            is_noise = layout.is_noise(some, self.file.noise_classes)
+            self.watch(times + self.file.time_constant, is_noise)
+        return outside
+
+
+def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]:
+    """Copy a file with corrected coordinates; all else stays as it was, byte for byte.
+
+    What changes: X, Y, Z of each point, the bounds in the header, and where it must, the
+    position of what follows the points. The target's suffix says whether it is compressed. It
+    appears whole or not at all: it is written beside its place as ``.part``, and read again
+    before it takes its name. A file there is replaced.
+
+    Parameters
+    ----------
+    parts : sequence of CorrectedPart
+        Of one file, whose points several scanners may have measured; with sigmas, or without.
+    target : path
+        ``.las`` or ``.laz``, not the input.
+
+    Returns
+    -------
+    list of int
+        Number of points of each outside the trajectory, which are unchanged.
+
+    Raises
+    ------
+    ValueError
+        For bad input, a target that is the input, coordinates that overflow, and LAZ files with
+        waveforms (formats 9 and 10) of several scanner channels, which lazrs would damage.
+    OSError
+        When the target cannot be written.
+    """
+    layout, target = read_layout(parts[0].file.path), Path(target)
+    _check_target(layout.path, target)
+    corrected = _Corrected(layout, target, parts)
+    with output_file(target) as copy:
+        with LasOutput(copy) as output, open_file(layout.path) as file:
+            if layout.is_copc and corrected.is_laz:
+                writer = CopcWriter(corrected.written, output, copy.parent)
+            else:
+                writer = PlainWriter(corrected.written, output, corrected.is_laz)
+            writer.write(corrected.blocks, file)
+            output.complete(writer.head, corrected.bounds * layout.scale + layout.offset)
+        _check_copy(layout, copy)
+    for value, count in corrected.untimed.items():
+        is_number = np.isfinite(value)
+        if not count or (is_number and count > corrected.outside.sum()):  # a time of the drive
+            continue
+        what = f"of {value:.15g} s" if is_number else "that is not a number"
+        warnings.warn(
+            f"{count} of {layout.points} points of {layout.path} have a gps_time {what}. They "
+            "can't be placed on the trajectory: nothing that goes by time moves them.",
+            stacklevel=3,
+        )
+    return corrected.outside.tolist()
+
+
+class _Corrected:
+    """The records of a file after their correction, and what was counted while they passed.
+
+    Attributes
+    ----------
+    written : LasLayout
+        Of the corrected records.
+    outside : (k,) int array
+        Number of points of each part outside the trajectory.
+    untimed : dict
+        Number of points by what stands in place of a time: a number (s), or NaN for none.
+    bounds : (2, 3) array
+        Largest and smallest integers of the coordinates.
+    """
+
+    def __init__(self, layout, target, parts):
+        self._layout, self._target, self._parts = layout, target, parts
+        self.is_laz = target.suffix.lower() == ".laz"
+        self._has_sigmas = parts[0].sigma is not None
+        self.written = add_sigma_fields(layout) if self._has_sigmas else layout
+
+    def blocks(self, is_final):
+        """All records, (n,) at a time, as bytes of each; those who watch are told the last time."""
+        layout, has_sigmas = self._layout, self._has_sigmas
+        parts = self._parts if is_final else [replace(part, watch=None) for part in self._parts]
+        self.outside = np.zeros(len(parts), int)
+        self.untimed = dict.fromkeys((np.nan, *PLACEHOLDERS), 0)
+        self.bounds = np.array([np.full(3, -np.inf), np.full(3, np.inf)])
+        for records in read_records(layout, SETTINGS.chunk_points):
+            _check_channels(layout, self._target, records)
+            sigmas = np.full((len(records), 3), np.nan) if has_sigmas else None
+            self.outside += [part.move(layout, records, sigmas) for part in parts]
+            times = records["gps_time"]
+            self.untimed[np.nan] += np.count_nonzero(~np.isfinite(times))
+            for time in PLACEHOLDERS:
+                self.untimed[time] += np.count_nonzero(times == time)
+            xyz = [records[name] for name in "XYZ"]
+            self.bounds[0] = np.maximum(self.bounds[0], [values.max() for values in xyz])
+            self.bounds[1] = np.minimum(self.bounds[1], [values.min() for values in xyz])
+            raw = records.view(np.uint8) if sigmas is None else with_sigmas(records, sigmas)
+            yield raw.view(f"V{self.written.record_length}")
+
+
+def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
+    """Correction.shift_integers for what has only ``apply``; no point lies outside of that."""
+    old = np.column_stack(xyz)
+    places = old * scale + offset
+    cloud = PointCloud(places, gps_time + time_constant, np.zeros(len(gps_time)))
+    new = old + np.rint((correction.apply(cloud).xyz - places) / scale)
+    overflow = int((np.abs(new) > INTEGER_LIMIT).any(axis=1).sum())
+    require_fit(overflow, scale, offset)
+    for values, corrected in zip(xyz, new.T, strict=True):
+        values[:] = corrected
+    return 0
+
+
+def _check_channels(layout, target, records):
+    """That lazrs keeps the waveforms: it mixes them up where scanner channels alternate."""
+    is_laz = layout.is_compressed or target.suffix.lower() == ".laz"
+    if not is_laz or layout.point_format not in (9, 10):
+        return
+    channel = records.view(np.uint8).reshape(len(records), -1)[:, 15] >> 4 & 3
+    if np.ptp(channel):
+        raise ValueError(
+            f"{layout.path} has waveforms (point format {layout.point_format}) of "
+            f"{len(np.unique(channel))} scanner channels, which lazrs does not compress without "
+            "loss. Use LAS for input and output, or one file for each channel."
+        )
+
+
+def _check_target(source, target):
+    if target.suffix.lower() not in (".las", ".laz"):
+        raise ValueError(f"The corrected file {target} must end in .las or .laz.")
+    for path in (target, target.with_name(target.name + PART)):
+        if path.exists() and not is_remote(source) and path.samefile(source):
+            raise ValueError(
+                f"The corrected file {path} is the input itself, which would be lost. Choose "
+                "another output folder."
+            )
+
+
+def _check_copy(layout, part):
+    """That the file just written can be opened and holds the points, up to the last."""
+    copy = read_layout(part)
+    records_at(copy, [copy.points - 1])
+    if copy.points != layout.points:
+        raise OSError(f"{part} was written with {copy.points} of {layout.points} points.")

@@ -1,0 +1,133 @@
+"""The CRS that a LAS or LAZ file states in its VLRs, and whether it is that of the survey."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+
+import numpy as np
+from pyproj import CRS, Transformer
+from pyproj.exceptions import CRSError, ProjError
+
+from mlscorr.io.clouds.las_checks import variable_records
+from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.trajectories.projection import crs_name
+
+OWNER, WKT, GEO_KEYS = b"LASF_Projection", 2112, 34735  # LAS 1.4 R15, section 3
+PROJECTED, GEOGRAPHIC, VERTICAL = 3072, 2048, 4096  # keys of GeoTIFF 1.1
+UNITS_OF_LENGTH = (3076, 4099)  # keys, in plan and of heights
+FEET = {9002: "feet", 9003: "US survey feet"}  # their values
+
+
+def stated_crs(layout: LasLayout) -> CRS | None:
+    """The CRS of a file's VLRs, as WKT or as EPSG codes.
+
+    Parameters
+    ----------
+    layout : LasLayout
+
+    Returns
+    -------
+    pyproj.CRS or None
+        None where no VLR states one, or PROJ doesn't know it.
+    """
+    words = [
+        data.split(b"\0")[0].decode("utf-8", "replace")
+        for data in variable_records(layout, OWNER, WKT)
+    ]
+    code = _code(_geo_keys(layout))
+    for text in filter(None, [*words, code] if layout.states_wkt else [code, *words]):
+        try:
+            with warnings.catch_warnings(action="ignore"):  # of codes that PROJ replaces
+                return CRS.from_user_input(text)
+        except CRSError:
+            continue
+    return None
+
+
+def _geo_keys(layout):
+    """Values of the GeoKeys that are codes, by key."""
+    data = b"".join(layout.vlr_data(OWNER, GEO_KEYS))
+    rows = struct.iter_unpack("<4H", data[8 : len(data) // 8 * 8])
+    return {key: value for key, at, _, value in rows if at == 0}
+
+
+def _code(keys):
+    """EPSG code (with that of heights) of GeoKeys, empty without one."""
+    plan, heights = (
+        next((keys[name] for name in names if 1024 <= keys.get(name, 0) < 32767), 0)
+        for names in ((PROJECTED, GEOGRAPHIC), (VERTICAL,))
+    )  # beyond are those that a user defined
+    if plan == 0:
+        return ""
+    return f"EPSG:{plan}+{heights}" if heights else f"EPSG:{plan}"
+
+
+def crs_conflict(layout: LasLayout, crs: str) -> str:
+    """A sentence where a file's own CRS is not that of the survey; empty where it is, or none.
+
+    What counts is where the file's middle lies: two names of one CRS are no conflict.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    crs : str
+        Of survey.toml; one that can be used.
+    """
+    stated, survey_crs = stated_crs(layout), CRS.from_user_input(crs)
+    if stated is None:
+        return ""
+    what = _other_units(layout, stated) or _other_place(layout, stated, survey_crs)
+    what = what or _other_heights(stated, survey_crs)
+    if not what:
+        return ""
+    return (
+        f"The VLRs of {layout.cloud.name} state {crs_name(stated)}, crs of survey.toml is "
+        f"{crs_name(survey_crs)}: {what}. Set crs to that of the cloud, or bring the cloud into it."
+    )
+
+
+def _other_units(layout, stated):
+    """Words on coordinates that are not in metres, whatever the unit that their CRS has."""
+    keys = {} if layout.states_wkt else _geo_keys(layout)
+    units = [FEET[keys[key]] for key in UNITS_OF_LENGTH if keys.get(key) in FEET]
+    units += [axis.unit_name for axis in stated.axis_info if axis.unit_name != "metre"]
+    return f"the cloud is in {units[0]}, and a correction needs metres" if units else ""
+
+
+def _other_place(layout, stated, survey_crs):
+    """Words on how far apart the middle of a cloud lies by two CRS."""
+    if stated.to_2d().to_epsg() == survey_crs.to_2d().to_epsg() is not None:
+        return ""
+    middle = cloud_box(layout).mean(axis=0)[:2]
+    try:
+        transformer = Transformer.from_crs(stated.to_2d(), survey_crs.to_2d(), always_xy=True)
+        apart = float(np.hypot(*np.subtract(transformer.transform(*middle), middle)))
+    except ProjError:
+        apart = np.inf
+    if apart <= SETTINGS.same_place:
+        return ""
+    length = f"{apart / 1e3:.1f} km" if apart >= 1e3 else f"{apart:.2f} m"
+    if not np.isfinite(apart):
+        return "one has no place for the cloud's middle"
+    return f"by the two the cloud's middle lies in places {length} apart"
+
+
+def _other_heights(stated, survey_crs):
+    """Words on two systems of heights."""
+    if not (stated.is_compound and survey_crs.is_compound):
+        return ""
+    first, second = (crs.sub_crs_list[1] for crs in (stated, survey_crs))
+    same = first.to_epsg() == second.to_epsg() if first.to_epsg() else first.name == second.name
+    return "" if same else "heights are of two systems"
+
+
+def cloud_box(layout: LasLayout) -> np.ndarray:
+    """Corners (2, 3) of the box that a file's header states, the lowest first. Units: m.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    """
+    return np.array(layout.field("6d", 179)).reshape(3, 2).T[::-1]

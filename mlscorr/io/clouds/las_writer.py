@@ -1,0 +1,164 @@
+"""Writing points as LAS or LAZ 1.4, format 6 or 7, block by block."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import date
+from pathlib import Path
+
+import laspy
+import lazrs
+import numpy as np
+from pyproj import CRS
+
+from mlscorr.io.store.output import output_file
+from mlscorr.survey import PointCloud
+
+SCAN_ANGLE_UNIT = 0.006  # deg, LAS 1.4 specification, formats 6 to 10
+INTEGER_LIMIT = np.iinfo(np.int32).max  # of coordinates
+
+
+@contextmanager
+def cloud_writer(
+    path: str | Path, corner: np.ndarray, crs: str | None = None, scale: float = 0.001,
+    created: date | None = None, is_standard: bool = False, has_colours: bool = False,
+) -> Iterator[CloudWriter]:  # fmt: skip
+    """A CloudWriter for one new LAS or LAZ file, which appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path ending in ``.las`` or ``.laz``
+    corner : (3,) array
+        A place near the cloud, from which its integers count. Units: m.
+    crs : str, optional
+        What pyproj understands, such as ``EPSG:32650``; written as WKT.
+    scale : float
+        Resolution of the stored coordinates. Units: m.
+    created : date, optional
+        Date in the header, today if not given.
+    is_standard : bool
+        Whether times are adjusted standard GPS time, not seconds of the GPS week.
+    has_colours : bool
+        Whether points have colours: format 7.
+
+    Yields
+    ------
+    CloudWriter
+
+    Raises
+    ------
+    ValueError
+        When no points were written.
+    OSError
+        When the disk refuses.
+    """
+    path = Path(path)
+    header = _header(corner, crs, scale, created, 7 if has_colours else 6)
+    if is_standard:
+        header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
+    compress = path.suffix.lower() == ".laz"
+    try:
+        with output_file(path) as part, open(part, "wb") as stream:
+            with laspy.open(
+                stream, mode="w", header=header, do_compress=compress, closefd=False
+            ) as las:
+                writer = CloudWriter(las)
+                yield writer
+                if writer.points == 0:
+                    raise ValueError(f"{path.name} would hold no points.")
+            stream.flush()
+            os.fsync(stream.fileno())
+    except lazrs.LazrsError as error:
+        raise OSError(f"{path} can't be written: {error}") from error
+
+
+class CloudWriter:
+    """Appends points to an open file; ``points`` counts them.
+
+    Parameters
+    ----------
+    las : laspy.LasWriter
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np
+    >>> from mlscorr.survey import PointCloud
+    >>> xyz = np.array([[532_000.0, 3_374_000.0, 42.0]])
+    >>> cloud = PointCloud(xyz, np.array([357_700.0]), np.array([1000]))
+    >>> with cloud_writer(tempfile.mkdtemp() + "/one.laz", xyz[0]) as writer:
+    ...     writer.write(cloud)
+    """
+
+    def __init__(self, las: laspy.LasWriter) -> None:
+        self._las = las
+        self.points = 0
+
+    def write(
+        self, cloud: PointCloud, scan_angle: np.ndarray | None = None,
+        return_number: np.ndarray | int = 1, number_of_returns: np.ndarray | int = 1,
+        colours: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
+        """Append a PointCloud.
+
+        Parameters
+        ----------
+        cloud : PointCloud
+            xyz (n, 3) in m, gps_time (n,) in s, intensity (n,) from 0 to 65535.
+        scan_angle : (n,) array, optional
+            From -180 to 180. Units: deg.
+        return_number, number_of_returns : (n,) int array
+        colours : (n, 3) array, optional
+            Red, green and blue from 0 to 65535.
+
+        Raises
+        ------
+        ValueError
+            Where a coordinate is not a number or does not fit the scale.
+        """
+        if len(cloud) == 0:
+            return
+        header = self._las.header
+        _check(cloud.xyz, header)
+        record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
+        record.x, record.y, record.z = cloud.xyz.T
+        record.gps_time = cloud.gps_time
+        record.intensity = cloud.intensity
+        record.return_number[:] = return_number
+        record.number_of_returns[:] = number_of_returns
+        if scan_angle is not None:
+            record.scan_angle = np.rint(scan_angle / SCAN_ANGLE_UNIT).astype(np.int16)
+        if colours is not None:
+            record.red, record.green, record.blue = np.asarray(colours, np.uint16).T
+        self._las.write_points(record)
+        self.points += len(cloud)
+
+
+def _check(xyz, header):
+    """That coordinates are numbers and fit 32 bit integers."""
+    bad = int((~np.isfinite(xyz)).any(axis=1).sum())
+    if bad:
+        raise ValueError(f"{bad} of {len(xyz)} points have a coordinate that is not a number.")
+    scale = header.scales[0]
+    distance = float(np.abs(xyz - header.offsets).max())
+    if distance / scale > INTEGER_LIMIT:
+        raise ValueError(
+            f"A point lies {distance:.0f} m from the cloud's corner; at a scale of {scale} m a "
+            f"LAS file holds {INTEGER_LIMIT * scale:.0f} m. Choose a coarser scale."
+        )
+
+
+def _header(corner, crs, scale, created, point_format):
+    """LAS header whose offset is the corner in whole metres."""
+    header = laspy.LasHeader(point_format=point_format, version="1.4")
+    header.scales = np.full(3, scale)
+    header.offsets = np.floor(corner)
+    header.generating_software = "mlscorr"
+    header.creation_date = created or date.today()
+    header.global_encoding.gps_time_type = laspy.header.GpsTimeType.WEEK_TIME
+    if crs is not None:
+        wkt = CRS.from_user_input(crs).to_wkt("WKT1_GDAL")  # LAS 1.4 asks for WKT 1
+        header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
+        header.global_encoding.wkt = True
+    return header

@@ -1,0 +1,185 @@
+"""TOML files read into pydantic models, with one sentence on each thing that is wrong in them."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+)
+
+from mlscorr.io.store.open_places import check_answered
+from mlscorr.io.store.opening import read_bytes
+from mlscorr.io.store.storage import as_path, is_folder, is_there
+from mlscorr.io.store.text_files import ENCODING, nearest, shown, warn_of_cut
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+# The same known keys as those that the next sentence names
+REPEATED = re.compile(r"; known are ([^.]+)\.(?= \S+ is an unknown key; known are \1\.)")
+
+
+class TomlSection(BaseModel):
+    """A part of a TOML file: no unknown keys, no numbers as text."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
+    """The document of a TOML file as a pydantic model; no other file is opened.
+
+    Parameters
+    ----------
+    path : path
+    model : class of pydantic
+    kind : str
+        What the file is, in words.
+
+    Returns
+    -------
+    model
+
+    Raises
+    ------
+    ValueError
+        Names the line of bad TOML, or every key that is unknown (with the nearest known one),
+        missing, or of a value that can't be used.
+    FileNotFoundError
+        Where there is no such file.
+    """
+    path = as_path(path)
+    if not is_there(path):
+        what = "is a folder" if is_folder(path) else "does not exist"
+        raise FileNotFoundError(f"{path} {what}; {kind} is a TOML file.")
+    try:
+        document = tomllib.loads(read_bytes(path).decode(ENCODING))
+    except UnicodeDecodeError:
+        raise ValueError(
+            f"{path} is not a text file in UTF-8; a TOML file is expected. Save it in UTF-8, or "
+            "let `mlscorr init FOLDER` write that of a survey."
+        ) from None
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(
+            f"{path} is not valid TOML: {error}. Text and paths stand in quotation marks, paths "
+            "with / for each backslash, and decimals have points."
+        ) from None
+    except (RecursionError, ValueError):
+        raise ValueError(
+            f"{path} can't be read: brackets are nested too deep, or a number has too many digits."
+        ) from None
+    check_answered(path, document)
+    validated = validate(str(path), document, model)
+    warn_of_cut(path)
+    return validated
+
+
+def validate(source: str, document: dict[str, Any], model: type[Model]) -> Model:
+    """A document as a pydantic model.
+
+    Parameters
+    ----------
+    source : str
+        Where it is from, in words.
+    document : dict
+    model : class of pydantic
+
+    Raises
+    ------
+    ValueError
+        As read_toml.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        sentences = " ".join(_sentence(item, model) for item in _causes(error.errors()))
+        raise ValueError(f"{source}: {REPEATED.sub('.', sentences)}") from None
+
+
+def _causes(items):
+    """Pydantic's findings without those on a list or section that follow from its own items."""
+
+    def follows(item):
+        depth = len(item["loc"])
+        return any(o["loc"][:depth] == item["loc"] and len(o["loc"]) > depth for o in items)
+
+    return [item for item in items if not follows(item)]
+
+
+def _sentence(item, model):
+    """One sentence on one of pydantic's findings, with the dotted key."""
+    key = ".".join(filter(str.strip, map(str, item["loc"])))
+    if item["type"] == "extra_forbidden":
+        name = ".".join(part for part in item["loc"] if isinstance(part, str) and part.strip())
+        keys = _keys(model)
+        near, tail = nearest(name, keys), name.rpartition(".")[2]
+        if "." in name and tail in keys and not _sections(model.model_fields[tail].annotation):
+            return f"{shown(key)} is an unknown key; {tail} stands above the first [section]."
+        if near == name:
+            section = name.split(".")[0]
+            return f"{key} is a key of one of several: write [[{section}]], not [{section}]."
+        if near is None:  # nothing is like it: what stands beside it
+            path = name.rpartition(".")[0]
+            known = [k.rpartition(".")[2] for k in keys if k.rpartition(".")[0] == path]
+            return f"{shown(key)} is an unknown key; known are {', '.join(known)}."
+        return f"{shown(key)} is an unknown key; the nearest known one is {near}."
+    if item["type"] == "missing":
+        return f"{key} is missing."
+    if item["type"] == "value_error":  # raised by a validator of ours, a sentence already
+        message = str(item["ctx"]["error"]).rstrip(".")
+        return f"{key}: {message}." if key else f"{message}."
+    if item["type"] in ("tuple_type", "list_type") and isinstance(item["input"], dict):
+        return f"{key} is a list of sections; write [[{key}]], not [{key}]."
+    message = item["msg"].replace("valid string", "valid string in quotation marks")
+    message = re.sub(r"valid dictionary or instance of \w+", "section, in brackets", message)
+    message = re.sub("(Input|List|Tuple) should", "it should", message)
+    message = message.replace(" after validation", "")
+    return f"{key} = {shown(repr(item['input']))} can't be used: {message[0].lower()}{message[1:]}."
+
+
+def _keys(model, prefix=""):
+    """Every dotted key of a model, sections included."""
+    keys = []
+    for name, field in model.model_fields.items():
+        keys.append(prefix + name)
+        for section in _sections(field.annotation):
+            keys += _keys(section, f"{prefix}{name}.")
+    return keys
+
+
+def _sections(annotation):
+    """Models among the types of an annotation, those of lists and alternatives too."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [section for part in get_args(annotation) for section in _sections(part)]
+
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+
+
+Coordinate = Annotated[float, Field(allow_inf_nan=False)]
+
+
+Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
+
+
+Three = Field(min_length=3, max_length=3)
+
+
+Six = Field(min_length=6, max_length=6)
+
+
+Column = Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=1)] | None
+
+
+PointSource = Annotated[int, Field(ge=0, le=65535)]  # 16 bits of a LAS point
+
+
+Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]

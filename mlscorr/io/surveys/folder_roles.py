@@ -1,0 +1,155 @@
+"""What the files of a folder are, by their content: clouds, trajectories, control, meshes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds.ply import announced_faces
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.patterns import folders_below
+from mlscorr.io.tables.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings, listed
+from mlscorr.io.tables.control_lists import lacking, unnamed_columns
+from mlscorr.io.tables.layout_search import NUMBER, find_layout, likely_header
+from mlscorr.io.trajectories.conventions import QUATERNION
+from mlscorr.io.trajectories.pof import POF_SUFFIX, POQ_SUFFIX
+from mlscorr.io.trajectories.positions import POSITION_SUFFIX, position_file
+from mlscorr.io.trajectories.sbet import SBET_FIELDS, SMRMSG_FIELDS
+from mlscorr.io.trajectories.time_systems import count_on
+from mlscorr.io.trajectories.trajectory_tables import COLUMNS, tum_columns
+
+Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
+CLOUDS = (".las", ".laz", ".e57")
+MESHES = (".ply",)
+TABLES = (".csv", ".txt", ".xlsx", ".asc", ".dat", ".tsv")
+OTHER_WORKBOOKS = (".xls", ".ods")
+TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx", POSITION_SUFFIX)
+RECORDS = (".out", ".smrmsg", ".bin")
+RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json")
+SIMULATED = "a simulated survey, which is one by itself"
+LEFT_OUT = {"truth.json": SIMULATED, **dict.fromkeys(RESULTS, "results of a run")}
+
+
+@dataclass(frozen=True)
+class FileRole:
+    """What a file is for a survey, and why.
+
+    Parameters
+    ----------
+    path : Path
+    role : str
+        What its content looks like; ``table`` for one of another content.
+    reason : str
+    """
+
+    path: Path
+    role: Role
+    reason: str
+
+
+def sort_files(folder: Path) -> list[FileRole]:
+    """Roles of the files in a folder and in those within it that hold no results or other survey.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    list of FileRole
+    """
+    left_out: list[FileRole] = []
+
+    def is_wanted(place):
+        reasons = [reason for name, reason in LEFT_OUT.items() if (place / name).exists()]
+        left_out.extend(FileRole(place, "none", reason) for reason in reasons[:1])
+        return not reasons
+
+    places = list(folders_below(folder, SETTINGS.folder_depth, is_wanted))
+    files = [path for place in places for path in sorted(place.iterdir()) if path.is_file()]
+    roles = [_role(path) for path in files if path.name[0] not in ".~" and path.suffix != ".toml"]
+    return roles + left_out
+
+
+def _role(path) -> FileRole:
+    """What one file is by its suffix and its first bytes."""
+    suffix = path.suffix.lower()
+    if suffix in CLOUDS:
+        return _cloud(path)
+    if suffix in MESHES:
+        return FileRole(path, "reference", "a mesh") if announced_faces(path) else _cloud(path)
+    if suffix in TRAJECTORIES:
+        return FileRole(path, "trajectory", f"its suffix is {path.suffix}")
+    if suffix == POQ_SUFFIX:
+        return FileRole(path, "accuracy", f"its suffix is {path.suffix}")
+    if suffix in TABLES:
+        return FileRole(path, *_table(path))
+    if suffix in RECORDS:
+        return next(_records(path), FileRole(path, "none", "no whole records of SBET or smrmsg"))
+    if suffix in OTHER_WORKBOOKS:
+        return FileRole(path, "table", "a workbook that is read once it is saved as .xlsx")
+    return FileRole(path, "none", "nothing that a survey.toml names")
+
+
+def _cloud(path):
+    """A cloud, or none with what is wrong in it."""
+    try:
+        layout = read_layout(path)
+    except ValueError as error:
+        return FileRole(path, "none", str(error))
+    return FileRole(path, "cloud", f"{layout.points} points in format {layout.point_format}")
+
+
+def _records(path) -> Iterator[FileRole]:
+    """What a headerless file of float64 may be, whole or cut off: its times and angles tell."""
+    size, sbet = path.stat().st_size, 8 * len(SBET_FIELDS)
+    if not size % sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):
+        yield FileRole(path, "trajectory", "whole SBET records with increasing times")
+    if not size % (8 * len(SMRMSG_FIELDS)) and _is_timed(path, SMRMSG_FIELDS, np.inf):
+        yield FileRole(path, "accuracy", "whole smrmsg records with increasing times")
+    if size > 2 * sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):  # its reader says the rest
+        yield FileRole(path, "trajectory", "SBET records with increasing times, cut off")
+
+
+def _is_timed(path, fields, limit):
+    """Whether a file starts with records whose times increase, and whose places are in a limit."""
+    values = np.fromfile(path, "<f8", 100 * len(fields))
+    table = values[: len(values) // len(fields) * len(fields)].reshape(-1, len(fields))
+    if not len(table) or not np.isfinite(table).all():
+        return False
+    is_timed = (np.diff(count_on(table[:, 0])[0]) > 0).all()
+    return bool(is_timed and np.abs(table[:, 1:3]).max() <= limit)
+
+
+def _table(path) -> tuple[Role, str]:
+    """Role of a table by the names of its columns, or by numbers without names."""
+    header = likely_header(path, TRAJECTORY_NAMES)
+    driven = set(find_meanings(header, TRAJECTORY_NAMES))
+    is_oriented = len(driven & {"roll", "pitch", "heading"}) > 1 or set(QUATERNION) <= driven
+    if is_oriented or ("gps_time" in driven and position_file(path)):  # its reader says what lacks
+        return "trajectory", f"columns {', '.join(sorted(driven))}"
+    if find_layout(path, {}, lambda _: ["gps_time"], {}, tum_columns) is not None:
+        return "trajectory", "rows of eight numbers, as time, place and quaternion"
+    if find_layout(path, {}, lambda _: ["gps_time"], {}, _unnamed_epoch) is not None:
+        return "table", "rows of numbers without names of columns, as of a trajectory"
+    header = likely_header(path, CONTROL_NAMES)
+    surveyed = set(find_meanings(header, CONTROL_NAMES))
+    if "name" in surveyed and ({"easting", "northing"} <= surveyed or {"x", "y"} <= surveyed):
+        return "control", f"columns {', '.join(sorted(surveyed))}"
+    try:  # in other encodings, or without names
+        if find_layout(path, CONTROL_NAMES, lacking, {}, unnamed_columns) is not None:
+            return "control", "rows of a name and three coordinates"
+    except ValueError as error:  # has the columns, and is not clear
+        return "control", str(error)
+    if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):
+        return "table", f"its columns are {listed(header)}"
+    return "none", "no table of places"
+
+
+def _unnamed_epoch(cells):
+    """The column of times in a row of numbers alone, as many as an epoch has, with parts of s."""
+    is_epoch = len(cells) >= len(COLUMNS) and all(map(NUMBER.fullmatch, cells))
+    return {"gps_time": 0} if is_epoch and not cells[0].isdecimal() else {}

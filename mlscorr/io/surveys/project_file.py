@@ -1,0 +1,306 @@
+"""project.toml: several drives, one control list, and what is believed of all of them."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.io.clouds.copies import find_copies
+from mlscorr.io.store.inputs import input_file
+from mlscorr.io.store.opening import read_bytes
+from mlscorr.io.store.storage import as_path, beside, is_folder, is_there, resolved
+from mlscorr.io.store.toml_file import read_toml
+from mlscorr.io.surveys.project_sections import ProjectFile
+from mlscorr.io.surveys.survey_file import SurveyParts, read_parts, read_survey_file, survey_toml
+from mlscorr.io.surveys.survey_paths import (
+    SurveyPaths,
+    check_distinct,
+    existing,
+    files_of,
+    matching,
+)
+from mlscorr.io.surveys.survey_sections import CloudSection, SurveyFile
+from mlscorr.io.tables.control import NOTHING_SURVEYED, read_surveyed
+from mlscorr.io.trajectories.projection import check_crs
+from mlscorr.io.trajectories.trajectory_sessions import check_systems
+from mlscorr.survey import ControlPoints, InputFile, Trajectory
+
+FILE_NAME = "project.toml"
+BELIEFS = ("pos", "matching", "ties")  # sections that hold for all drives
+SHARED = ("mounting", "scanner", *BELIEFS)  # and those that hold where a drive has none of its own
+
+
+class StatedDrive(NamedTuple):
+    """A drive as project.toml states it, or its survey.toml (path); else as DriveParts."""
+
+    name: str
+    path: Path
+    settings: SurveyFile
+    files: SurveyPaths
+    notes: tuple[str, ...]
+    ids: tuple[int, ...] | None
+
+
+class StatedProject(NamedTuple):
+    """A project as its project.toml states it."""
+
+    path: Path
+    settings: ProjectFile
+    drives: tuple[StatedDrive, ...]
+
+
+@dataclass(frozen=True)
+class DriveParts:
+    """A drive by all but its clouds.
+
+    Parameters
+    ----------
+    name : str
+    parts : SurveyParts
+    notes : tuple of str
+    ids : tuple of int, optional
+        The point_source_ids of its points, where files hold those of other drives, too.
+    """
+
+    name: str
+    parts: SurveyParts
+    notes: tuple[str, ...] = ()
+    ids: tuple[int, ...] | None = None
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """As recorded."""
+        return self.parts.recorded.trajectory
+
+
+@dataclass(frozen=True)
+class ProjectParts:
+    """A project as its files say it, but for the clouds.
+
+    Parameters
+    ----------
+    name : str
+    path : Path
+        Of project.toml.
+    crs : str or None
+    drives : tuple of DriveParts
+    control, check : ControlPoints
+        Of all drives.
+    layout : str or None
+        How the list of these was understood.
+    inputs : tuple of InputFile
+        project.toml and the control list.
+    """
+
+    name: str
+    path: Path
+    crs: str | None
+    drives: tuple[DriveParts, ...]
+    control: ControlPoints
+    check: ControlPoints
+    layout: str | None
+    inputs: tuple[InputFile, ...]
+
+    @property
+    def files(self) -> list[Path]:
+        """Every file that is read."""
+        named = [*self.inputs, *(file for drive in self.drives for file in drive.parts.inputs)]
+        return list(dict.fromkeys(file.path for file in named))
+
+
+def is_project(path: str | Path) -> bool:
+    """Whether a path is that of a project.toml or another TOML file with drives, or of a folder
+    that holds a project.toml and no survey.toml.
+
+    Parameters
+    ----------
+    path : path
+    """
+    path = as_path(path)
+    if is_folder(path):
+        return is_there(path / FILE_NAME) and not is_there(path / "survey.toml")
+    is_named = path.name == FILE_NAME or path.name.endswith(f".{FILE_NAME}")
+    is_table = path.suffix == ".toml" and is_there(path)
+    return is_named or (is_table and b"[[drive" in read_bytes(path))
+
+
+def read_project(project: str | Path | StatedProject) -> ProjectParts:
+    """All of a project but its clouds.
+
+    Parameters
+    ----------
+    project : path or StatedProject
+        project.toml, its folder, or what it states.
+
+    Raises
+    ------
+    ValueError
+        For anything wrong in project.toml, in the files it names, or between drives.
+    FileNotFoundError
+        For files that aren't there.
+    """
+    stated = project if isinstance(project, StatedProject) else stated_project(project)
+    path, settings = stated.path, stated.settings
+    drives = tuple(
+        DriveParts(name, read_parts(toml, own, files), notes, ids)
+        for name, toml, own, files, notes, ids in stated.drives
+    )
+    check_systems([drive.name for drive in drives], [drive.trajectory for drive in drives])
+    crs = settings.crs or drives[0].parts.settings.crs
+    inputs, surveyed = [input_file("project", path)], NOTHING_SURVEYED
+    if settings.control is not None:
+        file = existing(path, "control.file", settings.control.file)
+        inputs.append(input_file("control", file))
+        try:
+            surveyed = read_surveyed(file, settings.control, _everywhere(drives), crs)
+        except ValueError as error:  # which names where a survey has its [control]
+            error.args = (str(error).replace("survey.toml", path.name),)
+            raise
+    name = settings.name or path.parent.name
+    return ProjectParts(name, path, crs, drives, *surveyed, tuple(inputs))
+
+
+def stated_project(path: str | Path) -> StatedProject:
+    """What a project.toml and the survey.toml of its drives state; no data are read.
+
+    Parameters
+    ----------
+    path : path
+
+    Raises
+    ------
+    ValueError
+        For anything wrong in these, or between them.
+    FileNotFoundError
+        For files that aren't there.
+    """
+    path = as_path(path).absolute()
+    path = path / FILE_NAME if is_folder(path) else path
+    settings = read_toml(path, ProjectFile, "a project")
+    if settings.crs is not None:
+        check_crs(settings.crs)
+    drives = [_stated(path, settings, name, section) for name, section in settings.drives]
+    _check_tiles(path, settings, drives)
+    _check_crs_alike(path, settings, drives)
+    return StatedProject(path, settings, tuple(_with_beliefs(path, drives)))
+
+
+def _stated(path, settings, name, section):
+    """StatedDrive of a [[drive]]."""
+    toml, key, notes = path, f"files of [[drive]] {name}", ()
+    names = SHARED if section.survey is None else BELIEFS
+    given = {n: getattr(settings, n) for n in names if n in settings.model_fields_set}
+    if section.survey is None:
+        own = {n: getattr(section, n) for n in ("mounting", "scanner") if getattr(section, n)}
+        stated = settings.cloud.model_dump(include={"gps_time", "noise_classes"})
+        files = CloudSection(files=section.files, **stated)
+        given = {"name": name, "crs": settings.crs, "cloud": files} | given | own
+        whole = SurveyFile(trajectory=section.trajectory, **given)
+    else:
+        toml, key = survey_toml(beside(path, section.survey)), "cloud.files"
+        whole = read_survey_file(toml)
+        if whole.control is not None:
+            own = whole.control.file
+            if settings.control is None:
+                raise ValueError(
+                    f"{toml} has a [control] of its own ({own}), and {path} none: a project has "
+                    "one list for all drives. Name it there."
+                )
+            notes = (f"Control points are those of the project, not {own}.",)
+        given |= {"control": None, "name": name, "crs": whole.crs or settings.crs}
+        whole = whole.model_copy(update=given)
+    ids = _ids(path, name, section, whole)
+    return StatedDrive(name, toml, whole, files_of(toml, whole, key), notes, ids)
+
+
+def _ids(path, name, section, settings):
+    """The point_source_ids of a drive; None where all points of its files are its."""
+    ids = section.point_source_ids
+    if ids is None:
+        return None
+    if isinstance(settings.scanner, list) and any(s.point_source_ids for s in settings.scanner):
+        raise ValueError(
+            f"point_source_ids of drive {name} in {path} tell its points, and those of its "
+            "[[scanner]] which scanner measured them: an id can't tell both. Write the points of "
+            "each scanner, or of each drive, into files of their own."
+        )
+    return tuple(sorted(set(ids)))
+
+
+def _check_tiles(path, settings, drives):
+    """Refuse a tile of no drive, and one of two whose points nothing tells apart."""
+    owners: dict[Path, list[StatedDrive]] = {}
+    for owner, file in ((drive, file) for drive in drives for file in drive.files.clouds):
+        owners.setdefault(resolved(file), []).append(owner)
+    for copy, first in find_copies(owners).items():
+        both = [*owners[first], *owners[copy]]
+        ids = [number for drive in both for number in drive.ids or ()]
+        if len(set(ids)) < len(ids) or any(drive.ids is None for drive in both):
+            raise ValueError(
+                f"{copy}, of drive {owners[copy][0].name}, is a copy of {first}, of drive "
+                f"{owners[first][0].name}: all of its points would count twice. Leave it out of "
+                f"the [[drive]] of {path} whose trajectory does not cover it."
+            )
+    shared = {file: own for file, own in owners.items() if len(own) > 1}
+    if doubtful := [file for file, own in shared.items() if any(d.ids is None for d in own)]:
+        names = " and ".join(drive.name for drive in shared[doubtful[0]])
+        raise ValueError(
+            f"{len(doubtful)} of {len(owners)} cloud files of {path} are of two drives (first: "
+            f"{doubtful[0]}, of {names}), and nothing tells whose their points are. Name each in "
+            "one [[drive]], or give each drive its point_source_ids."
+        )
+    for file, own in shared.items():
+        number, count = Counter(number for drive in own for number in drive.ids).most_common(1)[0]
+        if count > 1:
+            names = " and ".join(drive.name for drive in own if number in drive.ids)
+            raise ValueError(
+                f"point_source_id {number} of {file} is of {names} in {path}: a point is of one."
+            )
+    if shared:
+        check_distinct(path, [*shared])
+    named = [f for name in settings.cloud.files or () for f in matching(path, "cloud.files", name)]
+    if orphans := [file for file in named if resolved(file) not in owners]:
+        raise ValueError(
+            f"{len(orphans)} of {len(named)} files under [cloud] in {path} are of no drive (first: "
+            f"{orphans[0]}). Name them in files of the [[drive]] whose trajectory covers them."
+        )
+
+
+def _check_crs_alike(path, settings, drives):
+    """Refuse drives in two CRS."""
+    crs = settings.crs or drives[0].settings.crs
+    if other := [drive for drive in drives if drive.settings.crs != crs]:
+        raise ValueError(
+            f"{len(other)} of {len(drives)} drives of {path} are in another CRS than the project, "
+            f"{crs} (first: {other[0].name}, {other[0].settings.crs}). Bring their clouds into one "
+            "CRS, and say it in their survey.toml: an SBET is projected into it by itself."
+        )
+
+
+def _with_beliefs(path, drives):
+    """Drives that all believe what some of them state; refuses what two state differently."""
+    beliefs = {}
+    for what in BELIEFS:
+        stated = [drive for drive in drives if what in drive.settings.model_fields_set]
+        values = [getattr(drive.settings, what) for drive in stated]
+        unlike = [d.name for d, own in zip(stated, values, strict=True) if own != values[0]]
+        if unlike:
+            raise ValueError(
+                f"[{what}] of {unlike[0]} is not that of {stated[0].name}, and drives of a project "
+                f"share it: say under [{what}] in {path} what holds for all {len(drives)}."
+            )
+        beliefs |= {what: values[0]} if values else {}
+    for drive in drives:
+        yield drive._replace(settings=drive.settings.model_copy(update=beliefs))
+
+
+def _everywhere(drives):
+    """A Trajectory that comes by wherever one of some drives does, an epoch each second."""
+    ways = [drive.trajectory for drive in drives]
+    rows = [np.unique(np.floor(way.gps_time), return_index=True)[1] for way in ways]
+    position = np.concatenate([w.position[some] for w, some in zip(ways, rows, strict=True)])
+    number = np.arange(len(position), dtype=float)
+    return Trajectory(number, position, Rotation.identity(len(position)))

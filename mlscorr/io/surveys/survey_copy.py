@@ -1,0 +1,170 @@
+"""A survey.toml written anew in another folder, with some values changed."""
+
+import glob
+import os
+import warnings
+from collections.abc import Sequence
+from pathlib import Path, PurePath
+
+import numpy as np
+import tomlkit
+from tomlkit.items import InlineTable
+
+from mlscorr.io.clouds.conversion import written_name
+from mlscorr.io.store.opening import read_bytes
+from mlscorr.io.store.storage import as_path, is_remote, is_url, resolved
+from mlscorr.io.store.text_files import ENCODING
+from mlscorr.io.surveys.survey_paths import matching
+from mlscorr.survey import Mounting
+
+PATHS = (("control", "file"), ("scene", "reference"))
+
+
+def write_survey_copy(
+    source: str | Path, target: str | Path, folder: str | Path, mountings: Sequence[Mounting] = (),
+    clouds: Sequence[Sequence[str]] = (), trajectory: str | None = None,
+    control: Sequence[str] = (), notes: Sequence[str] = (),
+) -> None:  # fmt: skip
+    """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
+
+    Parameters
+    ----------
+    source : path
+        survey.toml as it was.
+    target : path
+        The file to write.
+    folder : path
+        Where the file will stand in the end: paths are written relative to it.
+    mountings : sequence of Mounting, optional
+        Of each scanner, to 0.01 mm and 1e-6 deg.
+    clouds : sequence of sequences of str, optional
+        New files of each scanner, in the folder. Without them, new mountings are not yet those of
+        the clouds, and the copy says so.
+    trajectory : str, optional
+        New trajectory.file of all sessions, in the folder.
+    control : sequence of str, optional
+        Names of the control points by which that one was corrected.
+    notes : sequence of str, optional
+        A comment on the sigmas of each mounting, or an empty one.
+    """
+    source = as_path(source)
+    document = tomlkit.parse(read_bytes(source).decode(ENCODING))
+    there = _way(source.absolute().parent, Path(folder).absolute())
+    for section, key in PATHS:
+        if key in document.get(section, {}):
+            document[section][key] = _moved(there, document[section][key])
+    sessions, scanners = _listed(document["trajectory"]), _listed(document.get("scanner"))
+    for section in sessions or [document["trajectory"]]:
+        for key in {"file", "accuracy"} & set(section):
+            section[key] = _moved(there, section[key])
+    if clouds:
+        _set_clouds(source, document, sessions, scanners, clouds)
+    else:
+        for section in (document["cloud"], *sessions, *scanners):
+            for number, name in enumerate(section.get("files", ())):  # keeps comments between
+                section["files"][number] = _moved(there, name, source.parent)
+        if mountings:  # a further calibration would count the same correction twice
+            document["cloud"]["mounting"] = "recorded"
+    if trajectory is not None:
+        _set_trajectory(document, trajectory, sorted(set(control)))
+    sections, notes = scanners or [document], notes or [""] * len(mountings)
+    for section, mounting, note in zip(sections, mountings, notes, strict=bool(mountings)):
+        is_inside = isinstance(section, InlineTable)  # where no comment can stand
+        _set_mounting(section["mounting"], mounting, "" if is_inside else note)
+    Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _set_clouds(source, document, sessions, scanners, clouds):
+    """New files of each scanner; those of sessions keep their names, not their folders."""
+    for section in sessions:
+        if "files" in section:
+            paths = [matching(source, "trajectory.files", pattern) for pattern in section["files"]]
+            section["files"] = sorted({written_name(path) for some in paths for path in some})
+    document["cloud"]["files"] = list(dict.fromkeys(name for names in clouds for name in names))
+    for section, names in zip(scanners, clouds, strict=bool(scanners)):
+        if "files" in section:
+            section["files"] = list(names)
+
+
+def _set_trajectory(document, name, control):
+    """One trajectory in our own columns, with the control points by which it was corrected."""
+    if _listed(document["trajectory"]):
+        document["trajectory"] = tomlkit.table()
+    for key in set(document["trajectory"]) - {"file"}:  # its sigmas and columns are its own
+        del document["trajectory"][key]
+    document["trajectory"]["file"] = name
+    if control:
+        document["trajectory"]["corrected_by"] = control
+
+
+def _listed(section):
+    """Sections of a list of tables; none of a table."""
+    return section if isinstance(section, list) else []
+
+
+def _set_mounting(section, mounting, note):
+    """Lever arm and boresight, and how well they are known."""
+    values = mounting_values(mounting)
+    if mounting.covariance is None:  # a calibration's sigmas hold together, measured ones apart
+        is_calibrated = section.pop("correlation", None) is not None
+        for key in [key for key in values if is_calibrated or values[key] != section[key]]:
+            section.pop(f"{key}_sigma", None)
+    section.update(values)
+    if mounting.covariance is not None:
+        sigma = _set_covariance(section, mounting.covariance)
+        is_line = isinstance(section, InlineTable)  # TOML has comments behind it alone
+        if note or not is_line:
+            trivia = section.trivia if is_line else sigma.trivia
+            trivia.comment_ws, trivia.comment = ("  ", f"# {note}") if note else ("", "")
+
+
+def _set_covariance(section, covariance):
+    """Sigmas to 0.01 mm and 1e-6 deg, and correlations to 1e-6; the TOML item of the first."""
+    sigma = np.sqrt(np.diag(covariance))
+    first = tomlkit.item(np.maximum(np.round(sigma[:3], 5), 1e-5).tolist())
+    section["lever_arm_sigma"] = first
+    section["boresight_sigma"] = np.maximum(np.round(np.degrees(sigma[3:]), 6), 1e-6).tolist()
+    rows = tomlkit.array()
+    for row in (covariance / np.outer(sigma, sigma)).round(6).clip(-1, 1).tolist():
+        rows.add_line(row)
+    section["correlation"] = rows.multiline(True)
+    return first
+
+
+def mounting_values(mounting: Mounting) -> dict[str, list[float]]:
+    """``lever_arm`` and ``boresight`` as survey.toml has them, to 0.01 mm and 1e-6 deg.
+
+    Parameters
+    ----------
+    mounting : Mounting
+
+    Returns
+    -------
+    dict of lists of three float
+        Units: m, deg.
+    """
+    with warnings.catch_warnings(action="ignore"):  # of angles that are not unique: any will do
+        boresight = mounting.boresight.as_euler("xyz", degrees=True)
+    rounded = np.round(mounting.lever_arm, 5) + 0.0, np.round(boresight, 6) + 0.0
+    return dict(zip(("lever_arm", "boresight"), map(np.ndarray.tolist, rounded), strict=True))
+
+
+def _way(old, new):
+    """The way from the new folder to the old one, links resolved; absolute if there is none."""
+    if is_remote(old):
+        return old
+    try:
+        return PurePath(os.path.relpath(old.resolve(), new.resolve()))
+    except ValueError:  # another drive
+        return old
+
+
+def _moved(there, name, folder=None):
+    """A path, or a pattern if it is one in its old folder, as it is seen from the new folder."""
+    if is_url(name):
+        return name
+    if is_remote(there):
+        return str(resolved(there / name))
+    if folder is not None and glob.has_magic(name) and not (folder / name).exists():
+        there = PurePath(glob.escape(str(there)))
+    return (there / name).as_posix()

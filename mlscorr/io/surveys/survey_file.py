@@ -1,0 +1,314 @@
+"""survey.toml and the files it names, as one Survey."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mlscorr.io.clouds.conversion import converted, is_foreign
+from mlscorr.io.clouds.las import read_chunks, spread_records
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds.las_crs import crs_conflict
+from mlscorr.io.store.inputs import input_file
+from mlscorr.io.store.storage import as_path, is_folder, is_there
+from mlscorr.io.store.toml_file import read_toml
+from mlscorr.io.surveys.crs_checks import crs_notes
+from mlscorr.io.surveys.session_points import check_belongings
+from mlscorr.io.surveys.survey_paths import SurveyPaths, files_of
+from mlscorr.io.surveys.survey_scanners import clouds_of, mounted_scanners, scanner_notes
+from mlscorr.io.surveys.survey_sections import PlannedSurveyFile, SurveyFile
+from mlscorr.io.tables.control import read_surveyed
+from mlscorr.io.trajectories.projection import check_crs
+from mlscorr.io.trajectories.time_systems import ADJUSTMENT, match_times
+from mlscorr.io.trajectories.trajectory_sessions import Sessions, read_sessions
+from mlscorr.survey import (
+    NOISE_CLASSES,
+    CloudFile,
+    ControlPoints,
+    InputFile,
+    Pos,
+    Scanner,
+    Survey,
+    Trajectory,
+)
+
+FILE_NAME = "survey.toml"
+UNKNOWN_POS = (
+    f"Nothing says how well the POS is known: {Pos.position_sigma} m over "
+    f"{Pos.correlation_time:.0f} s are assumed. Give the trajectory's sigmas, or [pos]."
+)
+
+
+def read_survey(path: str | Path, planned: bool = False) -> Survey:
+    """Survey of a survey.toml, with all that the files hold but the points.
+
+    Parameters
+    ----------
+    path : path
+        survey.toml, or the folder that holds it.
+    planned : bool
+        Whether it may have no cloud.
+
+    Returns
+    -------
+    Survey
+        Without a section [control], or with a file that holds no point, control and check are
+        empty.
+
+    Raises
+    ------
+    ValueError
+        For anything wrong in survey.toml, in the files it names, or between them (times,
+        coordinates).
+    FileNotFoundError
+        For files that aren't there.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(drive={"duration": 4.0}, targets={"control": 3, "check": 1})
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> survey = mlscorr.read_survey(folder)
+    >>> len(survey.control), len(survey.trajectory)
+    (3, 401)
+    """
+    path = survey_toml(path)
+    settings = read_survey_file(path, planned)
+    parts = read_parts(path, settings, files_of(path, settings))
+    return parts.survey([parts.cloud_file(cloud) for cloud in parts.files.clouds])
+
+
+@dataclass(frozen=True)
+class SurveyParts:
+    """All of a survey but its clouds.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file that says it.
+    settings : PlannedSurveyFile
+    files : SurveyPaths
+    recorded : Sessions
+    control, check : ControlPoints
+    layout : str or None
+        How the list of these was understood.
+    inputs : tuple of InputFile
+    """
+
+    path: Path
+    settings: PlannedSurveyFile
+    files: SurveyPaths
+    recorded: Sessions
+    control: ControlPoints
+    check: ControlPoints
+    layout: str | None
+    inputs: tuple[InputFile, ...]
+
+    @property
+    def system(self) -> str:
+        """What is said of the clouds' times."""
+        return self.settings.cloud.gps_time if self.settings.cloud else "auto"
+
+    @property
+    def noise_classes(self) -> tuple[int, ...]:
+        """Classes of the clouds' points that are noise."""
+        cloud = self.settings.cloud
+        return NOISE_CLASSES if cloud is None else tuple(cloud.noise_classes)
+
+    def cloud_file(self, cloud: Path) -> tuple[CloudFile, str]:
+        """The CloudFile of a path; as the function of this name."""
+        given = self.recorded.trajectory, self.system, self.settings.crs
+        return cloud_file(cloud, *given, noise_classes=self.noise_classes)
+
+    def survey(self, read: Sequence[tuple[CloudFile, str]]) -> Survey:
+        """The survey of these parts and of clouds.
+
+        Parameters
+        ----------
+        read : sequence of (CloudFile, str)
+            With the sentences on their time systems.
+
+        Raises
+        ------
+        ValueError
+            Where clouds, trajectories and scanners don't go together.
+        """
+        settings, recorded, path = self.settings, self.recorded, self.path
+        trajectory = recorded.trajectory
+        layouts = [*recorded.layouts, *filter(None, [self.layout])]
+        layouts += [converted(file.path).note for file, _ in read if is_foreign(file.path)]
+        cloud_files = tuple(file for file, _ in read)
+        check_belongings(path, self.files.sessions, recorded.parts, cloud_files)
+        scanners = mounted_scanners(path, settings, cloud_files)
+        is_one = len(scanners) == 1
+        notes = crs_notes(settings.crs, trajectory, recorded.is_sbet)
+        notes += [*recorded.notes, *(note for _, note in read), *scanner_notes(scanners), *layouts]
+        if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
+            notes.append(UNKNOWN_POS)
+        return Survey(
+            name=settings.name or path.absolute().parent.name, path=path, crs=settings.crs,
+            clouds=clouds_of(scanners, cloud_files), trajectory=trajectory,
+            mounting=scanners[0].mounting if is_one else None, control=self.control,
+            check=self.check, scanner=scanners[0].scanner if is_one else Scanner(),
+            pos=settings.pos.pos(), reference=self.files.reference,
+            search_radius=settings.matching.search_radius, use_ties=settings.ties.use == "auto",
+            notes=tuple(notes), layouts=tuple(layouts), inputs=self.inputs,
+            scanners=() if is_one else scanners,
+            corrected_by=tuple(n for part in settings.trajectories for n in part.corrected_by),
+            is_remounted=settings.cloud is not None and settings.cloud.mounting == "recorded",
+        )  # fmt: skip
+
+
+def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> SurveyParts:
+    """All of a survey but its clouds.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file that says it.
+    settings : PlannedSurveyFile
+        What raises is as of read_survey.
+    files : SurveyPaths
+        That are named there.
+    """
+    inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
+    recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
+    surveyed = read_surveyed(files.control, settings.control, recorded.trajectory, settings.crs)
+    return SurveyParts(path, settings, files, recorded, *surveyed, inputs)
+
+
+def stated_pos(settings: PlannedSurveyFile) -> Pos | None:
+    """What [pos] says; None where it is left out.
+
+    Parameters
+    ----------
+    settings : PlannedSurveyFile
+    """
+    return settings.pos.pos() if "pos" in settings.model_fields_set else None
+
+
+def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFile:
+    """What stands in a survey.toml; no other file is opened.
+
+    Parameters
+    ----------
+    path : path
+        survey.toml, or the folder that holds it.
+    planned : bool
+        Whether it may have no cloud.
+
+    Returns
+    -------
+    SurveyFile, or PlannedSurveyFile for a planned survey
+
+    Raises
+    ------
+    ValueError
+        Names the line of bad TOML, or every key that is unknown (with the nearest known one),
+        missing, or of the wrong type.
+    """
+    settings = read_toml(survey_toml(path), PlannedSurveyFile if planned else SurveyFile, "it")
+    if settings.crs is not None:
+        check_crs(settings.crs)
+    return settings
+
+
+def input_files(path: str | Path, planned: bool = False) -> list[Path]:
+    """Paths of a survey.toml and of every file that it names, all of which exist.
+
+    Parameters
+    ----------
+    path : path
+    planned : bool
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    ValueError
+        As read_survey_file.
+    FileNotFoundError
+        For files that aren't there.
+    """
+    path = survey_toml(path)
+    return [path, *(file for _, file in files_of(path, read_survey_file(path, planned)).named)]
+
+
+def survey_toml(path: str | Path) -> Path:
+    """Path of a survey.toml, or of that in a folder.
+
+    Parameters
+    ----------
+    path : path
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is none.
+    """
+    path = as_path(path)
+    if is_folder(path):
+        path = path / FILE_NAME
+    if not is_there(path):
+        raise FileNotFoundError(
+            f"{path} does not exist; a survey is a folder with {FILE_NAME}, "
+            "which mlscorr init makes."
+        )
+    return path
+
+
+def cloud_file(
+    path: Path, trajectory: Trajectory, setting: str, crs: str | None,
+    ids: tuple[int, ...] | None = None, noise_classes: tuple[int, ...] = NOISE_CLASSES,
+) -> tuple[CloudFile, str]:  # fmt: skip
+    """CloudFile of a path, and the sentence on its time system.
+
+    Parameters
+    ----------
+    path : Path
+    trajectory : Trajectory
+    setting : str
+        cloud.gps_time of survey.toml.
+    crs : str or None
+        That of survey.toml, which can be used.
+    ids : tuple of int, optional
+        Only the points with these point_source_ids are of the trajectory.
+    noise_classes : tuple of int
+        cloud.noise_classes of survey.toml.
+
+    Raises
+    ------
+    ValueError
+        For a file that can't be read, or whose times are not the trajectory's.
+
+    Warns
+    -----
+    UserWarning
+        Where the file states another CRS.
+    """
+    layout = read_layout(path)
+    file = CloudFile(path, layout.points, layout.time_offset, "", ids, noise_classes=noise_classes)
+    if layout.scale.max() > 0.002:  # m, half of what a scanner's ranges are good for
+        warnings.warn(
+            f"The coordinates of {path.name} are in steps of {layout.scale.max():g} m: neither "
+            "targets nor corrected points are better than that. Export the cloud in steps of "
+            "0.001 m.",
+            stacklevel=2,
+        )
+    records = spread_records(layout)[1]
+    times = records["gps_time"][file.rows(records["point_source_id"])] + layout.time_offset
+    if not len(times) and (chunk := next(read_chunks(file), None)) is not None:  # too few of them
+        times = chunk.gps_time
+    match = match_times(
+        path.name, times, layout.is_standard, trajectory, setting, layout.time_offset
+    )
+    if crs is not None and (conflict := crs_conflict(layout, crs)):
+        warnings.warn(conflict, stacklevel=3)
+    constant = match.constant + layout.time_offset
+    file = replace(
+        file, time_constant=constant, time_system=match.cloud_system, new_week=match.new_week
+    )
+    taken = f"; written less {ADJUSTMENT + layout.time_offset:.0f} s, as its header states"
+    return file, f"gps_time of {path.name}: {match}{taken if layout.time_offset else ''}."

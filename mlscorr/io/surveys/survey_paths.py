@@ -1,0 +1,279 @@
+"""Where the files are that a survey.toml names."""
+
+import glob
+import os
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mlscorr.io.clouds.conversion import written_name
+from mlscorr.io.clouds.copies import find_copies
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.storage import beside, files_like, is_folder, is_remote, is_there, resolved
+from mlscorr.io.store.text_files import nearest
+from mlscorr.io.surveys.folder_roles import RESULTS
+from mlscorr.io.surveys.survey_sections import PlannedSurveyFile
+from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+from mlscorr.io.trajectories.trajectory_sessions import SessionFile
+from mlscorr.survey import CloudFile, SurveyFileError
+from mlscorr.survey.summary import counted
+
+
+@dataclass(frozen=True)
+class SurveyPaths:
+    """Paths of the files that a survey.toml names.
+
+    Parameters
+    ----------
+    clouds : list of Path
+    sessions : list of SessionFile
+        The one trajectory, or several.
+    control, reference : Path or None
+    """
+
+    clouds: list[Path]
+    sessions: list[SessionFile]
+    control: Path | None
+    reference: Path | None
+
+    @property
+    def named(self) -> list[tuple[str, Path]]:
+        """Pairs (what it is, path) of all."""
+        named = [("cloud", cloud) for cloud in self.clouds]
+        for session in self.sessions:
+            named += [("trajectory", session.path), ("trajectory accuracy", session.accuracy)]
+        named += [("control", self.control), ("reference", self.reference)]
+        return [(what, file) for what, file in named if file is not None]
+
+
+def files_of(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") -> SurveyPaths:
+    """Paths of the files that a survey.toml names.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    settings : PlannedSurveyFile
+    key : str
+        That names the clouds.
+
+    Raises
+    ------
+    FileNotFoundError
+        For those that don't exist.
+    ValueError
+        For a file that is named twice, and for two clouds of one name.
+    """
+    names = settings.cloud.files if settings.cloud else ()
+    clouds = [cloud for name in names for cloud in matching(path, key, name)]
+    if clouds:
+        check_distinct(path, clouds, key)
+    sessions = [session_file(path, section) for section in settings.trajectories]
+    check_sessions(path, sessions)
+    control = None if settings.control is None else settings.control.file
+    return SurveyPaths(
+        clouds,
+        sessions,
+        given_file(path, "control.file", control),
+        given_file(path, "scene.reference", settings.scene.reference),
+    )
+
+
+def session_file(path: Path, section: TrajectorySection) -> SessionFile:
+    """The files of a [trajectory] or one of [[trajectory]].
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    section : TrajectorySection
+
+    Raises
+    ------
+    FileNotFoundError
+        For those that don't exist.
+    """
+    file = existing(path, "trajectory.file", section.file)
+    return SessionFile(file, given_file(path, "trajectory.accuracy", section.accuracy), section)
+
+
+def check_sessions(path: Path, sessions: Sequence[SessionFile]) -> None:
+    """Refuse a trajectory that is named twice.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    sessions : sequence of SessionFile
+
+    Raises
+    ------
+    ValueError
+    """
+    file, count = Counter(resolved(session.path) for session in sessions).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{count} of the [[trajectory]] of {path} name the file {file}.")
+
+
+def matching(path: Path, key: str, name: str) -> list[Path]:
+    """Paths of the files that a survey.toml names by a pattern, or of the one by its name.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    key : str
+        That names them.
+    name : str
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is none.
+
+    Warns
+    -----
+    UserWarning
+        Where folders that hold results are left out of a pattern of all folders.
+    """
+    there = beside(path, name)
+    if not glob.has_magic(name) or is_there(there):
+        return [existing(path, key, name)]
+    matches = files_like(path.parent, name)
+    below = {file.parent for file in matches} - {path.parent} if "**" in name else set()
+    if results := {folder for folder in below if _holds_results(folder)}:
+        matches = [file for file in matches if file.parent not in results]
+        warnings.warn(
+            f"{key} of {path}: {name} leaves out results of an earlier run in "
+            f"{', '.join(sorted(map(str, results)))}.",
+            stacklevel=2,
+        )
+    if not matches:
+        raise FileNotFoundError(f"{key} of {path}: no file is like {there}.")
+    return matches
+
+
+def _holds_results(folder):
+    """Whether a run wrote a folder, or a project it."""
+    return any(is_there(folder / name) for name in RESULTS) or is_there(
+        folder.parent / "project.json"
+    )
+
+
+def own_clouds(
+    path: Path, key: str, patterns: Sequence[str] | None, clouds: Sequence[CloudFile],
+    owner: str = "",
+) -> list[CloudFile]:  # fmt: skip
+    """Those of a survey's clouds that patterns name; all without patterns.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    key : str
+        That holds the patterns.
+    patterns : sequence of str, optional
+    clouds : sequence of CloudFile
+    owner : str
+        Words on who has the patterns.
+
+    Raises
+    ------
+    ValueError
+        Where a pattern names none of them.
+    FileNotFoundError
+        Where there is no such file.
+    """
+    own = [] if patterns is not None else [*clouds]
+    for pattern in patterns or ():
+        there = {resolved(file) for file in matching(path, key, pattern)}
+        named = [cloud for cloud in clouds if resolved(cloud.path) in there]
+        if not named:
+            raise SurveyFileError(
+                f"{key} of {path}: {pattern}{owner} is none of the {len(clouds)} files of [cloud]."
+            )
+        own += named
+    return own
+
+
+def given_file(path: Path, key: str, name: str | None) -> Path | None:
+    """Path of a file that a survey.toml may name; as existing, None without a name."""
+    return None if name is None else existing(path, key, name)
+
+
+def existing(path: Path, key: str, name: str) -> Path:
+    """Path of a file that a survey.toml names.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    key : str
+        That names it.
+    name : str
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is none.
+    """
+    there = beside(path, name)
+    if not is_there(there):
+        raise FileNotFoundError(f"{key} of {path} names {there}, which {_lack(there)}.")
+    return there
+
+
+def _lack(there):
+    """Why there is no file of a name, and which one may be meant."""
+    if is_folder(there):
+        return "is a folder: name a file in it, or its clouds by a pattern, as FOLDER/*.laz"
+    is_listed = not is_remote(there) and there.parent.is_dir()
+    near = nearest(there.name, os.listdir(there.parent) if is_listed else ())
+    return f"does not exist; the nearest there is {near}" if near else "does not exist"
+
+
+def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> None:
+    """Refuse a cloud that is named twice or by a copy, and two of one name: outputs keep names.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    clouds : list of Path
+    key : str
+        That names them.
+
+    Raises
+    ------
+    ValueError
+    """
+    places = [str(resolved(cloud)) for cloud in clouds]
+    place, count = Counter(places).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{key} of {path} names the file {place} ({count} times). Name it once.")
+    if copies := find_copies(clouds):
+        raise ValueError(_copies_sentence(path, key, copies))
+    written = [written_name(cloud).casefold() for cloud in clouds]
+    name, count = Counter(written).most_common(1)[0]
+    if count > 1:
+        homonyms = {place for place, own in zip(places, written, strict=True) if own == name}
+        raise ValueError(
+            f"{key} of {path} has files whose results would have the same name: {name} ({count} "
+            f"times): {', '.join(sorted(homonyms)[:4])}. Rename one."
+        )
+
+
+def _copies_sentence(path: Path, key: str, copies: dict[Path, Path]) -> str:
+    """The sentence on clouds that hold the points of others, and on what to remove."""
+    limit = SETTINGS.named_faults
+    pairs = [f"{copy}, which is a copy of {first}" for copy, first in list(copies.items())[:limit]]
+    surplus = len(copies) - len(pairs)
+    more = f"; and {surplus} more" if surplus else ""
+    pronoun = "it" if len(copies) == 1 else "them"
+    return (
+        f"{key} of {path} names {counted(len(copies), 'copy')} of other clouds (the same number, "
+        f"bounds and times of points): {'; '.join(pairs)}{more}. Remove {pronoun} from {key}: each "
+        "point would count twice, as a pass of its own."
+    )

@@ -1,0 +1,230 @@
+"""What stands in survey.toml, section by section, in its own units (deg)."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Discriminator, Field, Tag, model_validator
+from scipy.spatial.transform import Rotation
+
+from mlscorr.io.store.toml_file import (
+    Degrees,
+    Meters,
+    PointSource,
+    Positive,
+    Share,
+    Six,
+    Three,
+    TomlSection,
+)
+from mlscorr.io.tables.table_sections import ControlSection
+from mlscorr.io.trajectories.trajectory_sections import SessionSection, TrajectorySection
+from mlscorr.survey import NOISE_CLASSES, SEARCH_RADIUS, Mounting, Pos, Scanner
+
+NoiseClasses = Annotated[
+    list[Annotated[int, Field(ge=0, le=255)]],  # 8 bits of a LAS point
+    Field(default_factory=partial(list, NOISE_CLASSES)),
+]
+
+
+class CloudSection(TomlSection):
+    """Which cloud files, the system of their times, and which of their points are noise."""
+
+    files: Annotated[list[str], Field(min_length=1)]
+    gps_time: Literal["auto", "week", "standard"] = "auto"
+    noise_classes: NoiseClasses  # whose points take no part in a measurement
+    mounting: Literal["stated", "recorded"] = "stated"  # by which the points are georeferenced
+
+
+class MountingSection(TomlSection):
+    """Lever arm (m: right, forward, up) and boresight (deg, about x, y, z)."""
+
+    lever_arm: Annotated[list[Meters], Three]
+    boresight: Annotated[list[Degrees], Three]
+
+    def mounting(self) -> Mounting:
+        """R_L^P = Rz(c) Ry(b) Rx(a) for the boresight [a, b, c]."""
+        boresight = Rotation.from_euler("xyz", self.boresight, degrees=True)
+        return Mounting(np.array(self.lever_arm, dtype=float), boresight)
+
+
+class CalibratedMountingSection(MountingSection):
+    """The same, and how well a calibration knows it, or who measured either."""
+
+    lever_arm_sigma: Annotated[list[Positive], Three] | None = None  # m
+    boresight_sigma: Annotated[list[Positive], Three] | None = None  # deg: right, forward, up
+    correlation: Annotated[list[Annotated[list[Share], Six]], Six] | None = None
+
+    @model_validator(mode="after")
+    def _can_be(self) -> Self:
+        if self.correlation is not None:
+            if self.lever_arm_sigma is None or self.boresight_sigma is None:
+                raise ValueError("correlation needs both, lever_arm_sigma and boresight_sigma")
+            matrix = np.array(self.correlation)
+            rounding = 0.5e-6 * len(matrix)  # of an eigenvalue, where six decimals are written
+            if not np.array_equal(matrix, matrix.T) or np.linalg.eigvalsh(matrix)[0] < -rounding:
+                raise ValueError("correlation is no correlation matrix: lopsided, or impossible")
+        return self
+
+    def mounting(self) -> Mounting:
+        """The Mounting with its covariance, and the sigmas of what was measured."""
+        mounting, unknown = super().mounting(), [np.nan] * 3
+        sigma = np.append(self.lever_arm_sigma or unknown, self.boresight_sigma or unknown)
+        sigma[3:] = np.radians(sigma[3:])
+        if self.correlation is None and not np.isnan(sigma).all():
+            mounting = replace(mounting, measured=sigma)
+        if np.isnan(sigma).any():
+            return mounting
+        correlation = np.eye(6) if self.correlation is None else np.array(self.correlation)
+        return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
+
+
+def left_out(section: TomlSection, names: Iterable[str]) -> tuple[str, ...]:
+    """Those keys of a section that the file leaves out, so that their defaults stand in.
+
+    Parameters
+    ----------
+    section : TomlSection
+    names : iterable of str
+    """
+    return tuple(name for name in names if name not in section.model_fields_set)
+
+
+class ScannerSection(TomlSection):
+    """What is believed of the scanner."""
+
+    range_noise: Positive = Scanner.range_noise  # m
+    angle_noise: Positive = float(np.degrees(Scanner.angle_noise))  # deg
+    lines_per_second: Positive = Scanner.lines_per_second
+
+    def scanner(self) -> Scanner:
+        """The same in radians."""
+        noises = self.range_noise, np.radians(self.angle_noise)
+        assumed = left_out(self, ("range_noise", "angle_noise"))
+        return Scanner(*noises, self.lines_per_second, assumed)
+
+
+class MountedScannerSection(ScannerSection):
+    """One of several scanners: its points, what is believed of it, and its mounting."""
+
+    name: Annotated[str, Field(min_length=1)] | None = None
+    files: Annotated[list[str], Field(min_length=1)] | None = None
+    point_source_ids: Annotated[list[PointSource], Field(min_length=1)] | None = None
+    mounting: CalibratedMountingSection | None = None
+
+    @model_validator(mode="after")
+    def _has_points(self) -> Self:
+        if self.files is None and self.point_source_ids is None:
+            raise ValueError(
+                "files is missing: name those that the scanner wrote, or its point_source_ids in "
+                "files with the points of several"
+            )
+        return self
+
+
+def _kind_of_section(document):
+    return _LIST if isinstance(document, list | tuple) else _TABLE
+
+
+# Names of the alternatives, which keys in sentences leave out because they are blank
+_TABLE, _LIST = "", " "
+Scanners = Annotated[
+    Annotated[ScannerSection, Tag(_TABLE)]
+    | Annotated[list[MountedScannerSection], Field(min_length=1), Tag(_LIST)],
+    Discriminator(_kind_of_section),
+]
+Trajectories = Annotated[
+    Annotated[TrajectorySection, Tag(_TABLE)]
+    | Annotated[list[SessionSection], Field(min_length=1), Tag(_LIST)],
+    Discriminator(_kind_of_section),
+]
+
+
+class PosSection(TomlSection):
+    """What is believed of the POS where the trajectory has no sigmas."""
+
+    position_sigma: Positive = Pos.position_sigma  # m
+    attitude_sigma: Annotated[list[Positive], Three] = np.degrees(Pos().attitude_sigma).tolist()
+    correlation_time: Positive = Pos.correlation_time  # s
+
+    def pos(self) -> Pos:
+        """The same in radians."""
+        return Pos(
+            self.position_sigma,
+            np.radians(self.attitude_sigma),
+            self.correlation_time,
+            assumed=left_out(self, ("position_sigma", "attitude_sigma", "correlation_time")),
+        )
+
+
+class MatchingSection(TomlSection):
+    """How far from its surveyed point a target is looked for."""
+
+    search_radius: Annotated[float, Field(gt=0, le=100)] = SEARCH_RADIUS  # m
+
+
+class TiesSection(TomlSection):
+    """Whether a correction uses what two passes both saw."""
+
+    use: Literal["auto", "off"] = "auto"
+
+
+class SceneSection(TomlSection):
+    """A reference surface."""
+
+    reference: str | None = None
+
+
+class CommonSections(TomlSection):
+    """What stands in the survey.toml of a drive, and in the project.toml of several."""
+
+    name: str | None = None
+    crs: str | None = None
+    mounting: CalibratedMountingSection | None = None
+    control: ControlSection | None = None
+    scanner: Scanners = ScannerSection()
+    pos: PosSection = PosSection()
+    matching: MatchingSection = MatchingSection()
+    ties: TiesSection = TiesSection()
+
+
+class PlannedSurveyFile(CommonSections):
+    """What stands in the survey.toml of a survey that isn't driven yet: it may have no cloud."""
+
+    cloud: CloudSection | None = None
+    trajectory: Trajectories
+    scene: SceneSection = SceneSection()
+
+    @model_validator(mode="after")
+    def _parts_scanners(self) -> Self:
+        names = [name for name, _ in self.scanners]
+        if names and self.mounting is not None:
+            raise ValueError(
+                "[mounting] is that of one scanner; with [[scanner]] each has its own, written "
+                "[scanner.mounting] below it"
+            )
+        if len(names) > len(set(names)):
+            raise ValueError(
+                f"the {len(names)} [[scanner]] need names of their own, and these are "
+                f"{', '.join(names)} (without a name it is the number)"
+            )
+        return self
+
+    @property
+    def trajectories(self) -> list[TrajectorySection]:
+        """That of [trajectory], or each [[trajectory]]."""
+        return [*self.trajectory] if isinstance(self.trajectory, list) else [self.trajectory]
+
+    @property
+    def scanners(self) -> list[tuple[str, MountedScannerSection]]:
+        """Each [[scanner]] with its name, or its number from 1; none with one [scanner]."""
+        sections = self.scanner if isinstance(self.scanner, list) else []
+        return [(section.name or str(n), section) for n, section in enumerate(sections, start=1)]
+
+
+class SurveyFile(PlannedSurveyFile):
+    """What stands in survey.toml, in its own units (deg)."""
+
+    cloud: CloudSection

@@ -1,0 +1,176 @@
+"""How a table is laid out: letters, separator, decimal sign, header, and what its columns mean."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.opening import open_file
+from mlscorr.io.store.text_files import ENCODING, shown
+from mlscorr.io.tables.column_names import plain
+
+SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}  # the surest first
+COMMENT_MARKS = ("#", "%", "!", "//")
+ENCODINGS = {ENCODING: "UTF-8", "utf-16": "UTF-16", "gb18030": "GB 18030", "cp1252": "Windows-1252"}
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """Where the rows of a table start, how they are parted, and what their columns are.
+
+    Parameters
+    ----------
+    path : Path
+    header : tuple of str
+        As it stands there; empty where columns have no names.
+    lines : int
+        Number of lines down to the first row.
+    columns : dict
+        Our name of a column to its position.
+    separator, decimal, encoding : str
+    factors : dict
+        Our name to what its unit is in m, deg or s, where a unit is given.
+    sheet : str, optional
+        Of a workbook.
+    is_own : bool
+        Whether header and separator are our own, so that there was nothing to understand.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    lines: int
+    columns: dict[str, int]
+    separator: str = ","
+    decimal: str = "."
+    encoding: str = ENCODING
+    factors: dict[str, float] = field(default_factory=dict)
+    sheet: str | None = None
+    is_own: bool = False
+
+    def __str__(self) -> str:
+        """What was understood, without a full stop."""
+        places = sorted(self.columns.items(), key=lambda item: item[1])
+        names = {name: self.name_of(name) for name, _ in places}
+        parts = [
+            f"{name} = {other}" for name, other in names.items() if plain(other) != plain(name)
+        ]
+        identical = [name for name, other in names.items() if plain(other) == plain(name)]
+        parts += [f"{', '.join(identical)} by name"] * bool(identical)
+        parted = f"sheet {shown(self.sheet)}" if self.sheet else SEPARATORS[self.separator]
+        letters = "" if self.encoding == ENCODING else f", letters of {ENCODINGS[self.encoding]}"
+        sign = "comma" if self.decimal == "," else "point"
+        form = f"{parted}, decimal {sign}{letters}"
+        return f"{self.path.name} was read as {', '.join(parts)} ({form})"
+
+    @property
+    def unused(self) -> list[int]:
+        """Positions of the columns that have a name and aren't used."""
+        used = self.columns.values()
+        return [i for i, name in enumerate(self.header) if name and i not in used]
+
+    @property
+    def not_used(self) -> str:
+        """Words on the columns that aren't used; nothing without such."""
+        names = ", ".join(shown(self.header[i]) for i in self.unused)
+        return f"; not used: {names}" if names else ""
+
+    def name_of(self, column: str) -> str:
+        """What a column is called in the table, or its number from 1.
+
+        Parameters
+        ----------
+        column : str
+            Our name.
+        """
+        place = self.columns[column]
+        return shown(self.header[place]) if self.header else f"column {place + 1}"
+
+    def number(self, cell: str) -> float:
+        """The number in a cell.
+
+        Parameters
+        ----------
+        cell : str
+
+        Raises
+        ------
+        ValueError
+            For anything else: points in numbers with decimal commas too, and 1_000.
+        """
+        if any(mark in cell for mark in ("_" if self.decimal == "." else "_.")):
+            raise ValueError(cell)
+        return float(cell.replace(self.decimal, "."))
+
+
+def head(path: Path, encoding: str = ENCODING) -> list[tuple[int, str]]:
+    """The first lines of a text file that are not blank, with their numbers from 1.
+
+    Parameters
+    ----------
+    path : Path
+    encoding : str
+
+    Returns
+    -------
+    list of (int, str)
+        Empty where the file is no text in this encoding; up to a line too long for a table.
+    """
+    lines, longest = [], SETTINGS.longest_line
+    try:
+        with open_file(path, encoding) as file:
+            for number in range(1, SETTINGS.sampled_lines + 1):
+                line = file.readline(longest)
+                if not line or len(line) == longest:
+                    break
+                if line.strip(" \t\r\n-=_"):
+                    lines.append((number, line))
+            while 0 < len(line) < longest and file.read(SETTINGS.copied_bytes):
+                pass  # a letter beyond ASCII may come late
+    except UnicodeError:
+        return []
+    return lines
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Cells of a line, stripped; blanks in a row part as one does.
+
+    Parameters
+    ----------
+    line : str
+    separator : str
+
+    Examples
+    --------
+    >>> split('P1   532012,49 "at the gate"', " "), split("P1; 1,5 ;", ";")
+    (['P1', '532012,49', 'at the gate'], ['P1', '1,5', ''])
+    """
+    text = " ".join(line.split()) if separator == " " else line
+    try:
+        cells = next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])
+    except csv.Error:
+        return [text]
+    return [cell.strip() for cell in cells]
+
+
+def is_comment(cells: Sequence[str]) -> bool:
+    """Whether a row holds nothing, or starts as a comment does.
+
+    Parameters
+    ----------
+    cells : sequence of str
+    """
+    return not any(cells) or cells[0].startswith(COMMENT_MARKS)
+
+
+def not_text(path: Path) -> str:
+    """The sentence on a file that is no text.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    return (
+        f"{path} is not a text file in UTF-8. Save it anew as comma-separated values in UTF-8; "
+        "letters such as umlauts are the likely cause, or a workbook that is not .xlsx."
+    )

@@ -1,0 +1,159 @@
+"""Whether control and trajectory lie together."""
+
+import warnings
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.tables.column_names import AXES
+from mlscorr.survey import SEARCH_RADIUS, ControlPoints, Trajectory
+
+FOOT = 0.3048  # m; the US survey foot is longer by 2 ppm
+
+
+def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) -> None:
+    """Refuse control that lies kilometres from the trajectory, as it stands or swapped.
+
+    Parameters
+    ----------
+    path : Path
+        Of the control, for messages.
+    points : ControlPoints
+    trajectory : Trajectory
+
+    Raises
+    ------
+    ValueError
+        Names the columns that are exchanged, or the distance.
+
+    Warns
+    -----
+    UserWarning
+        Of heights that seem to be in feet.
+    """
+    distance = distance_of(points.position[:, :2], trajectory)
+    orders = [(1, 0, 2), *permutations(range(3))]  # the usual exchange first
+    for order in orders if distance > SETTINGS.near else ():
+        swapped = distance_of(points.position[:, order[:2]], trajectory)
+        if swapped < SETTINGS.near:
+            under = [f"{AXES[i]} under {AXES[column]}" for i, column in enumerate(order)]
+            what = "Easting and northing" if order == orders[0] else f"Columns ({', '.join(under)})"
+            raise ValueError(
+                f"{what} seem to be swapped in {path}: its nearest point lies "
+                f"{distance / 1e3:.0f} km from the trajectory as it stands, {swapped:.0f} m when "
+                f"they are exchanged. Exchange the {'two ' * (order == orders[0])}columns, or say "
+                "which is which under [control.columns] in survey.toml."
+            )
+    if distance > SETTINGS.far:
+        raise ValueError(
+            f"The control nearest to the trajectory lies {distance / 1e3:.1f} km from it "
+            f"(limit {SETTINGS.far / 1e3:.0f} km): {path} and the trajectory may be in different "
+            "CRS or zones. Bring both into the crs of survey.toml."
+            f"{_likely_change(points.position[:, :2], trajectory)}"
+        )
+    if owner := _heights_in_feet(path, points.position, trajectory):
+        warnings.warn(
+            f"The heights of {owner} may be in feet: only multiplied by {FOOT} are control and "
+            "trajectory at like heights. Convert them to m, or both to one system of heights.",
+            stacklevel=2,
+        )
+
+
+def _heights_in_feet(path, position, trajectory):
+    """Whose heights are like the others when taken as feet, and not as they stand; else empty."""
+    distance, epoch = nearest_epochs(position[:, :2], trajectory)
+    near = distance < SETTINGS.near
+    up, driven = position[near, 2], trajectory.position[epoch[near], 2]
+    if not near.any() or (apart := abs(np.median(up - driven))) < SEARCH_RADIUS:
+        return ""
+    feet = {path: up * FOOT - driven, "the trajectory": up - driven * FOOT}
+    owners = (owner for owner, high in feet.items() if abs(np.median(high)) < FOOT * apart)
+    return next(owners, "")
+
+
+def _likely_change(position, trajectory):
+    """A sentence on what brings points (n, 2) near the trajectory; empty where nothing does."""
+    # Numbers of zones stand in front of six digits
+    zone = round(float(np.median(position[:, 0] - trajectory.position[0, 0])) / 1e6)
+    owners = ("these points", "the trajectory")
+    number = f"the number {abs(zone)} of a map zone taken off the eastings of {owners[zone < 0]}"
+    feet = f"multiply the coordinates by {FOOT} (by 1200/3937 where they are US survey feet)"
+    for what, factor, offset, remedy in (
+        (number, 1.0, zone * 1e6, f"they are {abs(zone)} 000 000 m too large"),
+        (f"{owners[0]} taken as feet", FOOT, 0.0, feet),
+        (f"{owners[1]} taken as feet", 1 / FOOT, 0.0, feet),
+    ):
+        distance = distance_of(position * factor - [offset, 0], trajectory) * min(1.0, 1.0 / factor)
+        if distance < SETTINGS.near:
+            return f" With {what} it is {distance:.0f} m: {remedy}."
+    return ""
+
+
+def far_cloud(name: str, box: np.ndarray, trajectory: Trajectory) -> tuple[str, bool]:
+    """A sentence on a cloud far from the trajectory, and whether it says what brings it there.
+
+    Parameters
+    ----------
+    name : str
+        Of the cloud.
+    box : (2, 2) array
+        Lowest and highest easting and northing by its header. Units: m.
+    trajectory : Trajectory
+
+    Returns
+    -------
+    sentence : str
+        Empty where the cloud is near.
+    is_explained : bool
+    """
+    apart = _box_distance(box, trajectory)
+    if apart < SETTINGS.near:
+        return "", False
+    sentence = f"{name} lies {apart / 1e3:.1f} km from the trajectory by its header"
+    for change, other in (
+        ("its coordinates taken as feet", box * FOOT),
+        ("easting and northing exchanged", box[:, ::-1]),
+    ):
+        if _box_distance(other, trajectory) < SETTINGS.near:
+            return f"{sentence}, and beside it with {change}: bring both into one CRS.", True
+    return f"{sentence}: one of them may be in another CRS, or of another survey.", False
+
+
+def _box_distance(box, trajectory):
+    """Least horizontal distance of a box from the trajectory's epochs. Units: m."""
+    place = trajectory.position[:, :2]
+    beside = np.maximum(np.maximum(box[0] - place, place - box[1]), 0.0)
+    return float(np.hypot(*beside.T).min())
+
+
+def distance_of(position: np.ndarray, trajectory: Trajectory) -> float:
+    """Least horizontal distance of points from the trajectory's epochs. Units: m.
+
+    Parameters
+    ----------
+    position : (n, 2) array
+        Easting and northing. Units: m.
+    trajectory : Trajectory
+    """
+    return nearest_epochs(position, trajectory)[0].min()
+
+
+def nearest_epochs(position: np.ndarray, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Horizontal distance (n,) of points from the nearest epochs in m, and these (n,).
+
+    Parameters
+    ----------
+    position : (n, 2) array
+        Easting and northing. Units: m.
+    trajectory : Trajectory
+
+    Returns
+    -------
+    distance : (n,) array
+    epoch : (n,) int array
+    """
+    from scipy.spatial import cKDTree
+
+    return cKDTree(trajectory.position[:, :2]).query(position)

@@ -1,0 +1,178 @@
+"""Rows of tables, and their numbers."""
+
+import csv
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from mlscorr.io.store.opening import open_file
+from mlscorr.io.store.storage import is_remote
+from mlscorr.io.store.text_files import ENCODING, shown
+from mlscorr.io.tables.layouts import SEPARATORS, TableLayout, is_comment, not_text
+from mlscorr.io.tables.sheets import read_sheets
+
+DATE = re.compile(r"\d+[-/:.]\d+[-/:.]\d+")  # of a day or a time of day
+
+
+def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, list[str]]]:
+    """Rows of a table behind its header, blank ones and comments left out.
+
+    Parameters
+    ----------
+    layout : TableLayout
+    exact : bool
+        Whether each row has to have as many columns as the header; fewer may be fine otherwise.
+
+    Yields
+    ------
+    line : str
+        Which line it is of what file, for messages.
+    cells : list of str
+
+    Raises
+    ------
+    ValueError
+        For a row that is too short or too long, and a file that is not text.
+    """
+    width, last = len(layout.header), max(layout.columns.values())
+    for number, cells in _all_rows(layout):
+        is_row = layout.is_own or not (is_comment(cells) or "".join(cells).strip("-=_") == "")
+        if not any(cells) or not is_row:
+            continue
+        if not layout.is_own:
+            is_parted_by_blanks = layout.separator == " " and not layout.sheet
+            width = width or (len(cells) if is_parted_by_blanks else 0)
+            exact = is_parted_by_blanks
+            while width and len(cells) > width and not cells[-1]:
+                del cells[-1]
+        line = f"Line {number} of {layout.path}"
+        if layout.separator != " " and (exact or not layout.is_own) and 0 < width < len(cells):
+            raise ValueError(_too_wide(line, len(cells), width))
+        if len(cells) <= last or (exact and len(cells) != width):
+            cause = "the file may be cut off, a separator may be missing, or a name may hold one"
+            if "latitude" in layout.columns and len(cells) > width:
+                cause = "angles may be in degrees, minutes and seconds: export decimal degrees"
+            raise ValueError(
+                f"{line} has {len(cells)} columns where {width or last + 1} belong: {cause} "
+                f"(columns are parted by {SEPARATORS[layout.separator]})."
+            )
+        yield line, cells
+
+
+def _all_rows(layout):
+    """Number of the last line of each row behind the header, and its cells."""
+    if layout.sheet is not None:
+        rows = dict(read_sheets(layout.path))[layout.sheet]
+        yield from ((number, cells) for number, cells in rows if number > layout.lines)
+        return
+    with open_file(layout.path, layout.encoding, newline="") as file:
+        try:
+            for _ in range(layout.lines):
+                next(file)
+            lines = (" ".join(line.split()) for line in file) if layout.separator == " " else file
+            reader = csv.reader(lines, delimiter=layout.separator, skipinitialspace=True)
+            for row in reader:
+                cells = (cell.strip() for cell in row)
+                signed = ["-" + cell[1:] if cell[:1] == "−" else cell for cell in cells]  # U+2212
+                yield layout.lines + reader.line_num, signed
+        except UnicodeDecodeError:
+            raise ValueError(not_text(layout.path)) from None
+        except csv.Error as error:
+            raise ValueError(
+                f"{layout.path} has a cell in line {layout.lines + reader.line_num} or behind it "
+                f"that never ends ({error}): a quotation mark may be missing."
+            ) from None
+
+
+def read_numbers(
+    layout: TableLayout, converters: Mapping[int, Callable[[str], float]] | None = None
+) -> np.ndarray:
+    """The columns of a table of numbers, in m, deg and s where a unit is given.
+
+    Parameters
+    ----------
+    layout : TableLayout
+    converters : dict, optional
+        Position of a column to the function that reads its cells, float for others.
+
+    Returns
+    -------
+    (n, k) array
+
+    Raises
+    ------
+    ValueError
+        Names the first line that is no row of numbers; also for a file without rows.
+    """
+    path = layout.path
+    if layout.header and layout.separator == ",":
+        _check_width(path, layout.lines, len(layout.header))
+    read: Any = dict(converters or {})
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*input contained no data")
+        try:
+            table = _loaded(layout, read, is_plain=not layout.is_own)
+        except ValueError:
+            if bad := _first_bad(layout, read):
+                raise ValueError(bad) from None
+            table = _loaded(layout, read, is_plain=True)  # without the rows of empty cells
+    if not len(table):
+        raise ValueError(f"{path} has a header but no epochs.")
+    return table * [layout.factors.get(name, 1.0) for name in layout.columns]
+
+
+def _loaded(layout, converters, is_plain):
+    """The table of numbers, of its plain lines or, which is faster, as the file is."""
+    if is_plain:
+        source, form = _plain_lines(layout), {"delimiter": "\t"}
+    else:
+        source = open_file(layout.path, ENCODING) if is_remote(layout.path) else layout.path
+        form = {"delimiter": ",", "skiprows": layout.lines}
+    columns = tuple(layout.columns.values())
+    try:
+        return np.loadtxt(
+            source, usecols=columns, encoding=ENCODING, ndmin=2, converters=converters, **form
+        )
+    except ValueError:
+        raise ValueError(f"{layout.path} is not a table of numbers.") from None
+
+
+def _plain_lines(layout):
+    """Rows of numbers of any layout, parted by tabs and with decimal points."""
+    for _, cells in read_rows(layout):
+        line = "\t".join(cells)
+        yield line.replace(",", ".") if layout.decimal == "," else line
+
+
+def _check_width(path, lines, width):
+    """Refuse rows with more cells than the header, as decimal commas make them."""
+    with open_file(path) as file:
+        for number, line in enumerate(file, start=1):
+            if line.count(b",") >= width and number > lines and not line.startswith(b"#"):
+                raise ValueError(_too_wide(f"Line {number} of {path}", line.count(b",") + 1, width))
+
+
+def _too_wide(line, cells, width):
+    return (
+        f"{line} has {cells} columns where the header has {width}: decimals must be separated by "
+        "points, not by commas, and a name with a comma stands in quotation marks."
+    )
+
+
+def _first_bad(layout, converters):
+    """A sentence on the first row that is none of numbers; empty where there is no such row."""
+    for line, cells in read_rows(layout):
+        if cells[0].startswith("#"):
+            continue
+        for column in layout.columns.values():
+            cell = cells[column].split("#")[0].strip()
+            try:
+                converters.get(column, layout.number)(cell)
+            except ValueError:
+                place = f"where a number belongs (column {column + 1})."
+                way_out = " It seems to be a date or a time of day: give seconds."
+                return f"{line} has '{shown(cell)}' {place}{way_out * bool(DATE.match(cell))}"
+    return ""

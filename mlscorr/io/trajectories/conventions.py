@@ -1,0 +1,173 @@
+"""Attitudes in the conventions of others, brought into our own."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mlscorr.frames import angles_from_attitude
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion
+from mlscorr.io.tables.column_names import ANGLES, AXES
+from mlscorr.io.trajectories.course import heading_and_course, median_difference
+from mlscorr.io.trajectories.projection import convergence_at, project
+from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+
+QUATERNION = ("qx", "qy", "qz", "qw")
+UNIT_TOLERANCE = 1e-3  # of a quaternion's length, where three decimals are written
+OUR_AXES = {  # right, forward and up in the body axes of others, as columns
+    "right-forward-up": np.eye(3),
+    "forward-left-up": np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+    "forward-right-down": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+}
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """How a file counts its angles, said in words.
+
+    Parameters
+    ----------
+    heading, pitch, roll : str
+        See TrajectorySection.
+    """
+
+    heading: str
+    pitch: str
+    roll: str
+
+    @classmethod
+    def of(cls, section: TrajectorySection, heading: str) -> "Conventions":
+        """Those that survey.toml names, else ours with this heading.
+
+        Parameters
+        ----------
+        section : TrajectorySection
+        heading : str
+        """
+        return cls(
+            section.heading or heading,
+            section.pitch or "nose up",
+            section.roll or "right side down",
+        )
+
+    def __str__(self) -> str:
+        """Half a sentence."""
+        return f"heading {self.heading}, pitch {self.pitch}, roll {self.roll}"
+
+
+def in_our_conventions(
+    path: Path, table: dict[str, np.ndarray], conventions: Conventions, crs: str | None
+) -> dict[str, np.ndarray]:
+    """A table with easting and northing, and angles as we count them.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    table : dict
+        Name of a column to an (n,) array. Units: s, m, deg.
+    conventions : Conventions
+    crs : str or None
+        Needed for latitude and longitude, and for headings from true north.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ValueError
+        Without the crs that is needed.
+    """
+    table = dict(table)
+    is_true = conventions.heading == "clockwise from true north"
+    if "latitude" in table:
+        table, convergence = _projected(path, table, crs)
+    elif is_true:
+        _check_crs(path, "headings from true north", crs)
+        convergence = convergence_at(crs, table["easting"], table["northing"])
+    if is_true:
+        table["heading"] = table["heading"] - np.degrees(convergence)
+    if conventions.heading == "counterclockwise from east":
+        table["heading"] = 90.0 - table["heading"]
+    if conventions.pitch == "nose down":
+        table["pitch"] = -table["pitch"]
+    if conventions.roll == "right side up":
+        table["roll"] = -table["roll"]
+    return table
+
+
+def _check_crs(path, what, crs):
+    """Refuse what needs the CRS of the map where survey.toml has none."""
+    if crs is None:
+        raise OpenQuestion(
+            f"{path} has {what}: set crs in survey.toml to the projected CRS of cloud and control.",
+            [PLACE_OF_CRS],
+        )
+
+
+def _projected(path, table, crs):
+    """A table with easting and northing for latitude and longitude; meridian convergence (rad)."""
+    _check_crs(path, "latitude and longitude", crs)
+    record = {name: np.radians(table[name]) for name in ("latitude", "longitude", "height")}
+    position, convergence = project(crs, record | {"height": table["height"]})
+    rest = {name: v for name, v in table.items() if name not in ("latitude", "longitude")}
+    return rest | dict(zip(AXES, position.T, strict=True)), convergence
+
+
+def attitude_of_quaternions(
+    path: Path, table: dict[str, np.ndarray], axes: str | None, crs: str | None = None
+) -> tuple[dict[str, np.ndarray], str]:
+    """A table with angles in place of quaternions, and the name of its body axes.
+
+    Without a name the axes are those whose forward goes along the course and whose up points up.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    table : dict
+        With qx, qy, qz, qw from body axes into east, north, up; true ones beside a latitude.
+    axes : str or None
+        One of OUR_AXES.
+    crs : str, optional
+        Needed for latitude and longitude.
+
+    Returns
+    -------
+    table : dict
+    axes : str
+
+    Raises
+    ------
+    ValueError
+        Where the course does not tell, and for quaternions that are none.
+    """
+    quaternion = np.column_stack([table[name] for name in QUATERNION])
+    if not np.isclose(np.linalg.norm(quaternion, axis=1), 1.0, atol=UNIT_TOLERANCE).all():
+        raise ValueError(f"{path} has quaternions whose length is not one: they are no attitudes.")
+    recorded, convergence = Rotation.from_quat(quaternion), 0.0
+    if "latitude" in table:
+        table, convergence = _projected(path, table, crs)
+    position = np.column_stack([table["easting"], table["northing"]])
+    tolerance, fitting = np.radians(SETTINGS.course_tolerance), []
+    for name, our_axes in OUR_AXES.items():
+        attitude = recorded * Rotation.from_matrix(our_axes)
+        angles = np.column_stack(angles_from_attitude(attitude))
+        angles[:, 2] -= convergence
+        heading, course = heading_and_course(table["gps_time"], position, angles[:, 2])
+        is_upright = (attitude.as_matrix()[:, 2, 2] > 0).all()
+        is_along = len(course) and median_difference(heading, course) < tolerance
+        if name == axes or (axes is None and is_upright and is_along):
+            fitting.append((name, angles))
+    if len(fitting) != 1:
+        raise OpenQuestion(
+            f"{path} has quaternions whose body axes the course over ground does not tell: name "
+            f"them under [trajectory] in survey.toml, as axes = one of {', '.join(OUR_AXES)}.",
+            [OpenPlace(("trajectory", "axes"), tuple(OUR_AXES), "body axes of the quaternions")],
+        )
+    name, angles = fitting[0]
+    rest = {key: values for key, values in table.items() if key not in QUATERNION}
+    return rest | dict(zip(ANGLES, np.degrees(angles).T, strict=True)), name

@@ -1,0 +1,408 @@
+"""Which constant turns a cloud's gps_time into the trajectory's.
+
+Three systems are in use: GPS seconds of week; GPS seconds since 1980-01-06; and these minus 1e9
+("adjusted standard GPS time"), LAS's own. A LAS header says week or standard, and real files lie:
+plain GPS seconds are found under either flag.
+"""
+
+import warnings
+from dataclasses import dataclass, replace
+from datetime import date, timedelta
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.trajectories.leap_seconds import EPOCH, leap_seconds
+from mlscorr.survey import Trajectory
+from mlscorr.survey.clouds import WEEK, counted_on
+
+DAY = 86400.0  # s
+ADJUSTMENT = 1e9  # s
+NO_TIMES = (0.0, -1.0)  # what programs write where a point has no time
+PLACEHOLDERS = (*NO_TIMES, *(time - ADJUSTMENT for time in NO_TIMES))  # s, converted likewise
+SYSTEMS = ("week", "standard", "gps")
+NAMES = {
+    "week": "GPS seconds of week",
+    "standard": "adjusted standard GPS time (GPS seconds minus 1e9)",
+    "gps": "plain GPS seconds since 1980",
+}
+
+
+@dataclass(frozen=True)
+class TimeMatch:
+    """trajectory time = cloud time + constant (s), the two systems, and the share inside.
+
+    A week more is added to cloud times below new_week (s), where seconds of week start again.
+    """
+
+    constant: float
+    cloud_system: str
+    trajectory_system: str
+    inside: float
+    new_week: float = -np.inf
+
+    def __str__(self) -> str:
+        text = f"{NAMES[self.cloud_system]}, as in the trajectory"
+        if self.constant != 0.0:
+            text = (
+                f"{NAMES[self.cloud_system]}; {self.constant:+.0f} s gives the trajectory's "
+                f"{NAMES[self.trajectory_system]}"
+            )
+        if self.new_week > -np.inf:
+            text += (
+                f"; the GPS week ends in the file, {WEEK:.0f} s are added where its times start "
+                "again, and they are written as they came"
+            )
+        return text
+
+    def placed(self, times: np.ndarray) -> np.ndarray:
+        """Times (n,) of the cloud in the trajectory's system. Units: s.
+
+        Parameters
+        ----------
+        times : (n,) array
+            In the cloud's own system. Units: s.
+        """
+        return counted_on(times, self.new_week) + self.constant
+
+
+def match_times(
+    name: str, times: ArrayLike, is_standard: bool, trajectory: Trajectory, setting: str = "auto",
+    time_offset: float = 0.0,
+) -> TimeMatch:  # fmt: skip
+    """Constant between a cloud's times and the trajectory's.
+
+    Parameters
+    ----------
+    name : str
+        The cloud file, for messages.
+    times : (n,) array
+        Times sampled from the cloud, in its own system. Units: s.
+    is_standard : bool
+        What the LAS header says: adjusted standard GPS time, or else seconds of week.
+    trajectory : Trajectory
+    setting : str
+        ``auto`` prefers the header but takes what fits; ``week`` and ``standard`` are obeyed.
+    time_offset : float
+        That was added to the times as stored. Units: s.
+
+    Returns
+    -------
+    TimeMatch
+
+    Raises
+    ------
+    ValueError
+        When most of the times lie outside the trajectory under every constant.
+
+    Warns
+    -----
+    UserWarning
+        When what fits contradicts the header, and of points without a time, which decide nothing.
+
+    Examples
+    --------
+    >>> from mlscorr.frames import attitude_from_angles
+    >>> from mlscorr.survey import Trajectory
+    >>> level = attitude_from_angles(np.zeros(2), 0.0, 0.0)
+    >>> trajectory = Trajectory(np.array([413200.0, 413300.0]), np.zeros((2, 3)), level)
+    >>> match_times("a.laz", np.array([391040000.0 + 413250.0]), True, trajectory).constant
+    -391040000.0
+    """
+    times = np.asarray(times, dtype=float)
+    times = times[np.isfinite(times)]
+    if not len(times):
+        raise ValueError(f"{name} has no points with a gps_time.")
+    stored = times - time_offset
+    is_missing = lacks_time(stored)
+    if is_missing.all():
+        raise ValueError(
+            f"The points of {name} have gps_time {listed_times(stored)} throughout: it was written "
+            "without times. Export it anew with gps_time, which places points on the trajectory."
+        )
+    if is_missing.any():
+        warnings.warn(
+            f"{is_missing.sum()} of {len(times)} points sampled from {name} have gps_time "
+            f"{listed_times(stored[is_missing])}: they were written without times, and its time "
+            "system is that of the others. Export them with gps_time, which places points on the "
+            "trajectory.",
+            stacklevel=2,
+        )
+        times = times[~is_missing]
+    _check_precision(name, times)
+    match = _match(times, is_standard, trajectory, setting)
+    new_week = _new_week(times)
+    if new_week > -np.inf:
+        counted = _match(counted_on(times, new_week), is_standard, trajectory, setting)
+        is_of_week = counted is not None and counted.cloud_system == "week"
+        if is_of_week and (match is None or counted.inside > match.inside):
+            match = replace(counted, new_week=new_week)
+    if match is None:
+        raise ValueError(_nothing_fits(name, times, trajectory.gps_time[[0, -1]], setting))
+    if setting == "auto":
+        flagged = "standard" if is_standard else "week"
+        match = _settle_equal(match, times)
+        if match.cloud_system != flagged:
+            warnings.warn(
+                f"The header of {name} says {NAMES[flagged]}, but its times "
+                f"[{times.min():.1f}, {times.max():.1f}] s fit the trajectory as {match}.",
+                stacklevel=2,
+            )
+    return match
+
+
+def _match(times, is_standard, trajectory, setting):
+    """The TimeMatch of times under the system that is preferred, or else under others; or None."""
+    candidates = _candidates(times, trajectory.gps_time[[0, -1]])
+    if setting != "auto":
+        return _best(candidates, times, trajectory, (setting,))
+    flagged = "standard" if is_standard else "week"
+    preferred = _best(candidates, times, trajectory, (flagged,))
+    return preferred or _best(candidates, times, trajectory, _others(flagged, times))
+
+
+def count_on(times: ArrayLike, period: float = WEEK) -> tuple[np.ndarray, np.ndarray | None]:
+    """Times of successive epochs that count on where seconds of the week start again.
+
+    They do where times fall by a week, less a pause of up to a day, as no mistake in a file does.
+
+    Parameters
+    ----------
+    times : (n,) array
+        Units: s.
+    period : float
+        After which they start again. Units: s.
+
+    Returns
+    -------
+    times : (n,) array
+    periods : (n,) int array, or None
+        Number of periods that were added; None where times never start again.
+
+    Examples
+    --------
+    >>> count_on([604_799.5, 604_800.0, 0.5, 1.0])[0].tolist()
+    [604799.5, 604800.0, 604800.5, 604801.0]
+    """
+    times = np.asarray(times, dtype=float)
+    is_fallen = np.diff(times) < DAY / WEEK * period - period
+    if not is_fallen.any() or not (times.min() >= 0 and times.max() <= period):
+        return times, None
+    periods = np.append(0, np.cumsum(is_fallen))
+    return times + period * periods, periods
+
+
+def counting_on(record: dict[str, np.ndarray], period: float = WEEK) -> dict[str, np.ndarray]:
+    """Columns of a file whose gps_time counts on; with the weeks that were added, if any.
+
+    Parameters
+    ----------
+    record : dict
+        Name of a column to an (n,) array.
+    period : float
+        As of count_on.
+
+    Returns
+    -------
+    dict
+    """
+    times, periods = count_on(record["gps_time"], period)
+    if periods is None:
+        return record
+    weeks = {"weeks": periods} if period == WEEK else {}
+    return record | {"gps_time": times} | weeks
+
+
+def _new_week(times):
+    """Limit (s) below which seconds of week are of the next one; infinite below zero without it.
+
+    Times at both ends of a week, and none for six days between them, are of a drive over its end.
+    """
+    ordered = np.sort(times)
+    gaps = np.diff(ordered)
+    is_of_week = ordered[0] >= 0 and ordered[-1] <= WEEK
+    if not is_of_week or not len(gaps) or gaps.max() < WEEK - DAY:
+        return -np.inf
+    last = int(np.argmax(gaps))
+    return float((ordered[last] + ordered[last + 1]) / 2)
+
+
+def lacks_time(times: np.ndarray) -> np.ndarray:
+    """Which points have no time: (n,) bool; what is no number, and 0 or -1 in their place.
+
+    Parameters
+    ----------
+    times : (n,) array
+        As stored. Units: s.
+    """
+    times = np.round(times, 6)  # s; an offset that was added and taken off again leaves less
+    is_placeholder = np.isin(times, PLACEHOLDERS)
+    is_missing = is_placeholder | ~np.isfinite(times)
+    if np.count_nonzero(is_placeholder) == 1 and not is_missing.all():
+        # a single one within the drive is a time: the week starts within one epoch
+        rest = times[~is_missing]
+        is_missing &= ~(is_placeholder & (np.abs(times - np.median(rest)) <= np.ptp(rest)))
+    return is_missing
+
+
+def listed_times(times: np.ndarray) -> str:
+    """Values of points without a time, with the number of each where they differ.
+
+    Parameters
+    ----------
+    times : (n,) array
+        Of these points, as stored. Units: s.
+    """
+    values, counts = np.unique(np.round(times, 6), return_counts=True)
+    if len(values) == 1:
+        return f"{values[0] + 0.0:.15g}"  # and not -0
+    some = zip(values.tolist(), counts.tolist(), strict=True)
+    return " and ".join(f"{value:.15g} ({number})" for value, number in some)
+
+
+def _check_precision(name, times):
+    """Warn of times all of which single precision can hold; refuse them where it is too coarse."""
+    rounded = times.astype(np.float32)
+    step = float(np.spacing(np.abs(rounded).max()))
+    if step <= SETTINGS.single_time_step or (rounded != times).any():
+        return
+    sentence = (
+        f"The times of {name} [{times.min():.3f}, {times.max():.3f}] s were rounded to single "
+        f"precision, in steps of {step:.2g} s, in which a vehicle moves on: export gps_time in "
+        "double precision."
+    )
+    if usual_systems(times) != ("week",):
+        raise ValueError(sentence)
+    warnings.warn(sentence, stacklevel=3)  # drift hardly changes within an eighth of a second
+
+
+def _candidates(times, span):
+    """Constants (s) as a list of (constant, cloud system, trajectory system), simplest first."""
+    middle, goal = np.median(times), np.mean(span)
+    candidates = [(0.0, system, system) for system in SYSTEMS]
+    candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
+    to_gps = {"standard": ADJUSTMENT, "gps": 0.0}
+    for cloud, added in to_gps.items():  # to seconds of week, or to the other continuous system
+        week = np.floor((middle + added) / WEEK)
+        candidates += [(added - WEEK * (week + k), cloud, "week") for k in (0, -1, 1)]
+        candidates += [(added - taken, cloud, t) for t, taken in to_gps.items() if t != cloud]
+    for system, taken in to_gps.items():  # from seconds of week
+        week = np.floor((goal + taken) / WEEK)
+        candidates += [(WEEK * (week + k) - taken, "week", system) for k in (0, -1, 1)]
+    return candidates
+
+
+def _inside(times, passes, constant):
+    """Share of the times that fall inside passes (k, 2) of the trajectory, or its span (2,)."""
+    starts, ends = np.reshape(passes, (-1, 2)).T
+    number = np.searchsorted(starts, times + constant, side="right") - 1
+    return np.mean((number >= 0) & (times + constant <= ends[number]))
+
+
+def _best(candidates, times, trajectory, systems):
+    """The TimeMatch with most times in passes, or else in all, the first of equals; or None."""
+    for passes in (trajectory.passes, trajectory.gps_time[[0, -1]]):  # gaps hold any by chance
+        fits = [
+            TimeMatch(float(constant), cloud, system, float(inside))
+            for flagged in systems
+            for constant, cloud, system in candidates
+            if cloud == flagged
+            and (inside := _inside(times, passes, constant)) >= SETTINGS.covered_share
+        ]
+        if fits:
+            return max(fits, key=lambda match: match.inside)
+    return None
+
+
+def _others(flagged, times):
+    """The systems that the header does not name, the likelier by the size of the times first."""
+    usual = usual_systems(times)
+    others = [system for system in SYSTEMS if system != flagged]
+    return sorted(others, key=lambda system: system not in usual)
+
+
+def usual_systems(times: np.ndarray) -> tuple[str, ...]:
+    """Names of the systems whose range times lie in, the likelier first.
+
+    Parameters
+    ----------
+    times : (n,) array
+        Units: s.
+    """
+    if times.min() >= 0 and times.max() <= 2 * WEEK:
+        return ("week",)
+    if times.min() >= ADJUSTMENT:
+        return ("gps",)
+    return ("gps", "standard") if times.min() >= SETTINGS.earliest_time else ("standard",)
+
+
+def utc_lag(*times: np.ndarray) -> int:
+    """GPS time minus UTC on the day of times, by the first that tell it, or else today's. Units: s.
+
+    Parameters
+    ----------
+    *times : (n,) arrays
+        Of cloud or trajectory, each in its own system. Units: s.
+    """
+    for some in times:
+        if (system := usual_systems(some)[0]) != "week":
+            seconds = float(some[0]) + ADJUSTMENT * (system == "standard")
+            # of garbage too, to the 23rd century
+            return leap_seconds(EPOCH + timedelta(days=np.clip(seconds / DAY, 0, 1e5)))
+    return leap_seconds(date.max)
+
+
+def _settle_equal(match, times):
+    """Name the system of equal times by their size: a constant of zero says nothing of it."""
+    usual = usual_systems(times)
+    if match.constant != 0.0 or match.cloud_system in usual:
+        return match
+    return replace(match, cloud_system=usual[0], trajectory_system=usual[0])
+
+
+def _other_systems(lag, earlier):
+    """Pairs (s, name) of what systems beside GPS time differ from it by, up to whole weeks."""
+    days = range(1, 7) if earlier <= DAY else ()  # else of another day, not seconds of the day
+    unix = (EPOCH - date(1970, 1, 1)).days * DAY - lag
+    differences = {lag: "UTC", unix: "Unix time", unix % WEEK: "Unix time"}
+    differences |= {day * DAY: "seconds of the day" for day in days}
+    return [(sign * s, system) for s, system in differences.items() for sign in (1, -1)]
+
+
+def _nothing_fits(name, times, span, setting):
+    """A sentence with both spans, the likely cause and the way out."""
+    candidates = _candidates(times, span)
+    shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
+    largest = max(inside for inside, cloud in shares if setting in ("auto", cloud))
+    spans = (
+        f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
+        f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
+    )
+    share = f"Only {largest:.0%} of" if largest > 0 else "None of"
+    constants = [constant for constant, cloud, _ in candidates if setting in ("auto", cloud)]
+    systems = _other_systems(utc_lag(span, times), min(times.max(), span[1]))
+    for constant, (later, system) in product(constants, systems):
+        if _inside(times, span, constant + later) == 1.0:
+            return (
+                f"{share} {spans}, but all would with {later:+.0f} s: one of both may be in "
+                f"{system}, or the trajectory covers a part of the cloud. Export both in GPS time "
+                f"and whole; if it is {system}, add {-later:.0f} to trajectory.time_constant (s) "
+                "in survey.toml instead."
+            )
+    if largest > 0:
+        return (
+            f"{share} {spans}: the trajectory covers a part of the cloud. Export the whole "
+            "trajectory, or clip the cloud to it."
+        )
+    if setting == "auto" or max(shares)[0] < SETTINGS.covered_share:
+        return (
+            f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
+            "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "
+            "them may be in UTC, local time or milliseconds. Check that both are of one drive."
+        )
+    return (
+        f'None of {spans}, taken as {NAMES[setting]}, which cloud.gps_time = "{setting}" in '
+        'survey.toml asks for. Try cloud.gps_time = "auto".'
+    )

@@ -1,0 +1,228 @@
+"""Trajectories from CSV, SBET and the files of others, and back to CSV."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.frames import angles_from_attitude, attitude_from_angles
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.opening import open_file
+from mlscorr.io.store.output import output_file
+from mlscorr.io.store.storage import as_path
+from mlscorr.io.store.text_files import warn_of_cut
+from mlscorr.io.trajectories.course import check_units, checked_motion
+from mlscorr.io.trajectories.pof import POF_SUFFIX
+from mlscorr.io.trajectories.sbet import is_sbet, read_riegl, read_sbet
+from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+from mlscorr.io.trajectories.trajectory_tables import (
+    ATTITUDE_SIGMAS,
+    COLUMNS,
+    POSITION_SIGMAS,
+    SESSION,
+    read_table,
+    read_terrascan,
+)
+from mlscorr.io.trajectories.trj import MARK
+from mlscorr.survey import Trajectory
+
+SBET_SUFFIXES = (".sbet", ".out")
+NAMED = {"file", "accuracy", "time_constant"}  # keys of any trajectory
+NOTHING_GIVEN = TrajectorySection(file="")
+
+
+@dataclass(frozen=True)
+class TrajectoryFile:
+    """A trajectory as it was read, and what was understood of its file.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    is_sbet : bool
+    layout : str or None
+        A sentence; None for an SBET and for our own columns, where nothing had to be understood.
+    """
+
+    trajectory: Trajectory
+    is_sbet: bool
+    layout: str | None = None
+
+
+def read_trajectory(
+    path: str | Path, crs: str | None = None, accuracy: str | Path | None = None
+) -> Trajectory:
+    """Trajectory of a .csv file, an SBET, or a file of others.
+
+    Parameters
+    ----------
+    path : path
+    crs : str, optional
+        Projected CRS that an SBET is brought into; a CSV is in map coordinates already.
+    accuracy : path, optional
+        An SBET's smrmsg or a POF's POQ; a CSV carries its sigmas in its own columns.
+
+    Returns
+    -------
+    Trajectory
+        Angles are degrees in the CSV and radians inside.
+
+    Raises
+    ------
+    ValueError
+        For missing columns, cells that are not numbers, times that don't increase, radians where
+        degrees belong, and an unknown kind of file.
+
+    Warns
+    -----
+    UserWarning
+        When the heading disagrees with the course over ground.
+    """
+    return read_trajectory_file(path, crs, accuracy).trajectory
+
+
+def read_trajectory_file(
+    path: str | Path,
+    crs: str | None = None,
+    accuracy: str | Path | None = None,
+    section: TrajectorySection = NOTHING_GIVEN,
+) -> TrajectoryFile:
+    """Trajectory of a file whose kind its content tells, or the suffix of a POF.
+
+    Parameters
+    ----------
+    path, crs, accuracy
+        See read_trajectory.
+    section : TrajectorySection, optional
+        What survey.toml says of columns and conventions.
+
+    Returns
+    -------
+    TrajectoryFile
+
+    Raises
+    ------
+    ValueError, UserWarning
+        As read_trajectory; also for what can be understood in two ways.
+    """
+    path = as_path(path)
+    with open_file(path) as file:
+        start = file.read(SETTINGS.longest_line)
+    if not start:
+        raise ValueError(f"{path} is empty (0 bytes): its copying was interrupted. Copy it anew.")
+    suffix = path.suffix.lower()
+    if suffix == POF_SUFFIX or suffix in SBET_SUFFIXES or is_sbet(path):
+        return _read_geographic(path, crs, accuracy, section, suffix == POF_SUFFIX)
+    if accuracy is not None:
+        raise ValueError(
+            f"{path} has its accuracy in its own sigma columns; an accuracy file ({accuracy}) "
+            "belongs to an SBET or a POF."
+        )
+    if suffix == ".pofx":
+        raise ValueError(
+            f"{path} is a POFX of RIEGL, whose layout is not public: export it as POF, SBET or "
+            "text."
+        )
+    is_text = not start.startswith(MARK)
+    is_wide = start[:2] in (b"\xff\xfe", b"\xfe\xff")  # UTF-16
+    if is_text and b"\0" in start and not is_wide and path.suffix.lower() != ".csv":
+        raise ValueError(
+            f"{path} is of an unknown kind: no table of text, no SBET (whole records of 136 bytes, "
+            f"angles in radians) and no trajectory of TerraScan. Export it as text or SBET."
+        )
+    table, layout = (read_table if is_text else read_terrascan)(path, section, crs)
+    trajectory = checked_motion(path, _trajectory_of(path, table))
+    if is_text and not is_wide:
+        warn_of_cut(path)
+    return TrajectoryFile(trajectory, False, layout)
+
+
+def _read_geographic(path, crs, accuracy, section, is_pof):
+    """TrajectoryFile of an SBET or a POF, which take no columns and no conventions."""
+    given = sorted(section.model_fields_set & set(TrajectorySection.model_fields) - NAMED)
+    if given:
+        raise ValueError(
+            f"{path} is {'a POF' if is_pof else 'an SBET'}, whose columns and conventions are "
+            f"known: remove {', '.join(given)} from [trajectory]."
+        )
+    if is_pof:
+        trajectory, layout = read_riegl(path, crs, accuracy)
+        return TrajectoryFile(checked_motion(path, trajectory), False, layout)
+    return TrajectoryFile(checked_motion(path, read_sbet(path, crs, accuracy)), True)
+
+
+def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
+    """Write a trajectory with its sigmas, if any: 1e-6 s, 1e-5 m, 1e-7 deg, heading from 0 to 360.
+
+    A column session follows where steps alone don't part the sessions of the POS. Seconds of week
+    start again where those of the input do. The file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+    trajectory : Trajectory
+
+    Raises
+    ------
+    OSError
+        When the disk refuses.
+    """
+    angles = np.degrees(np.column_stack(angles_from_attitude(trajectory.attitude)))
+    blocks = [trajectory.file_time[:, None], trajectory.position, angles]
+    names, formats = COLUMNS, ["%.6f"] + ["%.5f"] * 3 + ["%.7f"] * 3
+    if trajectory.position_sigma is not None:
+        blocks.append(trajectory.position_sigma)
+        names, formats = names + POSITION_SIGMAS, formats + ["%.5f"] * 3
+    if trajectory.attitude_sigma is not None:
+        blocks.append(np.degrees(trajectory.attitude_sigma))
+        names, formats = names + ATTITUDE_SIGMAS, formats + ["%.7f"] * 3
+    if trajectory.session is not None:
+        blocks.append(trajectory.session[:, None])
+        names, formats = names + SESSION, [*formats, "%d"]
+    table, line = np.hstack(blocks), ",".join(formats) + "\n"
+    with output_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(names) + "\n")
+        for start in range(0, len(table), 10_000):  # one format call for many rows is fast
+            rows = table[start : start + 10_000]
+            file.write((line * len(rows)) % tuple(rows.ravel()))
+
+
+def _trajectory_of(path, table):
+    """The Trajectory of a table in our own columns and conventions."""
+    _check_values(path, table)
+    angles = np.column_stack([table[name] for name in COLUMNS[4:]])
+    position = np.column_stack([table[name] for name in COLUMNS[1:4]])
+    check_units(path, table["gps_time"], position, angles)
+
+    def sigmas(names):
+        return np.column_stack([table[name] for name in names]) if names[0] in table else None
+
+    attitude_sigma = sigmas(ATTITUDE_SIGMAS)
+    try:
+        return Trajectory(
+            table["gps_time"],
+            position,
+            attitude_from_angles(*np.radians(angles).T),
+            sigmas(POSITION_SIGMAS),
+            None if attitude_sigma is None else np.radians(attitude_sigma),
+            table[SESSION[0]].astype(int) if SESSION[0] in table else None,
+            weeks=table.get("weeks"),
+        )
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _check_values(path, table):
+    """Refuse values that are not finite, sigmas below zero, and positions without any error."""
+    for name, values in table.items():
+        bad = ~np.isfinite(values)
+        if bad.any():
+            raise ValueError(
+                f"{bad.sum()} of {len(bad)} epochs of {path} have a {name} that is not a number "
+                f"(first: epoch {np.argmax(bad) + 1}). Remove these epochs."
+            )
+        is_nothing = name in POSITION_SIGMAS and not values.any()
+        if is_nothing or (name.startswith("sigma") and values.min() < 0):
+            raise ValueError(
+                f"{(values <= 0).sum()} of {len(values)} epochs of {path} have a {name} of 0 or "
+                f"less (first: epoch {np.argmax(values <= 0) + 1}). Without it [pos] counts."
+            )

@@ -1,0 +1,325 @@
+"""One trajectory of several files: sessions of the POS, joined in order of time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.trajectories.time_systems import NAMES, usual_systems
+from mlscorr.io.trajectories.trajectory import read_trajectory_file
+from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+from mlscorr.survey import Pos, Trajectory
+from mlscorr.survey.clouds import WEEK
+
+KINDS = ("position", "attitude")
+
+
+@dataclass(frozen=True)
+class SessionFile:
+    """A file of [trajectory] or of one [[trajectory]].
+
+    Parameters
+    ----------
+    path : Path
+    accuracy : Path or None
+        Of an SBET.
+    section : TrajectorySection
+        What survey.toml says of it.
+    """
+
+    path: Path
+    accuracy: Path | None
+    section: TrajectorySection
+
+
+@dataclass(frozen=True)
+class Sessions:
+    """The trajectory of a survey, and what it was made of.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of all sessions.
+    parts : tuple of Trajectory
+        Of each file.
+    is_sbet : bool
+        Whether one of the files is.
+    layouts : tuple of str
+        How tables of others were understood.
+    notes : tuple of str
+        How the files were joined, and what was added to their times.
+    """
+
+    trajectory: Trajectory
+    parts: tuple[Trajectory, ...]
+    is_sbet: bool
+    layouts: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def read_sessions(
+    files: Sequence[SessionFile], crs: str | None = None, pos: Pos | None = None
+) -> Sessions:
+    """The trajectory of a survey's one file, or of several that are joined.
+
+    Parameters
+    ----------
+    files : sequence of SessionFile
+    crs : str, optional
+        As of read_trajectory.
+    pos : Pos, optional
+        What survey.toml says of a trajectory without sigmas.
+
+    Returns
+    -------
+    Sessions
+
+    Raises
+    ------
+    ValueError
+        As read_trajectory_file, and where the files can't be of one drive.
+    """
+    read = [read_trajectory_file(f.path, crs, f.accuracy, f.section) for f in files]
+    names = [file.path.name for file in files]
+    parts = [
+        replace(part.trajectory, gps_time=part.trajectory.gps_time + file.section.time_constant)
+        for part, file in zip(read, files, strict=True)
+    ]
+    joined, notes = parts[0], []
+    if len(parts) > 1:
+        check_systems(names, parts)
+        parts = across_week_end(parts)
+        parts, notes = with_sigmas(names, parts, pos)
+        joined, joints = join_sessions(names, parts, pos or Pos())
+        notes = [_summary(names, parts, joined), *joints, *notes]
+    notes += _week_ends(names, parts)
+    notes += [
+        f"{file.section.time_constant:+g} s (trajectory.time_constant) were added to the times of "
+        f"{name}: trajectories that are written have them, too."
+        for name, file in zip(names, files, strict=True)
+        if file.section.time_constant
+    ]
+    layouts = tuple(filter(None, (file.layout for file in read)))
+    return Sessions(joined, tuple(parts), any(f.is_sbet for f in read), layouts, tuple(notes))
+
+
+def _summary(names, parts, joined):
+    """A sentence on several files."""
+    order = np.argsort([part.gps_time[0] for part in parts])
+    listed = ", ".join(f"{names[i]} {_span(parts[i])}" for i in order)
+    return (
+        f"The trajectory was joined of {len(parts)} files in order of time ({listed}): "
+        f"{len(joined)} epochs, gaps {len(joined.gaps)}."
+    )
+
+
+def _span(part):
+    return f"[{part.gps_time[0]:.3f}, {part.gps_time[-1]:.3f}] s"
+
+
+def check_systems(names: Sequence[str], parts: Sequence[Trajectory]) -> None:
+    """Refuse trajectories that can't be of one time system by the size of their times.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the files, for messages.
+    parts : sequence of Trajectory
+
+    Raises
+    ------
+    ValueError
+    """
+    systems = [usual_systems(part.gps_time) for part in parts]
+    for name, part, system in zip(names, parts, systems, strict=True):
+        if not set(system) & set(systems[0]):
+            raise ValueError(
+                f"The times of {names[0]} {_span(parts[0])} are {NAMES[systems[0][0]]} by their "
+                f"size, those of {name} {_span(part)} {NAMES[system[0]]}: the trajectories of a "
+                "survey need one time system. Export them in the same one."
+            )
+
+
+def across_week_end(parts: Sequence[Trajectory]) -> list[Trajectory]:
+    """Trajectories whose seconds of week count on from the end of a week into the next one.
+
+    A week is added to the first of a week where all together are then shorter, and last less than
+    half a week: a drive from Saturday to Sunday, and not the week between Sunday and Saturday.
+
+    Parameters
+    ----------
+    parts : sequence of Trajectory
+        Of one time system.
+    """
+    starts, ends = np.array([part.gps_time[[0, -1]] for part in parts]).T
+    if starts.min() < 0 or usual_systems(ends) != ("week",):
+        return list(parts)
+    lengths = {}
+    for first in np.unique(starts):
+        shift = WEEK * (starts < first)
+        lengths[first] = (ends + shift).max() - (starts + shift).min()
+    first = min(lengths, key=lambda start: lengths[start])
+    if lengths[first] >= min(WEEK / 2, lengths[starts.min()]):
+        return list(parts)
+    return [_week_later(part) if part.gps_time[0] < first else part for part in parts]
+
+
+def _week_later(part):
+    """A trajectory with a week added to its times, which files have as they came."""
+    weeks = np.zeros(len(part), int) if part.weeks is None else part.weeks
+    return replace(part, gps_time=part.gps_time + WEEK, weeks=weeks + 1)
+
+
+def _week_ends(names, parts):
+    """A sentence on each trajectory to whose times weeks were added."""
+    for name, part in zip(names, parts, strict=True):
+        if part.weeks is None:
+            continue
+        first = part.file_time[np.argmax(part.weeks > 0)]
+        yield (
+            f"The GPS week ends before epoch {np.argmax(part.weeks > 0) + 1} of {name} "
+            f"({first:.3f} s): {WEEK:.0f} s are added from there on, so that times count on. "
+            "Trajectories are written with seconds of week as they came."
+        )
+
+
+def with_sigmas(
+    names: Sequence[str], parts: Sequence[Trajectory], pos: Pos | None
+) -> tuple[list[Trajectory], list[str]]:
+    """All trajectories with the sigmas that one of them states, and sentences on those of [pos].
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the files, for messages.
+    parts : sequence of Trajectory
+    pos : Pos or None
+        What is believed of those without sigmas.
+
+    Raises
+    ------
+    ValueError
+        Where nothing is.
+    """
+    parts = list(parts)
+    notes = []
+    for kind in KINDS:
+        key = f"{kind}_sigma"
+        lacking = [i for i, part in enumerate(parts) if getattr(part, key) is None]
+        if len(lacking) in (0, len(parts)):
+            continue
+        without = ", ".join(names[i] for i in lacking)
+        if pos is None:
+            raise ValueError(
+                f"{len(lacking)} of the {len(parts)} trajectories state no sigma of {kind} "
+                f"({without}), the others do. Export them with it, name the accuracy of an SBET "
+                f"under its [[trajectory]], or say under [pos] in survey.toml what {key} they have."
+            )
+        for i in lacking:
+            stated = np.tile(np.broadcast_to(getattr(pos, key), 3), (len(parts[i]), 1))
+            parts[i] = replace(parts[i], **{key: stated})
+        notes.append(f"The sigma of {kind} that {without} does not state is that of [pos].")
+    return parts, notes
+
+
+def join_sessions(
+    names: Sequence[str], parts: Sequence[Trajectory], pos: Pos
+) -> tuple[Trajectory, list[str]]:
+    """One trajectory of several, in order of time; from one to the next is a gap.
+
+    What two of them have in common is taken once, of the one that starts first, and joins them
+    without a gap where both are the same to the millimetre: one export that was cut.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the files, for messages.
+    parts : sequence of Trajectory
+        All with sigmas, or none.
+    pos : Pos
+        Whose sigmas are believed where they have none.
+
+    Returns
+    -------
+    trajectory : Trajectory
+        Without sessions where its steps part them.
+    notes : list of str
+        Sentences on what overlaps.
+
+    Raises
+    ------
+    ValueError
+        Where two are at different places at the same time.
+    """
+    parts = _with_weeks(parts)
+    order = sorted(range(len(parts)), key=lambda i: (parts[i].gps_time[0], -len(parts[i])))
+    sessions, kept, notes = [_numbers(part) for part in parts], [], []
+    largest, bases = 1 + max(session.max() for session in sessions), {}
+    for number, i in enumerate(order):
+        bases[i], is_new = 1 + number * largest, np.ones(len(parts[i]), bool)
+        for j in order[:number]:
+            is_common = parts[j].segment(parts[i].gps_time) >= 0
+            if not is_common.any():
+                continue
+            is_same = _compare([names[j], names[i]], parts[j], parts[i], is_common, pos)
+            if is_same:
+                bases[i] = bases[j]
+            how = "the same, and join" if is_same else "alike within their sigmas, and part"
+            notes.append(
+                f"{is_common.sum()} epochs of {names[i]} lie within {names[j]}: they are {how} the "
+                f"two there; those of {names[j]} are taken."
+            )
+            is_new &= ~is_common
+        if is_new.any():
+            kept.append(replace(parts[i], session=bases[i] + sessions[i]).select(is_new))
+    parted = Trajectory.concatenate(kept)
+    whole = replace(parted, session=None)
+    return whole if np.array_equal(whole.gaps, parted.gaps) else parted, notes
+
+
+def _with_weeks(parts):
+    """All parts with the weeks that were added to their times, where that was done to one."""
+    if all(part.weeks is None for part in parts):
+        return parts
+    return [
+        replace(part, weeks=np.zeros(len(part), int)) if part.weeks is None else part
+        for part in parts
+    ]
+
+
+def _numbers(part):
+    """Sessions (n,) of a part by itself, from 0."""
+    return np.zeros(len(part), int) if part.session is None else part.session - part.session.min()
+
+
+def _compare(names, first, second, is_common, pos):
+    """Whether two trajectories are one; a ValueError where they are at different places."""
+    there = Trajectory.at(first, second.gps_time[is_common])
+    apart = np.linalg.norm(there.position - second.position[is_common], axis=1)
+    turned = (there.attitude * second.attitude[is_common].inv()).magnitude()
+    limits = []
+    for kind in KINDS:
+        key = f"{kind}_sigma"
+        stated = getattr(second, key)
+        if stated is None:
+            limits.append(np.linalg.norm(np.broadcast_to(getattr(pos, key), 3)) * np.sqrt(2))
+        else:
+            both = np.hstack([getattr(there, key), stated[is_common]])
+            limits.append(_rms(np.linalg.norm(both, axis=1)))
+    way, turn = _rms(apart), _rms(turned)
+    if way > limits[0] or turn > limits[1]:
+        common = second.gps_time[is_common]
+        raise ValueError(
+            f"{names[0]} and {names[1]} overlap by {np.ptp(common):.1f} s (from {common[0]:.3f} s) "
+            f"and differ there by {way:.3f} m and {np.degrees(turn):.4f} deg (RMS), where "
+            f"their sigmas state {limits[0]:.3f} m and {np.degrees(limits[1]):.4f} deg. Two "
+            "vehicles are two surveys, each with its own survey.toml; of one vehicle give the "
+            "final trajectory alone, and times of different weeks as GPS seconds that go on."
+        )
+    return bool(apart.max() <= SETTINGS.same_export)
+
+
+def _rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,0 +1,267 @@
+"""Trajectories in tables: our own columns, those of Inertial Explorer and others, and TUM's.
+
+TUM's rows are `time x y z qx qy qz qw` without a header, parted by blanks. With a header its names
+say which column is what: other programs write qw first.
+"""
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.store.open_places import OpenPlace, OpenQuestion
+from mlscorr.io.store.text_files import shown
+from mlscorr.io.tables.column_names import (
+    ANGLES,
+    AXES,
+    TRAJECTORY_NAMES,
+    UNITS,
+    find_meanings,
+    plain,
+)
+from mlscorr.io.tables.layout_search import NUMBER, likely_header
+from mlscorr.io.tables.layouts import TableLayout
+from mlscorr.io.tables.table_rows import read_numbers
+from mlscorr.io.tables.tables import read_layout
+from mlscorr.io.trajectories.conventions import (
+    QUATERNION,
+    UNIT_TOLERANCE,
+    Conventions,
+    attitude_of_quaternions,
+    in_our_conventions,
+)
+from mlscorr.io.trajectories.positions import check_projected, position_file
+from mlscorr.io.trajectories.time_systems import counting_on
+from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+from mlscorr.io.trajectories.trj import read_trj
+from mlscorr.survey import SurveyFileError
+
+COLUMNS = ("gps_time", *AXES, *ANGLES)
+POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
+ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
+SESSION = ("session",)  # of the POS, in a trajectory that was joined of several
+GRID, TRUE = "clockwise from grid north", "clockwise from true north"
+FROM_EAST = "counterclockwise from east"
+TUM = ("gps_time", *AXES, *QUATERNION)
+ORDER = re.compile(r"q.{0,3}|.*(quat|orient|rot).*|w")  # plain names of a quaternion's columns
+TIME_UNITS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}  # s
+EARLIEST = 1e8  # s since 1970: 1973
+LATEST = 1e11  # s since 1970: 5138; a thousand times more, so that sizes of units don't overlap
+TRUE_NORTH_USUAL = {"hell", "hdngsd", "eastsd"}  # columns of Inertial Explorer and POSPac alone
+HINTS = {
+    ("easting", "x"): " Say under [trajectory.columns] in survey.toml which of X and Y is easting, "
+    "or longitude where they are angles.",
+    ("heading", "yaw"): (
+        " Its yaw is a heading by convention only: say under [trajectory] in survey.toml how "
+        f'it counts, as heading = "{FROM_EAST}" or "{GRID}".'
+    ),
+}
+HINT_PLACES = {
+    ("heading", "yaw"): OpenPlace(
+        ("trajectory", "heading"), (FROM_EAST, GRID), "direction in which the yaw counts"
+    ),
+}
+
+
+def read_table(
+    path: Path, section: TrajectorySection, crs: str | None
+) -> tuple[dict[str, np.ndarray], str | None]:
+    """Columns of a trajectory in our names, units and conventions, and what was understood.
+
+    Parameters
+    ----------
+    path : Path
+    section : TrajectorySection
+    crs : str or None
+
+    Returns
+    -------
+    table : dict
+        Name of a column to an (n,) array. Units: s, m, deg.
+    layout : str or None
+        A sentence; None for our own columns without conventions of others.
+
+    Raises
+    ------
+    ValueError
+        For missing columns, cells that are no numbers, and conventions that are not known.
+    """
+    groups, chosen = (POSITION_SIGMAS, ATTITUDE_SIGMAS, SESSION), section.columns.chosen
+
+    def lacking(names: Collection[str]) -> list[str]:
+        is_projected = "latitude" not in names or {"easting", "northing"} <= set(names)
+        place = AXES if is_projected else ("latitude", "longitude", "height")
+        angles = ("roll", "pitch", "yaw" if section.heading and "yaw" in names else "heading")
+        if _is_quaternion(names, chosen):
+            angles = QUATERNION
+            is_named = {"easting", "northing"} & set(names) or not is_projected
+            place = place if is_named or "x" not in names else ("x", "y", "height")
+        return [name for name in ("gps_time", *place, *angles) if name not in names]
+
+    try:
+        layout = read_layout(
+            path,
+            COLUMNS,
+            groups,
+            TRAJECTORY_NAMES,
+            lacking,
+            chosen,
+            tum_columns,
+            HINTS,
+            HINT_PLACES,
+        )
+    except ValueError as error:
+        if isinstance(error, SurveyFileError) or not (other := position_file(path)):
+            raise
+        raise ValueError(other) from None
+    _check_order(layout, lacking, chosen)
+    layout = layout if layout.is_own else _used(layout, _is_quaternion(layout.columns, chosen))
+    if section.angles:
+        angles = (*ANGLES, "yaw", *ATTITUDE_SIGMAS)
+        factors = {name: UNITS[section.angles] for name in angles if name in layout.columns}
+        layout = replace(layout, factors=layout.factors | factors)
+    table = _place_in_degrees(path, layout, read_numbers(layout).T, section.angles)
+    check_projected(path, table)
+    table, unit = _in_seconds(layout, table)
+    table = counting_on(table)
+    if "qw" in layout.columns:
+        table, axes = attitude_of_quaternions(path, table, section.axes, crs)
+        return table, f"{layout}{unit}; body axes {axes}{layout.not_used}."
+    if "yaw" in table:
+        table["heading"] = table.pop("yaw")
+    conventions = Conventions.of(section, _usual_heading(layout, section))
+    given = section.model_fields_set & {"angles", "heading", "pitch", "roll"}
+    if layout.is_own and not given:
+        return table, f"{layout}{unit}." if unit else None
+    table = in_our_conventions(path, table, conventions, crs)
+    degrees = "" if "roll" in layout.factors else ", angles in degrees"
+    where = (
+        f"; latitude and longitude in the datum of {crs}" if "latitude" in layout.columns else ""
+    )
+    return table, f"{layout}{unit}{where}; {conventions}{degrees}{layout.not_used}."
+
+
+def read_terrascan(
+    path: Path, section: TrajectorySection, crs: str | None
+) -> tuple[dict[str, np.ndarray], str]:
+    """Columns of a TerraScan trajectory in our conventions, and what was understood.
+
+    Parameters
+    ----------
+    path, section, crs
+        See read_table.
+
+    Returns
+    -------
+    table : dict
+    layout : str
+    """
+    conventions = Conventions.of(section, GRID)
+    table = in_our_conventions(path, counting_on(read_trj(path)), conventions, crs)
+    return table, f"{path.name} was read as a TerraScan trajectory; {conventions}."
+
+
+def tum_columns(cells: Sequence[str]) -> Mapping[str, int]:
+    """Columns of a row in TUM's layout: eight numbers, the last four a unit quaternion.
+
+    Parameters
+    ----------
+    cells : sequence of str
+
+    Returns
+    -------
+    mapping
+        Empty for a row in another layout.
+    """
+    if len(cells) != len(TUM) or not all(map(NUMBER.fullmatch, cells)):
+        return {}
+    length = np.linalg.norm([float(cell.replace(",", ".")) for cell in cells[4:]])
+    is_attitude = abs(length - 1.0) < UNIT_TOLERANCE
+    return dict(zip(TUM, range(len(TUM)), strict=True)) if is_attitude else {}
+
+
+def _is_quaternion(names, chosen):
+    """Whether a quaternion gives the attitude: it was chosen, or there are no angles beside it."""
+    is_there = not set(QUATERNION).isdisjoint(names)
+    has_angles = {"roll", "pitch"} <= set(names) and not {"heading", "yaw"}.isdisjoint(names)
+    return is_there and (not has_angles or not set(QUATERNION).isdisjoint(chosen))
+
+
+def _check_order(layout, lacking, chosen):
+    """Refuse a quaternion by place where a header names its columns, in words that aren't known."""
+    if layout.header or "qw" not in layout.columns or chosen:
+        return
+    header = likely_header(layout.path, TRAJECTORY_NAMES)
+    if len(header) == len(TUM) and any(ORDER.fullmatch(plain(cell)) for cell in header):
+        known = find_meanings(header, TRAJECTORY_NAMES)
+        missing = lacking({*known, "qw"}) + ["qw"] * ("qw" not in known)
+        raise ValueError(
+            f"{layout.path} names its columns {', '.join(map(shown, header))}, which leaves open "
+            f"{', '.join(missing)}: number all under [trajectory.columns] in survey.toml, as "
+            "gps_time = 1, easting = 2, northing = 3, height = 4, qx = 5, qy = 6, qz = 7, qw = 8."
+        )
+
+
+def _in_seconds(layout, table):
+    """The table with times in seconds, and words on the unit where their size tells it."""
+    known = np.abs(table["gps_time"][np.isfinite(table["gps_time"])])
+    if "gps_time" in layout.factors or not len(known):
+        return table, ""
+    size = float(np.median(known))
+    for unit, factor in TIME_UNITS.items():
+        if EARLIEST <= size * factor < LATEST <= size:
+            seconds = table | {"gps_time": table["gps_time"] * factor}
+            return seconds, f"; times in {unit} by their size"
+    return table, ""
+
+
+def _used(layout: TableLayout, is_quaternion: bool) -> TableLayout:
+    """The layout with the columns that are used: one kind of place, sigmas of all axes or none.
+
+    With a quaternion x is east and y north: turned about a height, no others are right-handed.
+    """
+    columns = layout.columns
+    if is_quaternion and "easting" not in columns and "latitude" not in columns:
+        horizontal = {"x": "easting", "y": "northing"}
+        columns = {horizontal.get(name, name): place for name, place in columns.items()}
+        factors = {horizontal.get(name, name): factor for name, factor in layout.factors.items()}
+        layout = replace(layout, factors=factors)
+    needless = {"x", "y", *(ANGLES if is_quaternion else QUATERNION)}
+    needless |= {"yaw"} if is_quaternion else set()
+    needless |= {"latitude", "longitude"} if "easting" in columns else set()
+    needless |= {"yaw"} if "heading" in columns else set()
+    for group in (POSITION_SIGMAS, ATTITUDE_SIGMAS):
+        needless |= set() if set(group) <= set(columns) else set(group)
+    return replace(layout, columns={name: i for name, i in columns.items() if name not in needless})
+
+
+def _place_in_degrees(path, layout, values, angles):
+    """The table, with latitude and longitude in degrees where all angles are said to be radians."""
+    table = dict(zip(layout.columns, values, strict=True))
+    place = {name: table[name] for name in ("latitude", "longitude") if name in table}
+    if not place or not all(np.abs(degrees).max() <= np.pi for degrees in place.values()):
+        return table  # within 3.14 deg of 0, 0 there is no land
+    if angles != "rad":
+        raise OpenQuestion(
+            f"{path} has latitudes and longitudes that seem to be radians: none exceeds pi. If so, "
+            'write angles = "rad" under [trajectory] in survey.toml, or the unit behind the names '
+            "of these columns alone, as Lat [rad].",
+            [OpenPlace(("trajectory", "angles"), ("rad",), "unit of the angles")],
+        )
+    return table | {name: np.degrees(radians) for name, radians in place.items()}
+
+
+def _usual_heading(layout, section):
+    """How headings count where survey.toml doesn't say: from true north beside a latitude."""
+    if "latitude" in layout.columns:
+        return TRUE
+    if not section.heading and set(map(plain, layout.header)) & TRUE_NORTH_USUAL:
+        raise OpenQuestion(
+            f"{layout.path} was exported by Inertial Explorer, or by POSPac, whose headings count "
+            "from true north unless the export takes the convergence off. Say which under "
+            f'[trajectory] in survey.toml: heading = "{TRUE}" or "{GRID}".',
+            [OpenPlace(("trajectory", "heading"), (TRUE, GRID), "direction of headings")],
+        )
+    return GRID
