@@ -2,9 +2,9 @@
 
     python benchmarks/decision_costs.py [--records FOLDER] [--worlds N] [--picture FILE]
 
-Made-up surveys of features, whose evidence is kept in FOLDER (as ``python -m mlscorr.gap.train``
-does; a world that lacks takes minutes), are labelled at costs from a tenth to a hundred times the
-default, by probabilities learned on other worlds.
+Synthetic surveys of features, whose evidence is kept in FOLDER (as by ``train_decision.py``; a
+missing world takes minutes), are labelled at costs from a tenth to a hundred times the default, by
+probabilities learned on other worlds.
 """
 
 import argparse
@@ -13,11 +13,11 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from gap_training.cases import known_mechanisms
+from gap_training.fit import figures, out_of_fold
+from gap_training.records import collect
 
 from mlscorr.gap.infer.decision import OPERATING_POINTS
-from mlscorr.gap.train.cases import known_mechanisms
-from mlscorr.gap.train.fit import figures, out_of_fold
-from mlscorr.gap.train.records import collect
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -1,10 +1,9 @@
 """Errors of made-up surveys of features in which no effect acts, for studies and tests."""
 
 import numpy as np
+from gap_training.errors import process, scatter
+from gap_training.features import Geometry
 from numpy.random import Generator
-
-from mlscorr.gap.train.errors import process, scatter
-from mlscorr.gap.train.features import Geometry
 
 
 def errors(g: Geometry, rng: Generator, kind: str = "sines") -> np.ndarray:

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from feature_errors import errors
 from gap_mechanisms import ACTUAL, NOISES, STUDIED, Outside, metric, noisy, sized
+from gap_training.features import Geometry, geometry
 
 from mlscorr.gap.infer.causes import cause_of
 from mlscorr.gap.infer.decision import learned
@@ -23,7 +24,6 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.separability import compare_signatures
 from mlscorr.gap.infer.verdict import decide, joint_score
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train.features import Geometry, geometry
 
 
 @dataclass(frozen=True)

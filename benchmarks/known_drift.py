@@ -13,6 +13,7 @@ import argparse
 from dataclasses import replace
 
 import numpy as np
+from gap_training.features import geometry
 
 from mlscorr.effects import effect_class
 from mlscorr.effects.catalogue import SYSTEMATIC
@@ -26,9 +27,8 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.unknown import unknown_blocks
 from mlscorr.gap.observe.rows import background
+from mlscorr.gap.plan.sizing import Ruler, draw_effect
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train.features import geometry
-from mlscorr.gap.train.sizing import Ruler, draw_effect
 
 CLEAN = 0.3  # share of cases in which nothing acts
 SIZES = (1.0, 8.0)  # MDB, between which sizes are drawn evenly by their logs, as in training

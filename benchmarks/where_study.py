@@ -16,11 +16,11 @@ import numpy as np
 from feature_errors import errors
 from gap_mechanisms import sized
 from gap_study import Bed
+from gap_training.errors import process
 
 from mlscorr.gap.infer.causes import infer_causes
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.displacements import displacements
-from mlscorr.gap.train.errors import process
 
 HALF = np.sqrt(2 * np.log(2))  # of a Gaussian's sigma, at which it is half as large
 BANDS = {  # direction of the error, covariate, share of the rows, times the size, by name

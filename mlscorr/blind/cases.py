@@ -11,9 +11,9 @@ from mlscorr.blind.grading import grading_mechanisms
 from mlscorr.blind.mix import Case, causes
 from mlscorr.gap.observe.pairing import build_rows
 from mlscorr.gap.observe.patch_search import find_patches
+from mlscorr.gap.plan.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
+from mlscorr.gap.plan.sizing import Ruler
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.train.sizing import Ruler
 from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.simulate.mechanisms import Described, described, load_mechanisms
 

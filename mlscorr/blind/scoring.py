@@ -1,12 +1,14 @@
 """How often a diagnosis was right: answers against labels, with intervals and goals."""
 
+from __future__ import annotations
+
 import numpy as np
 from scipy.stats import binomtest, bootstrap, kstest
 
 from mlscorr.blind.answers import AnsweredCase
 from mlscorr.blind.settings import SETTINGS
+from mlscorr.gap.infer.calibration import calibration_error
 from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
-from mlscorr.gap.train.fit import calibration_error
 
 
 def score(cases: dict[str, tuple[dict, dict]]) -> dict:

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from gap_mechanisms import ACTUAL
+from gap_training import features
 
 from mlscorr.gap.close.closure import close_gap
 from mlscorr.gap.close.folds import make_folds, predict_whole
@@ -15,7 +16,6 @@ from mlscorr.gap.infer.observations import Observations
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train import features
 from tests.beds.gap_inference import surveyed
 
 

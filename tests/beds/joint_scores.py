@@ -1,9 +1,9 @@
 """Hand-made evidence of surveys: what decisions are learned from."""
 
 import numpy as np
+from gap_training.records import Record
 
 from mlscorr.gap.infer.decision import JointScore
-from mlscorr.gap.train.records import Record
 
 FACTS = dict.fromkeys(("rough", "raised", "event", "event in raised", "scale", "size", "odd"), 0.0)
 FACTS |= {"rough": 1.0, "size": 6.0}

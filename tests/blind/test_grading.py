@@ -9,10 +9,14 @@ from mlscorr.blind.grading import grading_mechanisms
 from mlscorr.simulate.mechanisms import mechanisms, training_mechanisms
 from tests.beds.places import ROOT
 
+FOLDERS = (
+    "benchmarks", "mlscorr/gap", "mlscorr/effects", "tests/beds", "tests/gap", "tests/gap_training",
+)  # fmt: skip
 SETTERS = sorted(
     path
-    for folder in ("benchmarks", "mlscorr/gap", "mlscorr/effects", "tests/beds", "tests/gap")
+    for folder in FOLDERS
     for path in (ROOT / folder).rglob("*.py")
+    if path.name != "grade_decision.py"  # which grades and sets nothing
 )
 
 PATHS = re.compile(  # the blind check, whose cases take that half; the module of the whole grammar

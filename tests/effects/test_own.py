@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from gap_training.features import geometry
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
 from mlscorr.effects import catalogue, effect_class, register_file
 from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train.features import geometry
 
 CLASS = """
 from dataclasses import dataclass

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_training import features
 
 from mlscorr.gap.agreement import agreements
-from mlscorr.gap.train import features
 
 
 @pytest.mark.long

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_training import features
 
 from mlscorr.effects import effect_class, make_effect
 from mlscorr.gap.advice import distinct_parameters
@@ -14,7 +15,6 @@ from mlscorr.gap.infer.error_models import STATED
 from mlscorr.gap.infer.parameters import CauseParameter
 from mlscorr.gap.infer.separability import Separability
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train import features
 from mlscorr.report.gap.labels import parameters_of
 
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import gap_study
 import numpy as np
 import pytest
+from gap_training import features
 
 from mlscorr.effects import make_effect
 from mlscorr.gap.infer.labels import weigh_labels
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.open_scale import SIGMAS, STEP, likely_scale, open_sigmas, with_scale
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train import features
 from mlscorr.survey import Pos
 from tests.beds.gap_inference import surveyed
 

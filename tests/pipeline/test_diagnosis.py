@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomlkit
+from gap_training.cases import RANDOM
 from typer.testing import CliRunner
 
 import mlscorr
@@ -17,7 +18,6 @@ from mlscorr.gap.infer.decision import Costs, kind_of
 from mlscorr.gap.infer.error_models import STATED
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.gap.signatures.simulators import as_believed, with_cause
-from mlscorr.gap.train.cases import RANDOM
 from mlscorr.io.clouds.las import read_chunks
 from mlscorr.pipeline.found_effects import read_effects
 from mlscorr.simulate import Scenario, simulate

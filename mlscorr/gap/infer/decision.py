@@ -1,8 +1,9 @@
 """From evidence to probabilities that are right as often as they say, and to one label.
 
-What was learned on made-up surveys (mlscorr.gap.train) stands in decision.json: weights of features
-of the evidence, from which the probability of each kind of label follows, and how far evidence
-tells labels of one kind apart. Nothing there was set on a mechanism that grades a diagnosis.
+What was learned on synthetic surveys (benchmarks/train_decision.py) stands in decision.json: weights
+of features of the evidence, from which the probability of each kind of label follows, and how far
+evidence tells labels of one kind apart. Nothing there was set on a mechanism that grades a
+diagnosis.
 """
 
 from __future__ import annotations

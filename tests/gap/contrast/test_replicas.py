@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from feature_errors import errors
+from gap_training.features import geometry
 
 from mlscorr.gap.contrast.replicas import replica_innovations
 from mlscorr.gap.infer.causes import infer_causes
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures import signatures
-from mlscorr.gap.train.features import geometry
 
 
 @pytest.mark.long

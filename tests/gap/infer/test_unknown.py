@@ -3,8 +3,8 @@
 import numpy as np
 
 from mlscorr.gap.infer.unknown import unknown_blocks
-from mlscorr.gap.train.draws import SizedMechanism
-from mlscorr.gap.train.sizing import Ruler, shift_by
+from mlscorr.gap.plan.draws import SizedMechanism
+from mlscorr.gap.plan.sizing import Ruler, shift_by
 from mlscorr.simulate.mechanisms import Mechanism
 
 

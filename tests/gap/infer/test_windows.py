@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from feature_errors import errors as clean_residuals
+from gap_training import features
 
 from mlscorr.collocation.covariance import Covariance
 from mlscorr.gap.infer.causes import infer_causes
@@ -16,7 +17,6 @@ from mlscorr.gap.infer.settings import SETTINGS
 from mlscorr.gap.infer.windows import models_with_windows, weigh_windows
 from mlscorr.gap.observe.rows import background
 from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.gap.train import features
 
 WINDOWS = ((413215.0, 25.0), (413360.0, 30.0))  # s: one in each pass
 

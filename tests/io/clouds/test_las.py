@@ -420,7 +420,8 @@ def test_a_killed_write_leaves_no_target(tmp_path):
     "A process killed while it writes leaves no file under the target's name; the next succeeds"
     path, target = write_street(tmp_path / "in.laz"), tmp_path / "out.laz"
     script = (
-        "import os, sys; sys.path.insert(0, sys.argv[1]); from tests.io.clouds import test_las as t; "
+        "import os, sys; sys.path.insert(0, sys.argv[1]); "
+        "from tests.io.clouds import test_las as t; "
         "from pathlib import Path; p = Path(sys.argv[2]); "
         "t.write_corrected(t.cloud_of(p), p.with_name('out.laz'), t.covering(p), "
         "lambda *_: os.kill(os.getpid(), 9))"

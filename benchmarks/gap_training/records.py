@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from gap_training.cases import draw_case
+from gap_training.worlds import World
 from mlscorr.gap.infer.decision import JointScore
 from mlscorr.gap.infer.labels import weigh_labels
 from mlscorr.gap.infer.verdict import joint_score
-from mlscorr.gap.train.cases import draw_case
-from mlscorr.gap.train.worlds import World
 from mlscorr.simulate.mechanisms import Described
 
 
@@ -116,3 +116,17 @@ def _records(seed, cases, mechanisms, replicas):
         joint = JointScore(**{**vars(joint), "noisy": sorted(joint.noisy)})
         p = evidence.p_value if drawn else None
         yield Record(seed, world.is_open, case.kind, case.truth, case.mdb, p, joint)
+
+
+def first_evidence(seed: int, mechanisms: Described) -> dict[str, float]:
+    """Log evidence of every label in the first case of a world, by which code is recognized.
+
+    Parameters
+    ----------
+    seed : int
+        Of the world.
+    mechanisms : dict
+        As of collect.
+    """
+    record = next(_records(seed, 1, mechanisms, 0))
+    return {label: round(score, 4) for label, score in record.joint.score.items()}

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from gap_training.worlds import World
 
 from mlscorr.effects import make_effect
 from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.train.worlds import World
 
 
 @pytest.fixture(scope="module")

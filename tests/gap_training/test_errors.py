@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from feature_errors import errors
+from gap_training.errors import odd_patches, process, scatter
+from gap_training.features import geometry
 
 from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.train.errors import odd_patches, process, scatter
-from mlscorr.gap.train.features import geometry
 
 
 @pytest.fixture(scope="module")

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
-import mlscorr.gap.infer
+from gap_training.records import Record
+from mlscorr.gap.infer.calibration import BINS, calibration_error
 from mlscorr.gap.infer.decision import KINDS, Costs, LearnedDecision, cheapest, features, kind_of
-from mlscorr.gap.train.records import Record
 
 PENALTIES = (0.01, 0.03, 0.1, 0.3, 1.0)  # inverse ones of squared weights, chosen out of fold
 SHARPNESS = np.linspace(0.2, 1.5, 27)  # factors on scores within a kind that are tried
 SHARES = (0.002, 0.01, 0.03, 0.06, 0.1, 0.2)  # shares of what no evidence tells that are tried
 FOLDS = 8  # of worlds
-BINS = 5  # of the stated probability: 300 cases of a blind check fill no more
 
 
 def fit(records: Sequence[Record]) -> LearnedDecision:
@@ -178,20 +175,6 @@ def figures(
     return rates
 
 
-def calibration_error(stated: np.ndarray, hit: np.ndarray) -> float:
-    """Mean distance of stated probabilities from how often they were right, over bins of them.
-
-    Parameters
-    ----------
-    stated : (n,) array
-    hit : (n,) array
-        One where it was right, else zero.
-    """
-    bins = np.clip((stated * BINS).astype(int), 0, BINS - 1)
-    return float(sum(abs(np.sum(stated[bins == b] - hit[bins == b])) for b in range(BINS))
-                 / len(stated))  # fmt: skip
-
-
 def document(decision: LearnedDecision, made_of: dict) -> dict:
     """A LearnedDecision and what made it, as decision.json has it.
 
@@ -209,12 +192,6 @@ def document(decision: LearnedDecision, made_of: dict) -> dict:
         name: np.round(content[name], 6).tolist() for name in ("mean", "scale", "weights", "bias")
     }
     return {"made_of": made_of} | content | rounded
-
-
-def code_hash() -> str:
-    """SHA-256 of the code that makes evidence, without comments and docstrings' layout."""
-    modules = sorted(Path(str(mlscorr.gap.infer.__file__)).parent.glob("*.py"))
-    return hash_of(ast.dump(ast.parse(path.read_text(encoding="utf-8"))) for path in modules)
 
 
 def hash_of(texts: Iterable[str]) -> str:

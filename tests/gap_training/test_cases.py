@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from gap_training.cases import SHARES, draw_case, known_mechanisms
+from gap_training.worlds import World
 
-from mlscorr.gap.train.cases import SHARES, draw_case, known_mechanisms
-from mlscorr.gap.train.worlds import World
 from tests.beds.places import ROOT
 
 WITHHELD = ROOT / "tests" / "withheld" / "mechanisms.py"

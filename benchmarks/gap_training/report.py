@@ -4,9 +4,9 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from gap_training.fit import figures
+from gap_training.records import Record
 from mlscorr.gap.infer.decision import OPERATING_POINTS
-from mlscorr.gap.train.fit import figures
-from mlscorr.gap.train.records import Record
 
 
 def study_arguments(about: str | None, first: int, worlds: int) -> argparse.ArgumentParser:

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
+from gap_training.errors import odd_patches, process, scatter
+from gap_training.features import Geometry, geometry
 from mlscorr.frames import georeference
 from mlscorr.gap.observe.channels import with_loss_variance
 from mlscorr.gap.observe.rows import Background, Rows, background
 from mlscorr.gap.signatures.signatures import Signature, signatures
-from mlscorr.gap.train.errors import odd_patches, process, scatter
-from mlscorr.gap.train.features import Geometry, geometry
 from mlscorr.simulate.pos import PosError, interpolate, pos_error
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Survey

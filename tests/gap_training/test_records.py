@@ -2,7 +2,8 @@
 
 import json
 
-from mlscorr.gap.train.records import collect, read_records
+from gap_training.records import collect, read_records
+
 from tests.beds.joint_scores import records
 
 

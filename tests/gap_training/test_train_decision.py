@@ -4,8 +4,8 @@ import json
 import sys
 
 import pytest
+from train_decision import main
 
-from mlscorr.gap.train.__main__ import main
 from tests.beds.joint_scores import records
 
 

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
+from gap_training.fit import figures, out_of_fold
+from gap_training.report import print_figures, study_arguments
 
 from mlscorr.gap.infer.decision import OPERATING_POINTS
-from mlscorr.gap.train.fit import figures, out_of_fold
-from mlscorr.gap.train.report import print_figures, study_arguments
 from tests.beds.joint_scores import records
 
 

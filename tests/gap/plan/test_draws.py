@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from gap_training.cases import known_mechanisms
+from gap_training.worlds import World
 
 from mlscorr.effects.catalogue import SYSTEMATIC
 from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.train.cases import known_mechanisms
-from mlscorr.gap.train.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.train.sizing import Ruler, likeness, shift_by
-from mlscorr.gap.train.worlds import World
+from mlscorr.gap.plan.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
+from mlscorr.gap.plan.sizing import Ruler, likeness, shift_by
 
 
 @pytest.fixture(scope="module")

@@ -1,17 +1,17 @@
 """Grade the decision of a diagnosis on evidence of made-up surveys of features.
 
-    OMP_NUM_THREADS=1 python -m mlscorr.blind FOLDER --first 5000 --worlds 10 --cases 24
+    OMP_NUM_THREADS=1 python benchmarks/grade_decision.py FOLDER --first 5000 --worlds 10 --cases 24
 
 Worlds are others than those it was learned on, and mechanisms those of the half that grades. What
 is weighed in each world is kept in FOLDER.
 """
 
 import numpy as np
+from gap_training.records import collect
+from gap_training.report import print_figures, study_arguments
 
 from mlscorr.blind.cases import outside_mechanisms
 from mlscorr.gap.infer.decision import learned
-from mlscorr.gap.train.records import collect
-from mlscorr.gap.train.report import print_figures, study_arguments
 
 
 def main() -> None:

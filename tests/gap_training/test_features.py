@@ -1,8 +1,7 @@
 """Made-up surveys of features."""
 
 import pytest
-
-from mlscorr.gap.train.features import geometry
+from gap_training.features import geometry
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """Learn how evidence becomes probability: decision.json of the inference.
 
-    OMP_NUM_THREADS=1 python -m mlscorr.gap.train FOLDER --first 1000 --worlds 40 --cases 24
+    OMP_NUM_THREADS=1 python benchmarks/train_decision.py FOLDER --first 1000 --worlds 40 --cases 24
 
 What is weighed in each world is kept in FOLDER, so that a second run fits within seconds.
 """
@@ -8,11 +8,12 @@ What is weighed in each world is kept in FOLDER, so that a second run fits withi
 import json
 from pathlib import Path
 
+from gap_training.cases import known_mechanisms
+from gap_training.fit import document, fit, hash_of, out_of_fold
+from gap_training.records import collect, first_evidence
+from gap_training.report import print_figures, study_arguments
+
 import mlscorr.gap.infer
-from mlscorr.gap.train.cases import known_mechanisms
-from mlscorr.gap.train.fit import code_hash, document, fit, hash_of, out_of_fold
-from mlscorr.gap.train.records import collect
-from mlscorr.gap.train.report import print_figures, study_arguments
 
 
 def main() -> None:
@@ -29,7 +30,8 @@ def main() -> None:
     if given.write:
         made_of = {
             "seeds": [seeds[0], seeds[-1]], "cases": given.cases, "records": len(records),
-            "mechanisms": hash_of(sorted(mechanisms)), "code": code_hash(),
+            "mechanisms": hash_of(sorted(mechanisms)),
+            "evidence": first_evidence(seeds[0], mechanisms),
         }  # fmt: skip
         path = Path(str(mlscorr.gap.infer.__file__)).with_name("decision.json")
         path.write_text(json.dumps(document(fit(records), made_of), indent=1) + "\n")

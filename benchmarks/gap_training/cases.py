@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 
+from gap_training.errors import process
+from gap_training.worlds import World
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
 from mlscorr.gap.observe.channels import with_loss_variance
 from mlscorr.gap.observe.rows import Background, Rows
+from mlscorr.gap.plan.draws import draw_effects, draw_mechanism, names_to_try
+from mlscorr.gap.plan.sizing import Ruler, draw_effect
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.signatures import Signature
-from mlscorr.gap.train.draws import draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.train.errors import process
-from mlscorr.gap.train.sizing import Ruler, draw_effect
-from mlscorr.gap.train.worlds import World
 from mlscorr.simulate.mechanisms import Described, described, load_mechanisms, training_mechanisms
 from mlscorr.simulate.pos import interpolate
 from mlscorr.survey import Survey
