@@ -16,12 +16,12 @@ from feature_errors import errors
 from gap_mechanisms import STUDIED, sized
 from gap_study import Bed
 
-from mlscorr.gap.close import cause_for_simulator, close_gap
-from mlscorr.gap.close.folds import make_folds, predict_whole
-from mlscorr.gap.close.found_cause import FoundCause
-from mlscorr.gap.infer.causes import infer_causes
-from mlscorr.gap.infer.observations import Observations
-from mlscorr.gap.observe.rows import background
+from mlscorr.gap.closure import cause_for_simulator, close_gap
+from mlscorr.gap.closure.folds import make_folds, predict_whole
+from mlscorr.gap.closure.found_cause import FoundCause
+from mlscorr.gap.evidence.causes import infer_causes
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.residuals.rows import background
 from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import select
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.infer.error_models import ErrorModel
-from mlscorr.gap.infer.observations import Observations
-from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.evidence.error_models import ErrorModel
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.signatures.changes import Bench
 
 

@@ -11,7 +11,7 @@ from gap_training.records import collect
 from gap_training.report import print_figures, study_arguments
 
 from mlscorr.blind.cases import outside_mechanisms
-from mlscorr.gap.infer.decision import learned
+from mlscorr.gap.evidence.decision import learned
 
 
 def main() -> None:

@@ -17,17 +17,17 @@ from gap_training.features import geometry
 
 from mlscorr.effects import effect_class
 from mlscorr.effects.catalogue import SYSTEMATIC
-from mlscorr.gap.infer.columns import column_table
-from mlscorr.gap.infer.decision import Costs, cheapest
-from mlscorr.gap.infer.error_models import STATED, error_models
-from mlscorr.gap.infer.events import refine_events
-from mlscorr.gap.infer.evidence import suited_models, weigh_blocks, without_known
-from mlscorr.gap.infer.labels import block_scores
-from mlscorr.gap.infer.observations import Observations
-from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.infer.unknown import unknown_blocks
-from mlscorr.gap.observe.rows import background
+from mlscorr.gap.evidence.columns import column_table
+from mlscorr.gap.evidence.decision import Costs, cheapest
+from mlscorr.gap.evidence.error_models import STATED, error_models
+from mlscorr.gap.evidence.events import refine_events
+from mlscorr.gap.evidence.evidence import suited_models, weigh_blocks, without_known
+from mlscorr.gap.evidence.labels import block_scores
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.evidence.unknown import unknown_blocks
 from mlscorr.gap.plan.sizing import Ruler, draw_effect
+from mlscorr.gap.residuals.rows import background
 from mlscorr.gap.signatures.signatures import signatures
 
 CLEAN = 0.3  # share of cases in which nothing acts

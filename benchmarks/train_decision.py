@@ -13,7 +13,7 @@ from gap_training.fit import document, fit, hash_of, out_of_fold
 from gap_training.records import collect, first_evidence
 from gap_training.report import print_figures, study_arguments
 
-import mlscorr.gap.infer
+import mlscorr.gap.evidence
 
 
 def main() -> None:
@@ -33,7 +33,7 @@ def main() -> None:
             "mechanisms": hash_of(sorted(mechanisms)),
             "evidence": first_evidence(seeds[0], mechanisms),
         }  # fmt: skip
-        path = Path(str(mlscorr.gap.infer.__file__)).with_name("decision.json")
+        path = Path(str(mlscorr.gap.evidence.__file__)).with_name("decision.json")
         path.write_text(json.dumps(document(fit(records), made_of), indent=1) + "\n")
         print(f"Written: {path}")
 

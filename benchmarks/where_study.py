@@ -18,8 +18,8 @@ from gap_mechanisms import sized
 from gap_study import Bed
 from gap_training.errors import process
 
-from mlscorr.gap.infer.causes import infer_causes
-from mlscorr.gap.observe.rows import background
+from mlscorr.gap.evidence.causes import infer_causes
+from mlscorr.gap.residuals.rows import background
 from mlscorr.gap.signatures.displacements import displacements
 
 HALF = np.sqrt(2 * np.log(2))  # of a Gaussian's sigma, at which it is half as large

@@ -26,10 +26,10 @@ FLOORS = (  # from the ground up; rooms on one floor do not know each other
 )
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
 GAP_FLOORS = (  # of the rooms within gap, likewise
-    ("observe",),
+    ("residuals",),
     ("signatures",),
-    ("infer",),
-    ("close", "plan", "train", "contrast"),
+    ("evidence",),
+    ("closure", "plan", "contrast"),
     ("document",),  # and __init__, which offers the costs of mistakes
 )
 GAP_FLOOR = {room: number for number, rooms in enumerate(GAP_FLOORS) for room in rooms}

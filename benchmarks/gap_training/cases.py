@@ -11,10 +11,10 @@ from numpy.random import Generator
 from gap_training.errors import process
 from gap_training.worlds import World
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
-from mlscorr.gap.observe.channels import with_loss_variance
-from mlscorr.gap.observe.rows import Background, Rows
 from mlscorr.gap.plan.draws import draw_effects, draw_mechanism, names_to_try
 from mlscorr.gap.plan.sizing import Ruler, draw_effect
+from mlscorr.gap.residuals.channels import with_loss_variance
+from mlscorr.gap.residuals.rows import Background, Rows
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.simulate.mechanisms import Described, described, load_mechanisms, training_mechanisms

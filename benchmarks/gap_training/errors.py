@@ -7,9 +7,9 @@ smoother; survey and extraction errors often have heavier tails than assumed.
 import numpy as np
 from numpy.random import Generator
 
-from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
-from mlscorr.gap.observe.rows import Rows
-from mlscorr.gap.observe.settings import SETTINGS
+from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
+from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals.settings import SETTINGS
 from mlscorr.survey import Scanner
 
 ODD_SHARE = 0.12  # at most, estimated: of 5 surveys by ray casting 2 have more than a twentieth

@@ -12,9 +12,9 @@ import numpy as np
 
 from gap_training.cases import draw_case
 from gap_training.worlds import World
-from mlscorr.gap.infer.decision import JointScore
-from mlscorr.gap.infer.labels import weigh_labels
-from mlscorr.gap.infer.verdict import joint_score
+from mlscorr.gap.evidence.decision import JointScore
+from mlscorr.gap.evidence.labels import weigh_labels
+from mlscorr.gap.evidence.verdict import joint_score
 from mlscorr.simulate.mechanisms import Described
 
 

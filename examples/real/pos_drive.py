@@ -7,7 +7,7 @@ import numpy as np
 from page import SHARED
 
 from mlscorr.frames import georeference
-from mlscorr.gap.observe.pairing import target_rows
+from mlscorr.gap.residuals.pairing import target_rows
 from mlscorr.io.trajectories.pos_error_series import read_pos_error_series
 from mlscorr.io.trajectories.poses import read_poses
 from mlscorr.simulate import Scenario

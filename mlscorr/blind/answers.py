@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from mlscorr.blind.mix import causes
-from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.evidence.settings import SETTINGS
 
 
 @dataclass(frozen=True)

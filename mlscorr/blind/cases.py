@@ -9,10 +9,10 @@ import numpy as np
 
 from mlscorr.blind.grading import grading_mechanisms
 from mlscorr.blind.mix import Case, causes
-from mlscorr.gap.observe.pairing import build_rows
-from mlscorr.gap.observe.patch_search import find_patches
 from mlscorr.gap.plan.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
 from mlscorr.gap.plan.sizing import Ruler
+from mlscorr.gap.residuals.pairing import build_rows
+from mlscorr.gap.residuals.patch_search import find_patches
 from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.io.surveys.survey_file import read_survey
 from mlscorr.simulate.mechanisms import Described, described, load_mechanisms

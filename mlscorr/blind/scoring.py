@@ -7,8 +7,8 @@ from scipy.stats import binomtest, bootstrap, kstest
 
 from mlscorr.blind.answers import AnsweredCase
 from mlscorr.blind.settings import SETTINGS
-from mlscorr.gap.infer.calibration import calibration_error
-from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
+from mlscorr.gap.evidence.calibration import calibration_error
+from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
 
 
 def score(cases: dict[str, tuple[dict, dict]]) -> dict:

@@ -84,7 +84,7 @@ def diagnose(
 
 def _costs(text):
     """Costs by the name of an operating point, or of three numbers."""
-    from mlscorr.gap.infer.decision import OPERATING_POINTS, Costs
+    from mlscorr.gap.evidence.decision import OPERATING_POINTS, Costs
 
     if text in OPERATING_POINTS:
         return OPERATING_POINTS[text]

@@ -8,10 +8,10 @@ from mlscorr.effects import effect_class
 from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import percent, size, with_articles
 from mlscorr.gap.agreement import Agreement
-from mlscorr.gap.close.closure import Closure
-from mlscorr.gap.infer.causes import Cause, Inference
-from mlscorr.gap.infer.parameters import CauseParameter
-from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.closure.closure import Closure
+from mlscorr.gap.evidence.causes import Cause, Inference
+from mlscorr.gap.evidence.parameters import CauseParameter
+from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.plan.additions import NextData
 
 NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."

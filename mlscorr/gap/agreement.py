@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.gap.observe.rows import Background, Rows
+from mlscorr.gap.residuals.rows import Background, Rows
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,15 @@ from mlscorr.effects import Effect
 from mlscorr.effects.wording import with_articles
 from mlscorr.gap.advice import advice_of, distinct_parameters, excess_of, sentence_of
 from mlscorr.gap.agreement import agreements
-from mlscorr.gap.close.closure import Closure
+from mlscorr.gap.closure.closure import Closure
+from mlscorr.gap.evidence.causes import Cause, Inference
+from mlscorr.gap.evidence.separability import Separability
+from mlscorr.gap.evidence.where import NAMES
 from mlscorr.gap.headline import headline
-from mlscorr.gap.infer.causes import Cause, Inference
-from mlscorr.gap.infer.separability import Separability
-from mlscorr.gap.infer.where import NAMES
-from mlscorr.gap.observe.absence import Absence
-from mlscorr.gap.observe.rows import Rows, background
 from mlscorr.gap.open_scale import open_sigmas
 from mlscorr.gap.plan.additions import NextData
+from mlscorr.gap.residuals.absence import Absence
+from mlscorr.gap.residuals.rows import Rows, background
 from mlscorr.survey import Survey
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page

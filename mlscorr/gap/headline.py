@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from mlscorr.effects.wording import figures
-from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.infer.where import CHANNELS, NAMES, Split, Where
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.evidence.where import CHANNELS, NAMES, Split, Where
 
 ACTS_ON = {  # covariates by which the size of an effect differs, by the effect's name
     "time_offset": ("speed", "turn_rate"),

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.infer.labels import weigh_labels
-from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.observe.rows import Rows, background
+from mlscorr.gap.evidence.labels import weigh_labels
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.residuals.rows import Rows, background
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.survey import Pos, Survey
 

@@ -10,8 +10,8 @@ import numpy as np
 from mlscorr.correction import Correction
 from mlscorr.effects import Effect
 from mlscorr.estimate import estimate_correction
-from mlscorr.gap import contrast, observe
-from mlscorr.gap.close import Beams, BeamSimulator, Surroundings, collect_beams
+from mlscorr.gap import contrast, residuals
+from mlscorr.gap.closure import Beams, BeamSimulator, Surroundings, collect_beams
 from mlscorr.gap.signatures import expected, without_effects
 from mlscorr.io.surveys.simulated_clouds import simulated_survey
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_into
@@ -54,10 +54,10 @@ class ComparedRows:
         What to run once the simulator has the cause, in a sentence.
     """
 
-    rows: observe.Rows
+    rows: residuals.Rows
     used: np.ndarray
     simulated: Callable | np.ndarray
-    absence: observe.Absence
+    absence: residuals.Absence
     notes: tuple[str, ...]
     contrasts: tuple[contrast.Contrast, ...] = ()
     distances: tuple[contrast.DistributionDistance, ...] = ()
@@ -89,7 +89,7 @@ def compare_with_belief(
         When there is too little to say anything.
     """
     pairing, rows, beams, absence, patches = _observed(survey, believed, library, progress)
-    rows, noisy = observe.beside_seen_noise(rows)
+    rows, noisy = residuals.beside_seen_noise(rows)
     simulator = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
     used = np.arange(len(rows)) < len(pairing.rows)
     observed = without_effects(rows, believed, effects)
@@ -129,20 +129,20 @@ def compare_with_clouds(
     sampler = contrast.SampleCollector(believed)
     finding, patches, _, notes = _read(believed, progress, sampler)
     samples = [sampler.sample(patches)]
-    absence = observe.find_absence(believed, finding.matches)
+    absence = residuals.find_absence(believed, finding.matches)
     correction = _by_control(believed, finding.matches.matched)
     matched = _with_moved(finding, believed).matches.matched
-    patches = None if patches is None else observe.spread_patches(patches)
+    patches = None if patches is None else residuals.spread_patches(patches)
     compared = []
     for folder, simulated in zip(folders, opened, strict=True):
         clouds, sample = _simulated_clouds(simulated, patches, correction, progress)
         samples.append(sample)
         observed = matched, finding.candidates, patches
-        rows, sentence = observe.rows_against(believed, *observed, clouds, correction)
+        rows, sentence = residuals.rows_against(believed, *observed, clouds, correction)
         _check_simulated(rows, folder)
         compared.append(rows)
         notes = (*notes, sentence)
-    first, *following = observe.without_unpaired(compared)
+    first, *following = residuals.without_unpaired(compared)
     check_enough(survey, first, library, notes)
     is_check = np.isin(first.targets.name, survey.check.name)
     used = (first.survey_item < 0) | ~is_check[first.survey_item]
@@ -152,7 +152,7 @@ def compare_with_clouds(
         contrast.contrast_clouds(believed, real, simulated_first, apart),
         contrast.cloud_distances(real, simulated_first, samples[2] if following else None, apart),
     )
-    quiet, noisy = observe.beside_seen_noise(first)
+    quiet, noisy = residuals.beside_seen_noise(first)
     notes = (*notes, *noisy)
     if following:
         change = first.residual - following[0].residual
@@ -175,8 +175,8 @@ def _check_simulated(rows, folder):
 
 def _simulated_clouds(simulated, patches, correction, progress):
     """SimulatedClouds and ChannelSample of a simulated survey, read once."""
-    collector, sampler = observe.PatchCollector(simulated), contrast.SampleCollector(simulated)
-    beams = None if patches is None else observe.SimulatedBeams(patches, correction)
+    collector, sampler = residuals.PatchCollector(simulated), contrast.SampleCollector(simulated)
+    beams = None if patches is None else residuals.SimulatedBeams(patches, correction)
     others = [sampler] if beams is None else [sampler, beams]
     read = read_into(collector.add, *map(_chunks_alone, others))
     with warnings.catch_warnings(action="ignore"):  # of beams, which refuse the clouds
@@ -188,7 +188,7 @@ def _simulated_clouds(simulated, patches, correction, progress):
         )
     flat, matched = collector.patches(), finding.matches.matched
     given = matched, flat, beams, _by_control(simulated, matched)
-    return observe.SimulatedClouds(simulated.name, *given), sampler.sample(flat)
+    return residuals.SimulatedClouds(simulated.name, *given), sampler.sample(flat)
 
 
 def _chunks_alone(collector):
@@ -210,13 +210,13 @@ def _with_moved(finding: Finding, survey: Survey) -> Finding:
 
 def _read(
     believed, progress, sampler=None
-) -> tuple[Finding, observe.Patches | None, Surroundings, tuple[str, ...]]:
+) -> tuple[Finding, residuals.Patches | None, Surroundings, tuple[str, ...]]:
     """The Finding, Patches, Surroundings and notes.
 
     The clouds are read once: targets, patches, what lies about targets and, where there is a
     SampleCollector, its sample are taken from each chunk as it comes.
     """
-    collector, surroundings = observe.PatchCollector(believed), Surroundings(believed)
+    collector, surroundings = residuals.PatchCollector(believed), Surroundings(believed)
     others = [surroundings] if sampler is None else [surroundings, sampler]
     read = read_into(collector.add, *map(_chunks_alone, others))
     finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
@@ -225,19 +225,19 @@ def _read(
 
 def _observed(
     survey, believed, library, progress
-) -> tuple[observe.Pairing, observe.Rows, Beams, observe.Absence, observe.Patches | None]:
+) -> tuple[residuals.Pairing, residuals.Rows, Beams, residuals.Absence, residuals.Patches | None]:
     """The Pairing, all its rows, check points last, the Beams on which they stand, the Absence, the
     Patches.
     """
     finding, patches, surroundings, notes = _read(believed, progress)
-    absence = observe.find_absence(believed, finding.matches)
+    absence = residuals.find_absence(believed, finding.matches)
     correction = _by_control(believed, finding.matches.matched)
     finding = _with_moved(finding, believed)
     observed = finding.matches.matched, finding.candidates, patches
-    pairing = observe.build_rows(believed, *observed, correction=correction)
+    pairing = residuals.build_rows(believed, *observed, correction=correction)
     check_enough(survey, pairing.rows, library, notes)
     pairing = replace(pairing, notes=(*notes, *pairing.notes))
-    rows = observe.Rows.concatenate([pairing.rows, pairing.check])
+    rows = residuals.Rows.concatenate([pairing.rows, pairing.check])
     beams = collect_beams(believed, rows, finding, patches, surroundings)
     return pairing, rows, beams, absence, patches
 

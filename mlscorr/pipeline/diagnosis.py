@@ -13,12 +13,12 @@ import numpy as np
 from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import contrast
 from mlscorr.gap.advice import NOTHING_TO_DO
-from mlscorr.gap.close import Closure, FoundCause, cause_for_simulator, close_gap
+from mlscorr.gap.closure import Closure, FoundCause, cause_for_simulator, close_gap
 from mlscorr.gap.document import assumed_document, gap_document
-from mlscorr.gap.infer import Costs, Inference, infer_causes
-from mlscorr.gap.observe import Absence, Rows, background
+from mlscorr.gap.evidence import Costs, Inference, infer_causes
 from mlscorr.gap.open_scale import likely_scale, open_sigmas, with_scale
 from mlscorr.gap.plan import NextData, next_data
+from mlscorr.gap.residuals import Absence, Rows, background
 from mlscorr.gap.signatures import Signature, as_believed, curvature, select, signatures, with_cause
 from mlscorr.io.store.output import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds

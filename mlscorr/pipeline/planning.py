@@ -13,9 +13,9 @@ from mlscorr.effects import Effect, known_effects
 from mlscorr.effects.labels import lowered, parameter_title, titles
 from mlscorr.estimate import COMPONENTS, PlannedAccuracy, predict_accuracy
 from mlscorr.gap.document import map_document, separability_document
-from mlscorr.gap.infer import Observations, Separability, compare_signatures
-from mlscorr.gap.observe import Rows, background
+from mlscorr.gap.evidence import Observations, Separability, compare_signatures
 from mlscorr.gap.plan import NextData, event_sizes, next_data, planned_rows
+from mlscorr.gap.residuals import Rows, background
 from mlscorr.gap.signatures import signatures
 from mlscorr.io.store.output import document, output_folder, write_json
 from mlscorr.survey import Matched, Survey, TargetObservations, check_survey

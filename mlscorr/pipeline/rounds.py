@@ -8,9 +8,9 @@ import numpy as np
 
 from mlscorr.effects.labels import lowered, title
 from mlscorr.gap.advice import no_cause
-from mlscorr.gap.close import LoneEffect, lone_effects
+from mlscorr.gap.closure import LoneEffect, lone_effects
 from mlscorr.gap.document import cause_document, windows_document
-from mlscorr.gap.infer import Costs
+from mlscorr.gap.evidence import Costs
 from mlscorr.io.store.output import document
 from mlscorr.pipeline.compared_rows import NEXT_RUN
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis

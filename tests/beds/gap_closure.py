@@ -7,13 +7,13 @@ import numpy as np
 from gap_mechanisms import ACTUAL
 from gap_training import features
 
-from mlscorr.gap.close.closure import close_gap
-from mlscorr.gap.close.folds import make_folds, predict_whole
-from mlscorr.gap.close.found_cause import FoundCause
-from mlscorr.gap.infer.causes import cause_of
-from mlscorr.gap.infer.labels import weigh_labels
-from mlscorr.gap.infer.observations import Observations
-from mlscorr.gap.observe.rows import background
+from mlscorr.gap.closure.closure import close_gap
+from mlscorr.gap.closure.folds import make_folds, predict_whole
+from mlscorr.gap.closure.found_cause import FoundCause
+from mlscorr.gap.evidence.causes import cause_of
+from mlscorr.gap.evidence.labels import weigh_labels
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.residuals.rows import background
 from mlscorr.gap.signatures.expectation import expected
 from mlscorr.gap.signatures.signatures import signatures
 from tests.beds.gap_inference import surveyed

@@ -6,10 +6,10 @@ import gap_study
 import numpy as np
 
 from mlscorr.collocation.covariance import Covariance
-from mlscorr.gap.infer.decision import learned
-from mlscorr.gap.infer.labels import weigh_labels
-from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.infer.verdict import decide, joint_score
+from mlscorr.gap.evidence.decision import learned
+from mlscorr.gap.evidence.labels import weigh_labels
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.evidence.verdict import decide, joint_score
 from mlscorr.gap.signatures.changes import Bench
 
 

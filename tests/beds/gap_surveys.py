@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.gap.close.beams import collect_beams
-from mlscorr.gap.close.surroundings import Surroundings
-from mlscorr.gap.observe.pairing import build_rows
-from mlscorr.gap.observe.patch_search import PatchCollector
-from mlscorr.gap.observe.patches import Patches
+from mlscorr.gap.closure.beams import collect_beams
+from mlscorr.gap.closure.surroundings import Surroundings
+from mlscorr.gap.residuals.pairing import build_rows
+from mlscorr.gap.residuals.patch_search import PatchCollector
+from mlscorr.gap.residuals.patches import Patches
 from mlscorr.io.clouds.las import read_chunks
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces
 

@@ -6,8 +6,8 @@ import numpy as np
 
 import mlscorr
 from mlscorr.gap.contrast import SampleCollector
-from mlscorr.gap.observe import PatchCollector
-from mlscorr.gap.observe.covariates import scanner_origin
+from mlscorr.gap.residuals import PatchCollector
+from mlscorr.gap.residuals.covariates import scanner_origin
 from mlscorr.io.clouds.las import read_chunks
 from mlscorr.io.surveys.simulated_clouds import simulated_survey
 from mlscorr.simulate import Scenario, simulate

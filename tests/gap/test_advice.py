@@ -14,11 +14,11 @@ from mlscorr.gap.advice import (
     sentence_of,
 )
 from mlscorr.gap.agreement import Agreement
-from mlscorr.gap.close.closure import Closure, Gap
-from mlscorr.gap.close.over_sigma import OverSigma
-from mlscorr.gap.infer.causes import Cause, Inference
-from mlscorr.gap.infer.verdict import GapVerdict
-from mlscorr.gap.infer.where import Where
+from mlscorr.gap.closure.closure import Closure, Gap
+from mlscorr.gap.closure.over_sigma import OverSigma
+from mlscorr.gap.evidence.causes import Cause, Inference
+from mlscorr.gap.evidence.verdict import GapVerdict
+from mlscorr.gap.evidence.where import Where
 from mlscorr.gap.plan.additions import NextData
 
 BAND = (-0.4, 0.7)  # mm

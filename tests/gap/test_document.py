@@ -10,10 +10,10 @@ from gap_training import features
 from mlscorr.effects import effect_class, make_effect
 from mlscorr.gap.advice import distinct_parameters
 from mlscorr.gap.document import map_document, separability_document, windows_document
-from mlscorr.gap.infer.causes import Cause
-from mlscorr.gap.infer.error_models import STATED
-from mlscorr.gap.infer.parameters import CauseParameter
-from mlscorr.gap.infer.separability import Separability
+from mlscorr.gap.evidence.causes import Cause
+from mlscorr.gap.evidence.error_models import STATED
+from mlscorr.gap.evidence.parameters import CauseParameter
+from mlscorr.gap.evidence.separability import Separability
 from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.report.gap.labels import parameters_of
 

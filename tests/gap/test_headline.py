@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mlscorr.effects.catalogue import EFFECTS
+from mlscorr.gap.evidence.extent import Extent
+from mlscorr.gap.evidence.where import SPLITS, Split, Where
 from mlscorr.gap.headline import ACTS_ON, headline
-from mlscorr.gap.infer.extent import Extent
-from mlscorr.gap.infer.where import SPLITS, Split, Where
 
 START = 413200.0  # s
 

@@ -9,8 +9,8 @@ from gap_training.cases import known_mechanisms
 from gap_training.fit import document, figures, fit, hash_of, out_of_fold
 from gap_training.records import first_evidence
 
-from mlscorr.gap.infer.calibration import calibration_error
-from mlscorr.gap.infer.decision import Costs, LearnedDecision
+from mlscorr.gap.evidence.calibration import calibration_error
+from mlscorr.gap.evidence.decision import Costs, LearnedDecision
 from tests.beds.joint_scores import joint, records
 
 
@@ -64,7 +64,7 @@ def test_hashes_tell_what_made_them():
 
 def test_the_shipped_decision_was_learned_on_the_evidence_of_today():
     "Evidence of the first case is that of decision.json to 1e-3: who changes it has to learn anew"
-    shipped = json.loads(files("mlscorr.gap.infer").joinpath("decision.json").read_text())[
+    shipped = json.loads(files("mlscorr.gap.evidence").joinpath("decision.json").read_text())[
         "made_of"
     ]
     evidence = first_evidence(shipped["seeds"][0], known_mechanisms(None))

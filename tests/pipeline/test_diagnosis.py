@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
-from mlscorr.gap.infer.causes import Cause
-from mlscorr.gap.infer.decision import Costs, kind_of
-from mlscorr.gap.infer.error_models import STATED
+from mlscorr.gap.evidence.causes import Cause
+from mlscorr.gap.evidence.decision import Costs, kind_of
+from mlscorr.gap.evidence.error_models import STATED
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.gap.signatures.simulators import as_believed, with_cause
 from mlscorr.io.clouds.las import read_chunks

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.gap.contrast.settings import SETTINGS
-from mlscorr.gap.observe.covariates import scanner_origin
-from mlscorr.gap.observe.plane_fit import block_chance, cell_corner, chance, place_key
-from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.gap.residuals.covariates import scanner_origin
+from mlscorr.gap.residuals.plane_fit import block_chance, cell_corner, chance, place_key
+from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.survey.columns import Columns
 from mlscorr.targets import NO_POINTS

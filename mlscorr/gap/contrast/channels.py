@@ -11,8 +11,8 @@ from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
 from mlscorr.gap.contrast.settings import SETTINGS
 from mlscorr.gap.contrast.tables import Binning, Contrast, Measure
 from mlscorr.gap.contrast.words import SILENT, sentence
-from mlscorr.gap.observe.covariates import scanner_origin
-from mlscorr.gap.observe.patches import Patches
+from mlscorr.gap.residuals.covariates import scanner_origin
+from mlscorr.gap.residuals.patches import Patches
 from mlscorr.survey import Survey
 
 CLASSES = ("dark", "medium", "bright")

@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist, pdist
 from mlscorr.gap.contrast.cells import sampled
 from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
 from mlscorr.gap.contrast.settings import SETTINGS
-from mlscorr.gap.observe.plane_fit import chance
+from mlscorr.gap.residuals.plane_fit import chance
 
 UNITS = {"points": "m", "intensity": "decades", "density": "decades"}  # of clouds; else sigmas
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.gap.contrast.settings import SETTINGS
-from mlscorr.gap.observe.patch_search import moments_before
-from mlscorr.gap.observe.plane_fit import chance
-from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.gap.residuals.patch_search import moments_before
+from mlscorr.gap.residuals.plane_fit import chance
+from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
 from mlscorr.simulate.scan import recorded_platform
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.survey.columns import Columns

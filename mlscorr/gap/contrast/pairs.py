@@ -10,7 +10,7 @@ import numpy as np
 
 from mlscorr.gap.contrast.blocks import block_of
 from mlscorr.gap.contrast.sample import ChannelSample
-from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
 from mlscorr.survey import Survey
 from mlscorr.survey.columns import Columns
 

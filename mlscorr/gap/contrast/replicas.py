@@ -3,9 +3,9 @@
 import numpy as np
 
 from mlscorr.gap.contrast.settings import SETTINGS
-from mlscorr.gap.infer.causes import Inference
-from mlscorr.gap.infer.observations import Observations
-from mlscorr.gap.observe.rows import Background, Rows
+from mlscorr.gap.evidence.causes import Inference
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.residuals.rows import Background, Rows
 
 
 def replica_innovations(

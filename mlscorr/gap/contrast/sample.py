@@ -8,8 +8,8 @@ import numpy as np
 
 from mlscorr.gap.contrast.cells import CellCollector, Cells
 from mlscorr.gap.contrast.edges import EdgeCollector, Edges
-from mlscorr.gap.observe.patches import Patches
-from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.gap.residuals.patches import Patches
+from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
 from mlscorr.survey import PointCloud, Survey
 
 

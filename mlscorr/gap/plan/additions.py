@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.effects import Effect
 from mlscorr.effects.labels import lowered, titles
-from mlscorr.gap.infer.observations import Observations
-from mlscorr.gap.infer.separability import Separability, compare_signatures
-from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
-from mlscorr.gap.observe.assemble import assemble, sample_pulses
-from mlscorr.gap.observe.rows import Rows, background
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.separability import Separability, compare_signatures
+from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
 from mlscorr.gap.plan.settings import SETTINGS
+from mlscorr.gap.residuals.assemble import assemble, sample_pulses
+from mlscorr.gap.residuals.rows import Rows, background
 from mlscorr.gap.signatures.signatures import signatures
 from mlscorr.survey import ControlPoints, Survey, Trajectory
 

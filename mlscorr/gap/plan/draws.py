@@ -7,7 +7,7 @@ from itertools import chain
 import numpy as np
 
 from mlscorr.effects.catalogue import effect_class
-from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.plan.sizing import Ruler, SizedEffect, draw_effect, likeness, shift_by
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.simulate.displacement import RecordedPoints

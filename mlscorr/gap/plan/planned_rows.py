@@ -4,13 +4,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from mlscorr.gap.infer.observations import Observations
-from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
-from mlscorr.gap.observe.assemble import assemble, sample_pulses
-from mlscorr.gap.observe.covariates import scanner_origin
-from mlscorr.gap.observe.rows import Rows
-from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
 from mlscorr.gap.plan.settings import SETTINGS
+from mlscorr.gap.residuals.assemble import assemble, sample_pulses
+from mlscorr.gap.residuals.covariates import scanner_origin
+from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
 from mlscorr.gap.signatures.settings import SETTINGS as SIGNATURES
 from mlscorr.gap.signatures.signatures import Signature
 from mlscorr.simulate.scenario import SceneScenario

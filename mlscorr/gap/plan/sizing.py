@@ -9,12 +9,12 @@ import numpy as np
 
 from mlscorr.collocation import Whitener
 from mlscorr.effects import Effect
-from mlscorr.gap.infer.detectable import detectable_size
-from mlscorr.gap.infer.error_models import error_models
-from mlscorr.gap.infer.observations import Observations, model_likelihood
-from mlscorr.gap.infer.separability import explained_square
-from mlscorr.gap.infer.settings import SETTINGS
-from mlscorr.gap.observe.rows import Rows, background
+from mlscorr.gap.evidence.detectable import detectable_size
+from mlscorr.gap.evidence.error_models import error_models
+from mlscorr.gap.evidence.observations import Observations, model_likelihood
+from mlscorr.gap.evidence.separability import explained_square
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.residuals.rows import Rows, background
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.signatures import Signature, signature
 from mlscorr.simulate.displacement import RecordedPoints

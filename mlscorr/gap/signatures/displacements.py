@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlscorr.gap.observe.covariates import covariates, poses_about, scanner_origin
-from mlscorr.gap.observe.rows import Rows
-from mlscorr.gap.observe.settings import SETTINGS
+from mlscorr.gap.residuals.covariates import covariates, poses_about, scanner_origin
+from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals.settings import SETTINGS
 from mlscorr.survey import Survey
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.effects import EFFECTS, Effect
-from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.residuals.rows import Rows
 from mlscorr.gap.signatures.changes import Bench, Change
 from mlscorr.gap.signatures.signatures import Signature, too_far
 from mlscorr.survey import Survey

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mlscorr.effects import EFFECTS, Effect, known_effects
-from mlscorr.gap.observe.rows import Rows
+from mlscorr.gap.residuals.rows import Rows
 from mlscorr.gap.signatures.changes import Bench
 from mlscorr.gap.signatures.settings import SETTINGS
 from mlscorr.survey import Survey

@@ -5,7 +5,7 @@ from itertools import groupby
 
 from mlscorr.effects.labels import lowered, title
 from mlscorr.effects.wording import joined
-from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.signatures.signatures import NO_MOUNTING, UNSTATED
 from mlscorr.report.assumed import assumed_statement, has_assumed_sigma
 from mlscorr.report.gap.channels import channel_statements

@@ -6,7 +6,7 @@ from matplotlib.patches import Rectangle
 
 from mlscorr.effects.labels import parameter_title
 from mlscorr.effects.wording import known
-from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
+from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.rows import DetectableRow
 from mlscorr.report.gap.settings import SETTINGS

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from mlscorr.gap.infer.settings import SETTINGS as INFERENCE
+from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
 from mlscorr.report.gap.innovations import WINDOW
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.gap.rows import split_title

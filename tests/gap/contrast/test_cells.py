@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.contrast.cells import CellCollector, cells_of, sampled
-from mlscorr.gap.observe.plane_fit import cell_corner
+from mlscorr.gap.residuals.plane_fit import cell_corner
 from mlscorr.survey import PointCloud
 from mlscorr.targets import NO_POINTS
 

@@ -8,8 +8,8 @@ from feature_errors import errors
 from gap_training.features import geometry
 
 from mlscorr.gap.contrast.replicas import replica_innovations
-from mlscorr.gap.infer.causes import infer_causes
-from mlscorr.gap.observe.rows import background
+from mlscorr.gap.evidence.causes import infer_causes
+from mlscorr.gap.residuals.rows import background
 from mlscorr.gap.signatures import signatures
 
 

@@ -6,7 +6,7 @@ from gap_training.cases import known_mechanisms
 from gap_training.worlds import World
 
 from mlscorr.effects.catalogue import SYSTEMATIC
-from mlscorr.gap.infer.settings import SETTINGS
+from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.plan.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
 from mlscorr.gap.plan.sizing import Ruler, likeness, shift_by
 

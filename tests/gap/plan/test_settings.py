@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
 from mlscorr.gap.plan.settings import SETTINGS
+from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
 from mlscorr.simulate.settings import SETTINGS as SIMULATION
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.observe.settings import SETTINGS as OBSERVE
+from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
 from mlscorr.gap.signatures.settings import SETTINGS, Settings
 
 

@@ -1,0 +1,257 @@
+"""How far the gap shrinks, on data not used to find the cause, once the simulator has it.
+
+Which effect it is, all blocks of time say; its size is found without each fifth of them. The
+simulator runs again with it, and the gap is measured where its size was not looked for. Check
+points are never looked at but here.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from mlscorr.gap.closure.folds import Simulated, make_folds, predict_whole
+from mlscorr.gap.closure.found_cause import FoundCause
+from mlscorr.gap.closure.over_sigma import OverSigma, errors_over_sigma
+from mlscorr.gap.closure.settings import SETTINGS
+from mlscorr.gap.closure.systematic import Squares, SystematicGap, share_gone
+from mlscorr.gap.evidence.columns import ColumnTable, column_table
+from mlscorr.gap.evidence.error_models import ErrorModel
+from mlscorr.gap.evidence.evidence import steady_columns
+from mlscorr.gap.evidence.measure import (
+    UNITS,
+    Predicted,
+    gap_kind,
+    position_terms,
+    scatter_terms,
+    signed_root,
+)
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
+from mlscorr.gap.evidence.tails import without_tails
+from mlscorr.gap.evidence.unknown import unknown_blocks
+from mlscorr.gap.residuals.rows import Rows, background
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Signed, before and after a cause is added, and 95 % of what it is when nothing is wrong."""
+
+    before: float
+    after: float
+    null_band: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Closure:
+    """The gap before and after a cause is added, where its size was not looked for.
+
+    Parameters
+    ----------
+    effect : str
+        The label that was added; the best known one where the verdict is unknown.
+    probability : float
+        Of that label.
+    kind, unit : str
+        How the gap is measured, see measure.
+    before, after : float
+        Signed.
+    shrink : float
+        1 - after^2 / before^2, at most 1; 0 where nothing was added. Where the gap grew,
+        before^2 / after^2 - 1, which is -1 at least.
+    interval : (float, float)
+        95 % of it, within [-1, 1].
+    null_band : (float, float)
+        95 % of what the gap is when nothing is wrong.
+    held_out : str
+        A sentence.
+    is_held_out : bool
+        Whether the size was found without the rows that judge it.
+    folds : (f, 2) array
+        The gap in each fold alone, before and after. In the unit.
+    gap : Gap
+        That of the rows in which the cause was found.
+    over_sigma : OverSigma
+        Errors over the sigma that the simulator gives them.
+    """
+
+    effect: str
+    probability: float
+    kind: str
+    unit: str
+    before: float
+    after: float
+    shrink: float
+    interval: tuple[float, float]
+    null_band: tuple[float, float]
+    held_out: str
+    is_held_out: bool
+    folds: np.ndarray
+    gap: Gap
+    over_sigma: OverSigma
+
+    @property
+    def is_within_noise(self) -> bool:
+        """Whether chance alone makes a gap as large as that before: there is nothing to close."""
+        low, high = self.null_band
+        is_lost = self.kind == "returns" and self.before < low  # below it fewer pulses return
+        return self.effect != "none" and self.before <= high and not is_lost
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def close_gap(
+    case: FoundCause,
+    simulated: Simulated,
+    rng: np.random.Generator,
+    progress: Callable[[int], None] | None = None,
+) -> Closure:
+    """Closure of a cause.
+
+    Parameters
+    ----------
+    case : FoundCause
+    simulated : function of a tuple of Effect, or (m,) array
+        What the simulator, run again with these too, adds to the rows' residuals: (m,); or what its
+        next run added, whatever was changed in it.
+    rng : numpy.random.Generator
+    progress : function of a number of steps, one in all, optional
+    """
+    rows, used, cause = case.rows, case.used, case.cause
+    kind = gap_kind(cause.effect, case.evidence.noisy, rows)
+    unit = UNITS[kind]
+    whole = predict_whole(case, simulated)  # takes most memory: before there is a table of all rows
+    ruler = _Ruler.of(kind, case, cause.probability if callable(simulated) else 0.0)
+    folds = make_folds(case, whole, ruler.observations, ruler.model, simulated, rng, progress)
+    held = ruler.compare(folds, rng)
+    fitted = replace(folds, fold=np.where(used, 0, -1), predicted=(whole,))
+    gap, in_sample = _gap(held, unit), _gap(ruler.compare(fitted, rng, used), unit)
+    nothing = cause.effect == "none"
+    return Closure(
+        cause.effect, float(cause.probability), kind, unit, gap.before,
+        gap.before if nothing else gap.after, 0.0 if nothing else held.gone,
+        (0.0, 0.0) if nothing else held.interval, gap.null_band, folds.held_out,
+        folds.is_held_out, signed_root(held.folds, unit), in_sample,
+        errors_over_sigma(rows, ruler.observations, folds, rng),
+    )  # fmt: skip
+
+
+def _gap(squares, unit):
+    """Gap in a unit, by Squares."""
+    before, after = (float(v) for v in signed_root(squares.square, unit))
+    band = np.percentile(signed_root(squares.chance, unit), INFERENCE.band)
+    return Gap(before, after, tuple(float(v) for v in band))
+
+
+@dataclass(frozen=True)
+class _Ruler:
+    """What a gap is measured with."""
+
+    kind: str
+    rows: Rows
+    used: np.ndarray
+    observations: Observations
+    table: ColumnTable | None  # of innovations, for a systematic gap
+    model: ErrorModel
+    probability: float
+
+    @classmethod
+    def of(cls, kind, case, probability):
+        rows, noise = case.rows, case.cause.model
+        observations = Observations.of(rows, background(rows, case.survey))
+        unknown = unknown_blocks(rows, case.survey)
+        table = column_table(rows, case.signatures, unknown, observations.sigma)
+        observations = observations[~case.undecided[observations.row]]
+        observations, _ = without_tails(observations, rows, steady_columns(observations, table))
+        model = case.evidence.likely_model(case.cause.effect)
+        scale = model.scale if noise.scale == 1.0 else noise.scale
+        model = replace(model, scale=scale, fixes=noise.fixes, windows=noise.windows)
+        white = None
+        if kind == "systematic":
+            table = replace(table, columns=observations.columns(table.columns))  # each is large
+            innovations = observations.whitener(model).innovations(table.columns)[0]
+            white = replace(table, columns=innovations)
+        return cls(kind, rows, case.used, observations, white, model, probability)
+
+    def compare(self, folds, rng, among=None):
+        """What the size of each fold's others does to the gap of some rows (m,): Squares."""
+        among = np.ones(len(self.rows), bool) if among is None else among
+        if self.kind == "systematic":
+            given = self.observations, self.model, self.table, self.rows.residual
+            return SystematicGap.of(*given, folds, self.used, among).measure(rng, self.probability)
+        *terms, place = self._terms(folds, rng)
+        is_share = self.kind == "returns"  # a mean of shares, not of squares
+        sign = -1.0 if is_share and terms[0][among[place]].mean() < 0 else 1.0  # lost, or gained
+        before, after, chance, usual = (sign * values[among[place]] for values in terms)
+        place = place[among[place]]
+        both = np.column_stack([before, after])
+        of_fold = folds.of_rows[place]
+        folded = np.array([np.bincount(of_fold, v, len(folds.predicted)) for v in both.T]).T
+        folded /= np.maximum(np.bincount(of_fold, minlength=len(folds.predicted)), 1)[:, None]
+        squares = both.mean(axis=0), folded, chance.mean(axis=0)
+        usual = np.percentile(usual.mean(axis=0), INFERENCE.band[0])
+        left = _left_out(both, folds.block[place])
+        if is_share:
+            *squares, usual, left = (np.sign(v) * v**2 for v in (*squares, usual, left))
+        gone = share_gone(*squares[0], usual)
+        return Squares(*(sign * v for v in squares), gone, _jackknife(left, gone, usual))
+
+    def _terms(self, folds, rng):
+        """Terms before, after (q,) and by chance (q, k) where the simulator is right without the
+        cause and with it, whose means are gaps; their rows (q,).
+        """
+        rows, nothing, replicas = self.rows, Predicted.nothing(self.rows), INFERENCE.replicas
+        if self.kind == "position":
+            observations = self.observations
+            residual = observations.columns(rows.residual[:, None])
+            chance, usual = (self._replicas(p, rng) for p in (nothing, folds.whole))
+            each = [position_terms(observations, p, residual)[:, 0] for p in folds.predicted]
+            after = np.choose(folds.of_rows[observations.row], each)
+            before = position_terms(observations, nothing, residual)[:, 0]
+            keep = observations.second
+            terms = before, after, chance, usual, observations.row
+            return tuple(values[keep] for values in terms)
+        of_kind = rows.channel == ("roughness" if self.kind == "scatter" else "return_rate")
+        drawn = np.sqrt(rows.noise)[:, None] * rng.standard_normal((len(rows), replicas))
+        before = np.column_stack([rows.residual, drawn])
+        if self.kind == "scatter":
+            held = Predicted(nothing.shift, folds.held("growth"), nothing.extra)
+            grown = np.column_stack([rows.residual, np.log1p(held.growth)[:, None] + drawn])
+            of_kind &= ~_outliers(rows.residual, np.log1p(held.growth), rows.noise, of_kind)
+            before, after = scatter_terms(rows, nothing, before), scatter_terms(rows, held, grown)
+        else:
+            after = np.column_stack([rows.residual - folds.held("shift"), drawn])
+        before, after, place = before[of_kind], after[of_kind], np.flatnonzero(of_kind)
+        return before[:, 0], after[:, 0], before[:, 1:], after[:, 1:], place
+
+    def _replicas(self, predicted, rng):
+        """Terms (n, k) of the position where the simulator is right with what is predicted."""
+        o = self.observations
+        whitener = o.whitener(predicted.model, predicted.extra[o.row] * o.half)
+        drawn = whitener.draw(rng, INFERENCE.replicas) + o.columns(predicted.shift[:, None])
+        return position_terms(o, predicted, drawn)
+
+
+def _outliers(residual, expected, noise, among):
+    """Which rows (m,) of some are odd with the cause and without it: kerbs and crowns are rougher
+    than planes, and a few of them would rule a mean of squares.
+    """
+    score = np.minimum(np.abs(residual), np.abs(residual - expected)) / np.sqrt(noise)
+    limit = np.quantile(score[among], 1.0 - INFERENCE.tail_rows) if among.any() else 0.0
+    return among & (score > max(limit, INFERENCE.tail))
+
+
+def _left_out(both, block):
+    """Means (g, 2) of terms (q, 2) with groups of blocks (q,) left out in turn."""
+    groups = 2 * SETTINGS.folds
+    group = np.unique((block * groups) // (block.max() + 1), return_inverse=True)[1]
+    count, sums = np.bincount(group), np.array([np.bincount(group, v) for v in both.T]).T
+    return (both.sum(axis=0) - sums) / np.maximum(len(both) - count, 1)[:, None]
+
+
+def _jackknife(left, share, usual):
+    """95 % of the share that is gone, by what is there without each of g groups (g, 2)."""
+    g = len(left)
+    each = np.array([share_gone(*pair, usual) for pair in left])
+    spread = INFERENCE.quantile * np.sqrt((g - 1) / g * ((each - each.mean()) ** 2).sum())
+    return max(-1.0, share - spread), min(1.0, share + spread)

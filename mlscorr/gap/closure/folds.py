@@ -1,0 +1,265 @@
+"""Sizes of a cause found without some blocks of time, for these to judge.
+
+Which effect it is, all blocks say together, and with what probability: a choice made anew in each
+part of the data is often another one. When an event acts they say too. Sizes are found anew
+without each fifth of the blocks.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from mlscorr.effects import Effect
+from mlscorr.gap.closure.cross_fit import cross_fitted
+from mlscorr.gap.closure.found_cause import FoundCause
+from mlscorr.gap.closure.settings import SETTINGS
+from mlscorr.gap.evidence.causes import Cause, Inference, cause_of
+from mlscorr.gap.evidence.error_models import ErrorModel
+from mlscorr.gap.evidence.labels import weigh_labels
+from mlscorr.gap.evidence.measure import Predicted
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
+from mlscorr.gap.residuals.rows import Rows, background
+from mlscorr.gap.signatures.expectation import expected
+from mlscorr.gap.signatures.signatures import Signature, select
+
+Simulated = Callable[[tuple[Effect, ...]], np.ndarray] | np.ndarray
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Which rows judge which size of a cause.
+
+    Parameters
+    ----------
+    block : (m,) int array
+        Of time, from 0.
+    fold : (m,) int array
+        Which of `predicted` each row judges; -1 for check points, which judge all.
+    predicted : tuple of Predicted
+    held_out : str
+        What was, in a sentence.
+    whole : Predicted
+        Of the cause that was found in all used rows.
+    columns : (m, p) array
+        What the parts of the cause that shift rows make of them, by their parameters.
+    """
+
+    block: np.ndarray
+    fold: np.ndarray
+    predicted: tuple[Predicted, ...]
+    held_out: str
+    whole: Predicted
+    columns: np.ndarray
+
+    @property
+    def is_held_out(self) -> bool:
+        """Whether rows judge a size that was found without them."""
+        return len(self.predicted) > 1
+
+    @property
+    def of_rows(self) -> np.ndarray:
+        """Which of `predicted` (m,) is compared with each row where one must be."""
+        return np.clip(self.fold, 0, len(self.predicted) - 1)
+
+    def held(self, name: str) -> np.ndarray:
+        """A column (m,) of Predicted by its name, of each row as of its own fold."""
+        each = np.array([getattr(predicted, name) for predicted in self.predicted])
+        return each[self.of_rows, np.arange(len(self.fold))]
+
+
+def predict_whole(case: FoundCause, simulated: Simulated) -> Predicted:
+    """What the cause that all used rows tell makes of the rows, or the simulator's next run did.
+
+    Parameters
+    ----------
+    case : FoundCause
+    simulated
+        As in ``close_gap``.
+    """
+    rows = case.rows
+    if callable(simulated):
+        return _predict(rows, case.survey, case.cause, simulated)
+    rough = rows.channel == "roughness"
+    before = np.exp(rows.residual - simulated)
+    growth = np.where(rough, np.exp(rows.residual) - before, 0.0)
+    return Predicted(simulated, growth, np.zeros(len(rows)), case.cause.model)
+
+
+def make_folds(
+    case: FoundCause, whole: Predicted, observations: Observations, model: ErrorModel,
+    simulated: Simulated, rng: np.random.Generator, progress: Callable[[int], None] | None = None,
+) -> Folds:  # fmt: skip
+    """Folds for a cause.
+
+    Parameters
+    ----------
+    case : FoundCause
+    whole : Predicted
+        Of the cause as all used rows tell it.
+    observations : Observations
+        Of all rows.
+    model : ErrorModel
+        Of their covariance, with the cause.
+    simulated, rng, progress
+        As in ``close_gap``.
+    """
+    rows, used, cause = case.rows, case.used, case.cause
+    block, columns = _blocks(rows, cause), case.columns()
+    nothing = np.zeros(len(rows), dtype=int)
+    if not callable(simulated):
+        held_out = (
+            "The simulator's next run was compared with the same survey; the effect had been "
+            "looked for in it, what the simulator then changed had not been fitted to it."
+        )
+        return Folds(block, nothing, (whole,), held_out, whole, columns)
+    if cause.effect == "none":
+        held_out = "Nothing was added to the simulator."
+        return Folds(block, nothing, (whole,), held_out, whole, columns)
+    shift = columns @ np.concatenate([np.zeros(0), *(size for _, size in case.shifting)])
+    squares = np.bincount(block, (shift * rows.metric * used) ** 2)
+    is_brief = len(np.unique(block[used & rows.metric])) < 2
+    if is_brief or squares.max() > SETTINGS.block_share * squares.sum() > 0:
+        held_out = "Nothing could be held out: what acts in one moment is told by no other."
+        return Folds(block, nothing, (whole,), held_out, whole, columns)
+    fold = np.where(used, _dealt(squares)[block], -1)
+    if columns.shape[1]:
+        predicted = _with_sizes(case, observations, model, fold, whole, columns)
+    else:
+        keeps = [used & (fold != number) for number in range(SETTINGS.folds)]
+        causes = [_trained(case, observations, model, keep, rng) for keep in keeps]
+        predicted = tuple(_predict(rows, case.survey, each, simulated) for each in causes)
+    if progress is not None:
+        progress(1)
+    held_out = (
+        f"The effect was chosen on all {block.max() + 1} blocks of time; each fifth of them judges "
+        "a size that was found without it."
+    )
+    if not used.all():
+        held_out += f" {len(np.unique(rows.item[~used]))} looks at check points were never used."
+    if case.undecided.any():
+        held_out += (
+            f" {len(np.unique(rows.item[case.undecided]))} of these, at the moment of the jump, "
+            "can't judge: no other row says on which side of it they were."
+        )
+    return Folds(block, fold, predicted, held_out, whole, columns)
+
+
+def _with_sizes(case, observations, model, fold, whole, columns):
+    """What the simulator expects by the size that all folds but each tell: Predicted of each.
+
+    The run with the size of all blocks, and to the first order what another size changes.
+    """
+    if not whole.shift.any():  # no simulator takes it
+        return (whole,) * SETTINGS.folds
+    learned = observations[case.used[observations.row]]
+    residual = learned.columns(case.rows.residual[:, None])[:, 0]
+    sizes = cross_fitted(
+        learned, model, fold[learned.row], SETTINGS.folds, learned.columns(columns), residual
+    )
+    change = columns @ (sizes[:-1] - sizes[-1]).T
+    return tuple(replace(whole, shift=whole.shift + each) for each in change.T)
+
+
+def _blocks(rows, cause):
+    """Which block of time each row (m,) is in, from 0."""
+    widths = [part.fixed["width"] for part, _ in cause.parts if "width" in part.fixed]
+    length = min(SETTINGS.block_length, SETTINGS.event_share * min(widths, default=np.inf))
+    number = np.floor((rows.gps_time - rows.reference.start) / length)
+    return np.unique(number, return_inverse=True)[1]
+
+
+def _dealt(squares):
+    """Which fold each block is in: each holds about as much of what the cause moves.
+
+    In turn to and fro from the largest on; blocks in which nothing moves follow in turn.
+    """
+    turn = np.append(np.arange(SETTINGS.folds), np.arange(SETTINGS.folds)[::-1])
+    dealt = np.empty(len(squares), dtype=int)
+    dealt[np.argsort(-squares, kind="stable")] = np.resize(turn, len(squares))
+    return dealt
+
+
+def _trained(case, observations, model, used, rng):
+    """The cause of a noise class with the size that some rows (m,) bool tell of.
+
+    The windows of a worse POS are those that all rows tell, as an event's time is.
+    """
+    survey, evidence, cause = case.survey, case.evidence, case.cause
+    if cause.model.windows:
+        part = observations[used[observations.row]]
+        windows = _with_factor(part, model, part.columns(case.rows.residual[:, None]))
+        return replace(cause, model=replace(cause.model, windows=windows))
+    names, part = cause.effect.split("+"), case.rows.select(used)
+    of_part = select([s for s in case.signatures if s.name in names], case.rows, used)
+    anew = weigh_labels(part, background(part, survey), survey, of_part, rng, 0)
+    best = {name: _likeliest(evidence, name) for name in names}
+    noise = [each for each in anew.noise if _is_alike(each, best.get(each.label))]
+    anew = replace(anew, noise=tuple(noise))
+    if not set(names) <= anew.noisy:  # without these rows nothing shows it
+        return cause
+    return cause_of(part, of_part, anew, cause.effect, cause.probability)
+
+
+def _with_factor(observations, model, residual):
+    """Windows of a model with all their factors changed alike, to what residuals (n, 1) tell."""
+
+    def windows(log_ratio):
+        return tuple(w._replace(factor=w.factor * float(np.exp(log_ratio))) for w in model.windows)
+
+    def score(log_ratio):
+        changed = replace(model, windows=windows(log_ratio))
+        return -observations.whitener(changed).log_likelihood(residual)[0]
+
+    widest = np.log(max(INFERENCE.window_factors) / min(INFERENCE.window_factors))
+    return windows(minimize_scalar(score, bounds=(-widest, widest), method="bounded").x)
+
+
+def _likeliest(evidence, name):
+    """The NoiseEvidence of a label that explains most."""
+    return max((e for e in evidence.noise if e.label == name), key=lambda each: each.gain[0])
+
+
+def _is_alike(noise, other):
+    """Whether two NoiseEvidence are of one kind: of all times, of fixes, or in windows."""
+    return type(noise) is type(other) and (noise.member < 0) == (other.member < 0)
+
+
+def cause_for_simulator(rows: Rows, signatures: Sequence[Signature], inference: Inference) -> Cause:
+    """The cause that is put into the simulator: the verdict's; the best known one for unknown.
+
+    Parameters
+    ----------
+    rows : Rows
+    signatures : sequence of Signature
+    inference : Inference
+        Of these.
+    """
+    if inference.verdict.label != "unknown":
+        return inference.cause
+    if inference.verdict.is_hidden:
+        return cause_of(rows, signatures, inference.evidence, "none", inference.probability["none"])
+    best, probability = _best_known(inference.probability), inference.probability
+    return cause_of(rows, signatures, inference.evidence, best, probability.get(best, 0.0))
+
+
+def _best_known(probability):
+    """The most probable label that a simulator can take; none where there is no other."""
+    known = (name for name in probability if name not in ("none", "unknown"))
+    return max(known, key=probability.get, default="none")
+
+
+def _predict(rows, survey, cause, simulated):
+    """What a simulator with a cause in it expects of all rows: Predicted."""
+    try:
+        effects = cause.effects
+    except ValueError:  # larger than any survey can have: no simulator takes it
+        return Predicted.nothing(rows)
+    own = [effect for effect in effects if not effect.is_of_pose()]
+    change = expected(rows, survey, [effect for effect in own if effect.random])
+    rough = (rows.channel == "roughness").any()  # then the stated noise, from the points, holds it
+    extra = np.zeros(len(rows)) if rough else change.variance
+    shift = simulated(tuple(own)) if own else np.zeros(len(rows))
+    return Predicted(shift, change.growth, extra, cause.model)

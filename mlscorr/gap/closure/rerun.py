@@ -1,0 +1,279 @@
+"""The full simulator run again on a survey's own pulses: what the residuals would be in it.
+
+Targets are fitted anew by the extraction, and planes anew to their points, as build_rows does
+with the survey itself. The world is the reference surface, the targets where they were surveyed,
+and planes as the survey shows them; a plane that was seen twice is one.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+
+import numpy as np
+
+from mlscorr.effects import Effect
+from mlscorr.gap.closure.beams import Beams
+from mlscorr.gap.closure.refit import refit_targets
+from mlscorr.gap.residuals.channels import log_roughness, rounding_sigma
+from mlscorr.gap.residuals.plane_fit import freedom, moments
+from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals.selection import gate
+from mlscorr.gap.residuals.settings import SETTINGS
+from mlscorr.gap.signatures.changes import check_mounting
+from mlscorr.gap.signatures.expectation import expected
+from mlscorr.gap.signatures.simulators import joined
+from mlscorr.simulate.scan import Draws, Met, Planes, Replay, TargetWorld, true_targets
+from mlscorr.survey import Survey
+
+ON_PATCHES = ("shared", "roughness", "return_rate")
+
+
+def rerun(
+    rows: Rows, survey: Survey, beams: Beams, effects: Iterable[Effect], rng: np.random.Generator
+) -> np.ndarray:
+    """Residuals (m,) of the rows in a survey that the simulator makes with some effects.
+
+    Parameters
+    ----------
+    rows : Rows
+        Those that the Beams were collected for, or some of them.
+    survey : Survey
+        As recorded; its Scanner says what noise the simulator makes.
+    beams : Beams
+    effects : iterable of Effect
+        Turn truth into record. Random ones on the pose are not realised: their variance is the
+        background's.
+    rng : numpy.random.Generator
+        One seed draws the same noise whatever the effects are: the difference of two runs is what
+        the effects do.
+
+    Returns
+    -------
+    (m,) array
+        As in Rows, in the same units; NaN where nothing can be compared: beams that meet another
+        surface, a target that isn't found or known much worse than as observed.
+
+    Raises
+    ------
+    ValueError
+        For effects on the beams of a survey without a mounting, and for rows that are not the
+        Beams'.
+    """
+    effects, views = tuple(effects), _views_of(rows, beams)
+    check_mounting(survey, effects)
+    residual = np.full(len(rows), np.nan)
+    if len(rows) == 0:
+        return residual
+    run, dither, speckle, fit_rng = _drawn(rows, survey, beams, effects, rng)
+    patches = _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng)
+    on = np.flatnonzero((rows.channel == "surface") & (views[:, 0] >= 0))
+    if len(on) and beams.reference is not None:
+        spread = SETTINGS.trims[-1] * np.sqrt(patches.variance)
+        residual[on] = _surface(rows, survey, beams, on, views[on, 0], run, dither, spread)
+    return residual
+
+
+def _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng):
+    """Fill the residuals of targets, where they were surveyed, and of planes, as they were seen;
+    the _Patches of these.
+    """
+    boards = _boards(rows, beams, run.effects)
+    met = _meet(rows, beams, views, run.beams, boards, speckle)
+    xyz, kept = run.measure(met)
+    xyz += dither
+    patches = _Patches.of(beams, xyz, kept, np.isfinite(met.range))
+    for channel, values in zip(ON_PATCHES, (_shared, _roughness, _return_rate), strict=True):
+        on = np.flatnonzero(rows.channel == channel)
+        residual[on] = values(patches, views[on], rows.believed[on])
+    simulated = xyz, kept, met, run.beams, boards
+    refit_targets(residual, rows, run.survey, beams, views, simulated, fit_rng)
+    return patches
+
+
+@dataclass(frozen=True)
+class BeamSimulator:
+    """The simulator on a survey's own beams, with the same noise each time.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    beams : Beams
+        Of these.
+    effects : tuple of Effect
+        That it believes in already.
+    seed : int
+    """
+
+    rows: Rows
+    survey: Survey
+    beams: Beams
+    effects: tuple[Effect, ...]
+    seed: int
+
+    def added(self, effects: Iterable[Effect]) -> np.ndarray:
+        """What further effects add to each row (m,); to the first order where no run tells it."""
+        union = reduce(joined, effects, [*self.effects])
+        added = self._run(tuple(union)) - self._plain
+        linear = expected(self.rows, self.survey, effects).shift
+        return np.where(np.isfinite(added) & self.rows.metric, added, linear)
+
+    @cached_property
+    def _plain(self):
+        return self._run(self.effects)
+
+    def _run(self, effects):
+        return rerun(self.rows, self.survey, self.beams, effects, np.random.default_rng(self.seed))
+
+
+def _drawn(rows, survey, beams, effects, rng):
+    """All that is random, whatever the effects are: the Replay, rounding of the points (n, 3) in
+    m, speckle of the pulses about targets, and a generator for the fits.
+    """
+    draws, dither, speckle, fit_rng = rng.spawn(4)
+    n, on_target = len(beams.view), beams.target[beams.view] >= 0
+    draws, rounding = Draws.of(n, draws), rounding_sigma() * dither.standard_normal((n, 3))
+    run = Replay(survey, beams.pulses, effects, rows.reference, draws, beams.origin)
+    return run, rounding, speckle.standard_normal(n)[on_target], fit_rng
+
+
+def _views_of(rows, beams):
+    """Numbers (m, 2) of the first and second view of each row's item; -1 for none."""
+    views = np.full((len(rows), 2), -1)
+    for column in (0, 1):
+        numbers = np.flatnonzero(beams.second == bool(column))
+        of_item = dict(zip(beams.item[numbers].tolist(), numbers, strict=True))
+        views[:, column] = [of_item.get(item, -1) for item in rows.item.tolist()]
+    other = (views[:, 0] >= 0) & (beams.gps_time[views[:, 0]] != rows.gps_time)
+    if other.any():
+        raise ValueError(
+            f"{other.sum()} of {len(rows)} rows have another time than in the Beams: collect the "
+            "beams anew for these rows."
+        )
+    return views
+
+
+def _boards(rows, beams, effects):
+    """Boards of the views at targets, where these truly are."""
+    targets = true_targets(rows.targets, effects, rows.reference)
+    of_item = dict(zip(rows.item.tolist(), rows.survey_item, strict=True))
+    items = beams.item[beams.target >= 0].tolist()
+    surveyed = np.array([of_item.get(item, -1) for item in items], dtype=int)
+    centre = targets.position[surveyed] - beams.origin if len(targets) else np.empty((0, 3))
+    return replace(beams.boards, centre=centre)
+
+
+def _meet(rows, beams, views, shot, boards, speckle):
+    """Met of all pulses: with the planes of patches, and with targets."""
+    point, normal = beams.point.copy(), beams.normal.copy()
+    shared, second = np.nonzero((views >= 0) & (rows.channel == "shared")[:, None])
+    both = views[shared, second]  # one plane for both views
+    point[both], normal[both] = rows.position[shared] - beams.origin, rows.direction[shared]
+    offset = np.einsum("li,li->l", normal, point)
+    on_target = beams.target[beams.view] >= 0
+    flat, (start, direction) = ~on_target, shot
+    view = beams.view[flat]
+    planes = Planes(normal[view], offset[view], beams.pulses.intensity[flat])
+    number = beams.target[beams.view[on_target]]
+    world = TargetWorld(boards, number, beams.beyond[on_target], beams.behind[on_target], speckle)
+    met = ((planes, flat), (world, on_target))  # patches stand before targets
+    return Met.concatenate([what.meet(start[on], direction[on]) for what, on in met])
+
+
+@dataclass(frozen=True)
+class _Patches:
+    """Planes through the simulated points of each view at a patch; NaN or 0 for other views.
+
+    centre, normal (l, 3); variance (l,) in m^2; number (l,) of points and of pulses that met it.
+    """
+
+    centre: np.ndarray
+    normal: np.ndarray
+    variance: np.ndarray
+    points: np.ndarray
+    fired: np.ndarray
+
+    @classmethod
+    def of(cls, beams, xyz, kept, met):
+        flat = beams.target[beams.view] < 0
+        view, count = beams.view[flat], int((beams.target < 0).sum())
+        local = xyz[flat] - beams.origin - beams.point[view]
+        weight = (kept & met)[flat].astype(float)
+        local[weight == 0] = 0.0
+        mean, values, axis = moments(local, weight, np.searchsorted(view, np.arange(count)))
+        points, fired = (np.bincount(view, v, len(beams)) for v in (weight, met[flat]))
+        full = points[:count] >= SETTINGS.plane_points
+        centre, normal = np.full((2, len(beams), 3), np.nan)
+        centre[:count] = np.where(full[:, None], mean + beams.point[:count], np.nan)
+        turned = np.sign(np.einsum("li,li->l", axis, beams.normal[:count]))
+        normal[:count] = axis * turned[:, None]
+        unbiased = values[:, 0] * points[:count] / freedom(points[:count])
+        variance = np.full(len(beams), np.nan)
+        variance[:count] = np.where(full, unbiased, np.nan)
+        return cls(centre, normal, variance, points, fired)
+
+
+def _shared(patches, views, _believed):
+    first, second = views.T
+    normal = patches.normal[first] + patches.normal[second]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    apart = patches.centre[first] - patches.centre[second]
+    return np.where((views >= 0).all(axis=1), np.einsum("mi,mi->m", normal, apart), np.nan)
+
+
+def _roughness(patches, views, believed):
+    view = views[:, 0]
+    variance = np.maximum(patches.variance[view], 1e-12)
+    ratio, _ = log_roughness(variance, believed, patches.points[view])
+    return np.where(view >= 0, ratio, np.nan)
+
+
+def _return_rate(patches, views, _believed):
+    view = views[:, 0]
+    share = patches.points[view] / np.maximum(patches.fired[view], 1)
+    return np.where((view >= 0) & (patches.fired[view] > 0), share - 1.0, np.nan)
+
+
+def _surface(rows, survey, beams, on, view, run, dither, spread):
+    """Mean distance (k,) of simulated points from the facets that the recorded beams meet.
+
+    Points farther from the middle one than the spread (l,), and than any surface is rough, are of
+    another surface.
+    """
+    fired = np.flatnonzero(np.isin(beams.view, view))  # the other pulses are not compared
+    of, facet = beams.view[fired], beams.facet[fired]
+    start, beam = (values[fired] for values in run.beams)
+    part, triangle = beams.reference.meet(start, beam, beams.pulses.intensity[fired])
+    met = Met(np.full(len(dither), np.nan), np.ones(len(dither)), beams.pulses.intensity)
+    met.range[fired], met.incidence[fired] = part.range, part.incidence
+    xyz, kept = (values[fired] for values in run.measure(met))
+    normal, offset = beams.reference.mesh.normal, beams.reference.mesh.offset
+    direction, largest = np.zeros((len(beams), 3)), np.zeros(len(beams))
+    direction[view] = rows.direction[on]
+    largest[view] = np.abs(rows.residual[on]) + gate(survey, rows.gps_time[on])
+    cosine = np.einsum("ni,ni->n", normal[triangle], direction[of])
+    used = kept & (triangle >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
+    cosine = np.einsum("ni,ni->n", normal[facet], direction[of])
+    used &= (facet >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
+    away = np.einsum("ni,ni->n", normal[facet], xyz + dither[fired] - beams.origin)
+    away = (away - offset[facet]) * np.sign(cosine)
+    used &= np.abs(away) <= largest[of]
+    middle = _median(np.where(used, away, np.nan), of, len(beams))
+    limit = np.fmax(spread, SETTINGS.roughest)
+    with np.errstate(invalid="ignore"):
+        used &= np.abs(away - middle[of]) <= limit[of]
+
+    def count(which):
+        return np.bincount(of, which, len(beams))[view]
+
+    number, lost = count(used), count(np.isfinite(part.range) & ~kept)
+    known = number >= np.maximum(1, SETTINGS.facet_share * (count(of >= 0) - lost))
+    return np.where(known, count(np.where(used, away, 0.0)) / np.maximum(number, 1), np.nan)
+
+
+def _median(values, view, count):
+    """Median (l,) of each view's values (n,) that are not NaN."""
+    order = np.lexsort((values, view))  # NaN last
+    first = np.searchsorted(view, np.arange(count))
+    number = np.bincount(view, np.isfinite(values), count).astype(int)
+    return values[order[np.minimum(first + number // 2, len(view) - 1)]]

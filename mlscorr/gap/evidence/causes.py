@@ -1,0 +1,276 @@
+"""Causes with their parameters, and the whole inference in one call."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from mlscorr.effects import Effect
+from mlscorr.effects.vehicle import PositionNoise
+from mlscorr.gap.evidence.decision import Costs, JointScore, learned
+from mlscorr.gap.evidence.detectable import detectable_size
+from mlscorr.gap.evidence.error_models import STATED, ErrorModel, error_models, shares
+from mlscorr.gap.evidence.labels import LabelEvidence, weigh_labels
+from mlscorr.gap.evidence.observations import model_likelihood
+from mlscorr.gap.evidence.parameters import (
+    CauseParameter,
+    effect_parameters,
+    fit_amplitudes,
+    most_probable_size,
+    window_parameters,
+)
+from mlscorr.gap.evidence.separability import Separability, compare_signatures
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.evidence.verdict import GapVerdict, best_member, decide, joint_score, with_absence
+from mlscorr.gap.evidence.where import Where, locate
+from mlscorr.gap.evidence.windows import WindowEvidence
+from mlscorr.gap.residuals.absence import Absence
+from mlscorr.gap.residuals.rows import Background, Rows
+from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.survey import Survey, Trajectory
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One label with what it says in numbers.
+
+    Parameters
+    ----------
+    effect : str
+        The label.
+    probability : float
+    parameters : tuple of CauseParameter
+    parts : tuple of (Signature, (p,) array)
+        What to put into the simulator: signature.effect(estimate) is the Effect.
+    shift : (m,) array
+        What it makes of the residuals.
+    extra : (m,) array or None
+        Variance that it adds to the rows' own noise.
+    model : ErrorModel
+        Of the POS's covariance with it.
+    """
+
+    effect: str
+    probability: float
+    parameters: tuple[CauseParameter, ...]
+    parts: tuple[tuple[Signature, np.ndarray], ...]
+    shift: np.ndarray
+    extra: np.ndarray | None = None
+    model: ErrorModel = STATED
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Effects for the simulator. Raises ValueError for a size that no survey can have."""
+        return tuple(signature.effect(estimate) for signature, estimate in self.parts)
+
+    def stretches(self, trajectory: Trajectory) -> tuple[tuple[str, float, float], ...]:
+        """Name, start and end of each event and window, as far as the drive reaches; an event's
+        where it is half as large as at its largest, or larger.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            The recorded one.
+        """
+        stretches = []
+        for part, _ in self.parts:
+            if part.kind.moment():
+                time = trajectory.gps_time[0] + part.fixed["time"]
+                half = np.sqrt(2 * np.log(2)) * part.fixed.get("width", 0.0)
+                end = time + half if half else trajectory.passes[trajectory.segment(time)][1]
+                stretches.append((part.name, float(time - half), float(end)))
+        for start, length, *_ in self.model.windows:
+            stretches.append((PositionNoise.name, start, start + length))
+        first, last = trajectory.gps_time[[0, -1]].tolist()
+        return tuple((name, max(start, first), min(end, last)) for name, start, end in stretches)
+
+
+@dataclass(frozen=True)
+class Inference:
+    """All that the rows say.
+
+    Parameters
+    ----------
+    verdict : GapVerdict
+    causes : tuple of Cause
+        That of the verdict, then the others, best first.
+    same : tuple of str
+        Effects that this survey can't tell apart from the label at the size that it has.
+    where : Where
+    separability : Separability
+    probability : dict
+        Of every label that was weighed, most probable first.
+    evidence : LabelEvidence
+        What was compared.
+    joint : JointScore
+        Of the labels.
+    """
+
+    verdict: GapVerdict
+    causes: tuple[Cause, ...]
+    same: tuple[str, ...]
+    where: Where
+    separability: Separability
+    probability: dict[str, float]
+    evidence: LabelEvidence
+    joint: JointScore
+
+    @property
+    def cause(self) -> Cause:
+        """The Cause of the verdict."""
+        return next(cause for cause in self.causes if cause.effect == self.verdict.label)
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def infer_causes(
+    rows: Rows,
+    background: Background,
+    survey: Survey,
+    signatures: Sequence[Signature],
+    rng: np.random.Generator,
+    replicas: int = SETTINGS.replicas,
+    absence: Absence | None = None,
+    costs: Costs | None = None,
+) -> Inference:
+    """Which effect explains the rows, with what parameters, and where it shows.
+
+    Parameters
+    ----------
+    rows : Rows
+    background : Background
+    survey : Survey
+    signatures : sequence of Signature
+    rng : numpy.random.Generator
+        Draws the replicas.
+    replicas : int
+        More of them make the p-value and the null bands finer.
+    absence : Absence, optional
+        Of targets that have no row.
+    costs : Costs, optional
+        Of wrong answers.
+
+    Raises
+    ------
+    ValueError
+        When no row has a residual in m, or a sigma is zero.
+    """
+    evidence = weigh_labels(rows, background, survey, signatures, rng, replicas)
+    joint, evidence = joint_score(rows, survey, signatures, evidence)
+    probability = learned().probabilities(joint)
+    verdict = decide(evidence, probability, absence, costs)
+    probability = probability if absence is None else with_absence(probability, absence)
+    names = [n for n in probability if n not in ("none", "unknown")]
+    names = [
+        name
+        for i, name in enumerate(names)
+        if i < SETTINGS.listed_causes or probability[name] > SETTINGS.listed
+    ]
+    names = list(dict.fromkeys((verdict.label, *names)))
+    causes = [cause_of(rows, signatures, evidence, name, probability[name]) for name in names]
+    if verdict.is_hidden:  # the rows show nothing of it
+        causes[0] = Cause("unknown", probability["unknown"], (), (), np.zeros(len(rows)))
+    first, *others = causes
+    causes = (first, *sorted(others, key=lambda cause: -cause.probability))
+    best = first
+    left = rows.residual - best.shift
+    models = _likely_models(evidence, left, rng, max(replicas, 20), best.model.windows)
+    acts = best.stretches(survey.trajectory) if len(best.parts) < 2 else ()
+    acts = acts[0][1:] if len(acts) == 1 else None  # several are no stretch
+    where = locate(rows, background, best.shift, rng, models, best.model, best.extra, acts)
+    compared = compare_signatures(evidence.observations, signatures, evidence.blocks.models[0])
+    same = _same(best, compared)
+    return Inference(verdict, causes, same, where, compared, probability, evidence, joint)
+
+
+def _likely_models(evidence, residual, rng, number, windows):
+    """Models drawn by their probability given residuals (m,) that nothing but windows acts on."""
+    columns = evidence.observations.columns(residual[:, None])
+    # with windows all are open: those that were relevant were chosen without them
+    models = error_models() if windows else evidence.blocks.models
+    score = np.concatenate([
+        model_likelihood(evidence.observations, replace(model, windows=windows), columns)
+        for model in models
+    ])  # fmt: skip
+    count = rng.multinomial(number, shares(score))
+    return [model for model, times in zip(models, count, strict=True) for _ in range(times)]
+
+
+def _same(cause, compared):
+    """Effects with the squared correlation of one class with a cause of one part."""
+    if len(cause.parts) != 1 or cause.effect not in compared.effects:
+        return (cause.effect,)
+    return compared.same(cause.effect, cause.parts[0][1])
+
+
+def cause_of(
+    rows: Rows,
+    signatures: Sequence[Signature],
+    evidence: LabelEvidence,
+    label: str,
+    probability: float,
+) -> Cause:
+    """Cause of a label.
+
+    Parameters
+    ----------
+    rows : Rows
+    signatures : sequence of Signature
+    evidence : LabelEvidence
+        Of these.
+    label : str
+    probability : float
+    """
+    shift = np.zeros(len(rows))
+    if label == "none":
+        return Cause(label, probability, (), (), shift)
+    if label == "unknown":
+        return Cause(label, probability, (), (), _unknown_shift(rows, evidence))
+    names, parameters, parts = label.split("+"), (), ()
+    steady = [name for name in names if name not in evidence.noisy]
+    if steady:
+        members = [best_member(signatures, evidence, n, "+".join(steady)) for n in steady]
+        parameters, estimates, shift = effect_parameters(rows, evidence, members, steady)
+        parts = tuple(zip(members, estimates, strict=True))
+    cause = Cause(label, probability, parameters, parts, shift)
+    for name in names:
+        if name in evidence.noisy:
+            cause = _with_noise(cause, rows, signatures, evidence, name)
+    return cause
+
+
+def _with_noise(cause, rows, signatures, evidence, name):
+    """The cause with one noise class beside."""
+    classes = [each for each in evidence.noise if each.label == name]
+    best = max(classes, key=lambda each: each.gain[0])
+    if isinstance(best, WindowEvidence):
+        more, model = window_parameters(best.windows), replace(cause.model, windows=best.windows)
+        return replace(cause, parameters=cause.parameters + more, model=model)
+    size, sigma = most_probable_size(best.size, best.by_size[:, 0])
+    if best.member < 0:
+        more = CauseParameter(PositionNoise.FACTOR, "ratio", size, sigma)
+        attitude = (size, *cause.model.attitude[1:])
+        model = replace(cause.model, scale=size, attitude=attitude)
+        return replace(cause, parameters=(*cause.parameters, more), model=model)
+    kind = signatures[best.member]
+    detectable = detectable_size(rows, evidence.observations, kind)
+    more = CauseParameter("magnitude", kind.units[0], size, sigma, detectable)
+    cause = replace(
+        cause, parameters=(*cause.parameters, more), parts=(*cause.parts, (kind, np.array([size])))
+    )
+    if kind.is_common:
+        return replace(cause, model=replace(cause.model, fixes=size))
+    if (
+        best.channels.any() or cause.extra is not None
+    ):  # the stated noise, from the points, holds it
+        return cause
+    return replace(cause, extra=size**2 * kind.variance)
+
+
+def _unknown_shift(rows, evidence):
+    """What the leading unknown block makes of the residuals (m,)."""
+    observations, columns = evidence.observations, evidence.table.columns[:, evidence.lead()[1]]
+    residual = observations.columns(rows.residual[:, None])[:, 0]
+    weight, models = evidence.blocks.none[:, 0], evidence.blocks.models
+    fit = fit_amplitudes(observations, models, weight, residual, observations.columns(columns))
+    return columns @ fit.estimate

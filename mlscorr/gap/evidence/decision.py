@@ -1,0 +1,259 @@
+"""From evidence to probabilities that are right as often as they say, and to one label.
+
+What was learned on synthetic surveys (benchmarks/train_decision.py) stands in decision.json:
+weights of features of the evidence, from which the probability of each kind of label follows, and
+how far evidence tells labels of one kind apart. Nothing there was set on a mechanism that grades a
+diagnosis.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+
+import numpy as np
+from scipy.special import betainc
+
+KINDS = ("none", "noise", "effect", "pair", "unknown")
+ABSENT = -20.0  # log evidence of what there is none of: less than any that matters
+BEND = 2.0  # log evidence beyond which more of it says less: odds of seven to one
+FARTHEST = 3.0  # standard deviations of a feature: beyond them nothing was learned
+
+
+@dataclass(frozen=True)
+class JointScore:
+    """Logs of prior times evidence over none, of all labels and given the best effect.
+
+    Parameters
+    ----------
+    score : dict
+        By label, none and pairs among them.
+    single : dict
+        By label, before two of them were tried together.
+    beside : dict
+        By label: what each adds to the effect that is best alone; empty where there is no effect.
+    facts : dict
+        Of the survey: what tells how evidence is to be taken, by name.
+    noisy : set of str
+        Labels of noise classes.
+    """
+
+    score: dict[str, float]
+    single: dict[str, float]
+    beside: dict[str, float]
+    facts: dict[str, float]
+    noisy: Collection[str]
+
+    def of_kind(self, kind: str) -> dict[str, float]:
+        """Scores of the labels of one of KINDS."""
+        return {n: v for n, v in self.score.items() if kind_of(n, self.noisy) == kind}
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What a wrong answer costs, in units of an effect named for another one.
+
+    Parameters
+    ----------
+    false_alarm : float
+        Of a cause, or unknown, where nothing is wrong.
+    miss : float
+        Of none, or noise, where a cause is there.
+    unknown : float
+        Of unknown where a known cause is there.
+    """
+
+    false_alarm: float = 4.0
+    miss: float = 1.0
+    unknown: float = 0.9
+
+
+OPERATING_POINTS = {
+    "sensitive": Costs(false_alarm=1.0, miss=1.0, unknown=1.0),
+    "default": Costs(),
+    "careful": Costs(false_alarm=10.0),
+}
+
+
+def kind_of(label: str, noisy: Collection[str]) -> str:
+    """The one of KINDS that a label is of: how many effects it names, whatever noise is beside.
+
+    Parameters
+    ----------
+    label : str
+    noisy : collection of str
+        Labels of noise classes.
+    """
+    if label in ("none", "unknown"):
+        return label
+    effects = [part for part in label.split("+") if part not in noisy]
+    return ("noise", "effect", "pair")[len(effects)]
+
+
+def features(joint: JointScore) -> dict[str, float]:
+    """What probabilities are made of, by name.
+
+    Parameters
+    ----------
+    joint : JointScore
+    """
+    base = joint.score["none"]
+    by_kind = _by_kind(joint.single, joint.noisy)
+    effects = sorted(by_kind["effect"], reverse=True)
+    noise, unknown = _total(by_kind["noise"]) - base, _total(by_kind["unknown"]) - base
+    effect, pair, joined = (
+        _total(joint.of_kind(kind).values()) - base for kind in ("effect", "pair", "unknown")
+    )
+    beside = _by_kind(joint.beside, joint.noisy)
+    cause = max(effect, pair)
+    evidence = {
+        "effect": effect,
+        "unknown": unknown,
+        "noise": noise,
+        "pair": pair,
+        "unknown beside": max(beside["unknown"], default=ABSENT),
+        "noise beside": max(beside["noise"], default=ABSENT),
+        "effect beside": max(beside["effect"], default=ABSENT),
+        "best to next effect": effects[0] - effects[1] if len(effects) > 1 else -ABSENT,
+        "effect to unknown": effect - unknown,
+        "effect to noise": effect - noise,
+        "noise to unknown": noise - unknown,
+        "pair to effect": pair - effect,
+        "pair to unknown": pair - joined,
+        "unknown to single": joined - unknown,
+        "cause to noise": cause - noise,
+        "cause to unknown": cause - unknown,
+    }
+    bent = {n: float(np.arcsinh(v / BEND)) for n, v in (evidence | joint.facts).items()}
+    # evidence of an event is worth less: it may be drift
+    bent["effect: event"] = bent["effect"] * joint.facts["event"]
+    return bent
+
+
+def _by_kind(score, noisy):
+    """Values by KINDS."""
+    kinds: dict[str, list[float]] = {kind: [] for kind in KINDS}
+    for name, value in score.items():
+        kinds[kind_of(name, noisy)].append(value)
+    return kinds
+
+
+def _total(values: Iterable[float]) -> float:
+    values = list(values)
+    return float(np.logaddexp.reduce(values)) if values else ABSENT
+
+
+@dataclass(frozen=True)
+class LearnedDecision:
+    """What was learned.
+
+    Parameters
+    ----------
+    names : tuple of f str
+        Of features.
+    mean, scale : (f,) array
+        By which these are standardised.
+    weights : (5, f) array
+        Of each of KINDS, and with ``bias`` the log of its probability up to a constant.
+    bias : (5,) array
+    sharpness : dict
+        By kind: factor on the scores of its labels, against each other, and the share that all of
+        them have alike, whatever their scores.
+    p_value : tuple of (a, b)
+        Of the beta distribution that p-values from replicas have where nothing acts.
+    """
+
+    names: tuple[str, ...]
+    mean: np.ndarray
+    scale: np.ndarray
+    weights: np.ndarray
+    bias: np.ndarray
+    sharpness: dict[str, tuple[float, float]]
+    p_value: tuple[float, float] = (1.0, 1.0)
+
+    @classmethod
+    def of(cls, document: dict) -> LearnedDecision:
+        """The LearnedDecision of a document, as decision.json has it."""
+        mean, scale, weights, bias = (
+            np.array(document[key]) for key in ("mean", "scale", "weights", "bias")
+        )
+        a, b = document["p_value"]
+        names, sharpness = tuple(document["names"]), document["sharpness"]
+        return cls(names, mean, scale, weights, bias, sharpness, (a, b))
+
+    def standardised(self, values: Sequence[float]) -> np.ndarray:
+        """Features (f,) less their mean, over their scale, no farther than was learned.
+
+        Parameters
+        ----------
+        values : (f,) or (n, f) array
+        """
+        return np.clip((np.asarray(values) - self.mean) / self.scale, -FARTHEST, FARTHEST)
+
+    def by_kind(self, joint: JointScore) -> np.ndarray:
+        """Probability (5,) of each of KINDS; zero where there is no such label."""
+        values = features(joint)
+        score = self.weights @ self.standardised([values[name] for name in self.names]) + self.bias
+        score[[not joint.of_kind(kind) for kind in KINDS]] = -np.inf
+        return np.exp(score - np.logaddexp.reduce(score))
+
+    def probabilities(self, joint: JointScore) -> dict[str, float]:
+        """Probability of every label, most probable first.
+
+        Parameters
+        ----------
+        joint : JointScore
+        """
+        share: dict[str, float] = {}
+        for kind, probability in zip(KINDS, self.by_kind(joint), strict=True):
+            labels = joint.of_kind(kind)
+            factor, floor = self.sharpness.get(kind, (1.0, 0.0))
+            score = factor * np.array(list(labels.values()))
+            parts = np.exp(score - np.logaddexp.reduce(score)) if len(score) else score
+            parts = (1.0 - floor) * parts + floor / max(len(score), 1)
+            share |= dict(zip(labels, probability * parts, strict=True))
+        return {name: float(share[name]) for name in sorted(share, key=lambda n: -share[n])}
+
+    def calibrated(self, p_value: float) -> float:
+        """Probability of a p-value from replicas as small as this where nothing acts.
+
+        Parameters
+        ----------
+        p_value : float
+        """
+        return float(betainc(*self.p_value, np.clip(p_value, 0.0, 1.0)))
+
+
+@lru_cache(maxsize=1)
+def learned() -> LearnedDecision:
+    """The LearnedDecision that comes with the package."""
+    text = (files("mlscorr.gap.evidence") / "decision.json").read_text(encoding="utf-8")
+    return LearnedDecision.of(json.loads(text))
+
+
+def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs) -> str:
+    """The label whose expected cost is least.
+
+    Parameters
+    ----------
+    probability : dict
+        Of all labels, most probable first.
+    noisy : collection of str
+        Labels of noise classes.
+    costs : Costs
+    """
+    calm = {n: kind_of(n, noisy) in ("none", "noise") for n in probability}
+    none, no_cause = probability["none"], sum(p for name, p in probability.items() if calm[name])
+
+    def cost(label):
+        right = probability[label]
+        if calm[label]:
+            return costs.miss * (1 - no_cause) + no_cause - right
+        wrong = costs.unknown if label == "unknown" else 1.0
+        # where noise is the truth something is wrong: a cause there is a wrong name, no false alarm
+        return costs.false_alarm * none + no_cause - none + wrong * (1 - no_cause - right)
+
+    return min(probability, key=cost)

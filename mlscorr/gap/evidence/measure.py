@@ -1,0 +1,216 @@
+"""How large the gap is, beyond chance, in the unit in which its kind of cause shows.
+
+systematic   mm: of the squared residuals, in the metric of V^-1, the most that any one cause, known
+             or unknown, could explain, less what it explains by chance
+position     mm: mean of sigma_i^2 (u_i^2 - 1) of the innovations u: more than all sigmas predict
+scatter      mm: mean excess variance of the points about their planes
+returns      percent: mean excess share of pulses that return
+
+All are signed squares that are zero on average when nothing is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.effects import effect_class
+from mlscorr.gap.evidence.columns import ColumnTable, block_groups
+from mlscorr.gap.evidence.error_models import STATED, ErrorModel, window_growth
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.residuals.rows import Rows
+
+UNITS = {"systematic": "mm", "position": "mm", "scatter": "mm", "returns": "%"}
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """What a simulator with a cause in it expects of the rows.
+
+    Parameters
+    ----------
+    shift : (m,) array
+        Of the residuals, in their unit.
+    growth : (m,) array
+        Of roughness rows: variance about the plane that is added, over the believed one.
+    extra : (m,) array
+        Variance that is added to the rows' own noise. Units: m^2.
+    model : ErrorModel
+        Of the POS's covariance.
+    """
+
+    shift: np.ndarray
+    growth: np.ndarray
+    extra: np.ndarray
+    model: ErrorModel = STATED
+
+    @classmethod
+    def nothing(cls, rows: Rows) -> Predicted:
+        """Of the simulator as it is."""
+        zero = np.zeros(len(rows))
+        return cls(zero, zero, zero)
+
+
+def gap_kind(label: str, noisy: Iterable[str], rows: Rows) -> str:
+    """How the gap of a label is measured: one of UNITS.
+
+    Parameters
+    ----------
+    label : str
+    noisy : iterable of str
+        Names of noise classes.
+    rows : Rows
+    """
+    parts = set(label.split("+"))
+    if not parts <= set(noisy):
+        return "systematic"
+    kinds = [effect_class(part) for part in parts]
+    if all(kind.stage == "return" for kind in kinds):
+        return "returns"
+    rough = (rows.channel == "roughness").any()
+    return "scatter" if rough and not any(kind.is_of_pose() for kind in kinds) else "position"
+
+
+def signed_root(square: np.ndarray, unit: str = "mm") -> np.ndarray:
+    """sign(g) |g|^(1/2) of a square in m^2 (in mm) or of shares (in percent)."""
+    return (1e3 if unit == "mm" else 1e2) * np.sign(square) * np.sqrt(np.abs(square))
+
+
+@dataclass(frozen=True)
+class Explanations:
+    """What each block of a table explains of innovations.
+
+    Parameters
+    ----------
+    table : ColumnTable
+    columns : (n, c) array
+        Innovations of its columns.
+    modes : tuple
+        Of blocks alike, their numbers (h,), columns (h, p) and, of each block's normal matrix,
+        values (h, p) and vectors (h, p, p).
+    """
+
+    table: ColumnTable
+    columns: np.ndarray
+    modes: tuple
+
+    @classmethod
+    def of(cls, table: ColumnTable, columns: np.ndarray) -> Explanations:
+        """See the class."""
+        normal, modes = columns.T @ columns, []
+        for index, numbers, _ in block_groups(table):
+            value, vector = np.linalg.eigh(normal[index[:, :, None], index[:, None, :]])
+            modes.append((numbers, index, np.maximum(value, 0.0), vector))
+        return cls(table, columns, tuple(modes))
+
+    def largest(self, innovations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The most that any block explains of the squares, and which one does so.
+
+        Each block counts less its number of columns, which is what it explains by chance.
+
+        Parameters
+        ----------
+        innovations : (n, k) array
+
+        Returns
+        -------
+        square : (k,) array
+        block : (k,) int array
+        """
+        free, projected, k = SETTINGS.free_sigma, self.columns.T @ innovations, innovations.shape[1]
+        scores, numbers = [np.full((1, k), -np.inf)], [np.array([-1])]
+        for number, index, value, vector in self.modes:
+            square = (vector.swapaxes(1, 2) @ projected[index]) ** 2
+            explained = (square / (value + free**-2)[:, :, None]).sum(axis=1)
+            scores.append(explained - (value * free**2 > 1).sum(axis=1)[:, None])
+            numbers.append(number)
+        score, number = np.vstack(scores), np.concatenate(numbers)
+        best = score.argmax(axis=0)
+        return score[best, np.arange(k)], number[best]
+
+    def fit(self, number: int, innovations: np.ndarray) -> np.ndarray:
+        """What one block makes of innovations (n,): (n,)."""
+        columns = self.columns[:, self.table.blocks[number].columns]
+        normal = columns.T @ columns + np.eye(columns.shape[1]) / SETTINGS.free_sigma**2
+        return columns @ np.linalg.solve(normal, columns.T @ innovations)
+
+
+def unit_square(observations: Observations, model: ErrorModel) -> float:
+    """Square of the length that a sum of squares of one has, spread over all rows. Units: m^2.
+
+    The sigma is that of the median innovation.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : ErrorModel
+        Of V.
+    """
+    _, sigma = observations.whitener(model).innovations(np.zeros((len(observations), 1)))
+    return float(np.median(sigma) ** 2 / len(observations))
+
+
+def position_terms(
+    observations: Observations, predicted: Predicted, residual: np.ndarray
+) -> np.ndarray:
+    """sigma^2 (u^2 - 1) of residuals less what is predicted.
+
+    Parameters
+    ----------
+    observations : Observations
+    predicted : Predicted
+    residual : (n, k) array
+
+    Returns
+    -------
+    terms : (n, k) array
+        Units: m^2.
+    """
+    extra = predicted.extra[observations.row] * observations.half
+    shift = observations.columns(predicted.shift[:, None])
+    u, sigma = observations.whitener(predicted.model, extra).innovations(residual - shift)
+    return sigma[:, None] ** 2 * (u**2 - 1)
+
+
+def scatter_terms(rows: Rows, predicted: Predicted, residual: np.ndarray) -> np.ndarray:
+    """Excess variance about the planes of roughness rows, zero elsewhere.
+
+    Parameters
+    ----------
+    rows : Rows
+    predicted : Predicted
+    residual : (m, k) array
+
+    Returns
+    -------
+    terms : (m, k) array
+        Units: m^2.
+    """
+    rough = (rows.channel == "roughness")[:, None]
+    believed = np.where(rough, rows.believed[:, None], 0.0)
+    return believed * (np.exp(np.where(rough, residual, 0.0)) - 1 - predicted.growth[:, None])
+
+
+def simulated_variance(
+    observations: Observations, model: ErrorModel, extra: np.ndarray | None = None
+) -> np.ndarray:
+    """Variance (n,) of observations under a model: the diagonal of V. Units: m^2.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : ErrorModel
+    extra : (m,) array, optional
+        That is added to the rows' own noise. Units: m^2.
+    """
+    e = observations.errors
+    position = (e.raised_position(model.raised) ** 2).sum(axis=1)
+    growth = np.hypot(window_growth(model.windows, e.gps_time), e.growth)[:, 0]
+    variance = model.scale**2 * position + growth**2 * (e.position**2).sum(axis=1)
+    variance += model.attitude[0] ** 2 * (e.attitude**2).sum(axis=1)
+    variance += model.fixes**2 * (e.place**2).sum(axis=1) + model.noise**2 * e.own
+    variance += (observations.shared**2).sum(axis=1)
+    return variance if extra is None else variance + extra[observations.row] * observations.half

@@ -1,0 +1,285 @@
+"""The rows as scalar observations in the order of time, and V of them under an ErrorModel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from mlscorr.collocation import Signal, Whitener, factor
+from mlscorr.collocation.covariance import Covariance
+from mlscorr.gap.evidence.error_models import STATED, ErrorModel, varied_models, window_growth
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.residuals.rows import Background, Rows
+from mlscorr.survey.columns import Columns
+
+FACTORS = 128  # kept of V0: those that the evidence comes back to, less than 100 MB
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Errors(Columns):
+    """What each of n observations errs by, as sigmas in m.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    clock : (n,) array
+        Of the position, which leaps where its error starts anew. Units: s.
+    own : (n,) array
+        Variance of its noise. Units: m^2.
+    position, attitude, place : (n, 3) array
+        Mixings; place is the derivative by the position.
+    correlation_time : float
+        As believed. Units: s.
+    growth : (n, 1) array
+        Factor of what believed windows add, see ``window_growth``.
+    raised : (n,) int array
+        Stretch in which the stated sigma is raised; -1 where it isn't.
+    """
+
+    gps_time: np.ndarray
+    clock: np.ndarray
+    own: np.ndarray
+    position: np.ndarray
+    attitude: np.ndarray
+    place: np.ndarray
+    correlation_time: float
+    growth: np.ndarray
+    raised: np.ndarray
+
+    @property
+    def position_variance(self) -> np.ndarray:
+        """Stated variance by the POS's position: (n,), m^2."""
+        return (self.position**2).sum(axis=1)
+
+    def raised_position(self, factors: tuple[float, ...]) -> np.ndarray:
+        """Mixing (n, 3) of the position with a factor on each stretch in which sigma is raised.
+
+        Parameters
+        ----------
+        factors : tuple of float
+            Of the first stretches; one for others.
+        """
+        known = np.ones(max(self.raised.max(initial=-1) + 1, len(factors)) + 1)
+        known[: len(factors)] = factors
+        return self.position * known[self.raised][:, None]  # the last, -1, is where it isn't raised
+
+
+@dataclass(frozen=True, repr=False)
+class Observations(Columns):
+    """Metric rows as n scalar observations in the order of time, one for each look.
+
+    A row of two times is two observations, half of it each, that share the unknown height of
+    their plane.
+
+    Parameters
+    ----------
+    rows : int
+        Number of Rows, m.
+    row : (n,) int array
+        The row that each observation is of.
+    half : (n,) array
+        Share of the row's value.
+    errors : Errors
+    shared : (n, c) array
+        Errors that several observations have in common. Units: m.
+    second : (n,) bool array
+        False for the first of two looks, which only defines the plane.
+    """
+
+    rows: int
+    row: np.ndarray
+    half: np.ndarray
+    errors: Errors
+    shared: np.ndarray
+    second: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @classmethod
+    def of(cls, rows: Rows, background: Background) -> Observations:
+        """Observations of the metric rows; of too many two-time rows some, evenly in time.
+
+        Parameters
+        ----------
+        rows : Rows
+        background : Background
+            Of these rows.
+
+        Raises
+        ------
+        ValueError
+            When no row has a unit of length.
+        """
+        if not rows.metric.any():
+            raise ValueError(
+                f"None of {len(rows)} rows has a residual in m: roughness and return rate alone "
+                "can't say what is wrong. Survey targets, or give a [scene] reference."
+            )
+        leg = np.flatnonzero(_affordable(rows)[background.row])
+        leg = leg[np.argsort(background.gps_time[leg], kind="stable")]
+        row, time = background.row[leg], background.gps_time[leg]
+        double = rows.two_times[row]
+        first, half = double & (time == rows.gps_time[row]), np.where(double, 0.5, 1.0)
+        partials = np.where((first | ~double)[:, None], rows.partials[row], rows.partials_2[row])
+        survey = rows.survey_design()[row]
+        often = np.diff(survey.tocsc().indptr) > 1  # columns
+        own = half * rows.noise[row]
+        own += np.asarray(survey[:, np.flatnonzero(~often)].power(2).sum(axis=1)).ravel()
+        errors = Errors(
+            gps_time=time,
+            clock=time if background.clock is None else background.clock[leg],
+            own=own,
+            position=background.position[leg],
+            attitude=background.attitude[leg],
+            place=partials[:, :3],
+            correlation_time=background.correlation_time,
+            growth=window_growth(background.windows, time),
+            raised=np.full(len(leg), -1) if background.raised is None else background.raised[leg],
+        )
+        survey = survey[:, np.flatnonzero(often)].toarray()
+        shared = np.hstack([survey, _plane_heights(row, double, first)])
+        return cls(len(rows), row, half, errors, shared, ~first)
+
+    def columns(self, values: np.ndarray) -> np.ndarray:
+        """Columns (n, c) of values (m, c) of the rows."""
+        return np.asarray(values, dtype=float)[self.row] * self.half[:, None]
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Stated sigma (m,) of the rows by the POS's position. Units: m."""
+        return np.sqrt(np.bincount(self.row, self.errors.position_variance, self.rows))
+
+    def with_shared(self, columns: np.ndarray) -> Observations:
+        """The same with causes that are accepted, as nuisance: columns (n, k) of free size."""
+        return replace(self, shared=np.hstack([self.shared, SETTINGS.free_sigma * columns]))
+
+    def with_own(self, own: np.ndarray) -> Observations:
+        """The same with other variances (n,) of the observations' own noise."""
+        return replace(self, errors=replace(self.errors, own=own))
+
+    def whitener(self, model: ErrorModel = STATED, extra: np.ndarray | float = 0.0) -> Whitener:
+        """V under a model, factored.
+
+        Parameters
+        ----------
+        model : ErrorModel
+        extra : (n,) array, optional
+            Added to the variance of the observations' own noise; kept in no cache. Units: m^2.
+
+        Raises
+        ------
+        ValueError
+            When V is not positive definite.
+        """
+        plain = np.ndim(extra) == 0 and extra == 0.0
+        separate = _factored(self.errors, model) if plain else _factor(self.errors, model, extra)
+        return separate.with_common(self.shared)
+
+
+def _affordable(rows):
+    """Which rows (m,) are observed: each of two times costs a column of shared error."""
+    double = np.flatnonzero(rows.two_times)
+    keep = np.ones(len(rows), dtype=bool)
+    if len(double) > SETTINGS.double_rows:
+        double = double[np.argsort(rows.gps_time[double], kind="stable")]
+        keep[double] = False
+        keep[double[np.linspace(0, len(double) - 1, SETTINGS.double_rows).astype(int)]] = True
+    return keep
+
+
+def _plane_heights(row, double, first):
+    """Heights of planes that were seen twice, as free as the largest amplitude: (n, k), positive
+    at the first look, negative at the second.
+    """
+    planes, number = np.unique(row[double], return_inverse=True)
+    heights = np.zeros((len(row), len(planes)))
+    free = max(SETTINGS.amplitudes)
+    heights[np.flatnonzero(double), number] = np.where(first[double], free, -free)
+    return heights
+
+
+@lru_cache(maxsize=FACTORS)
+def _factored(errors, model):
+    return _factor(errors, model)
+
+
+def _factor(errors, model, extra=0.0):
+    """Whitener of V0: of signals and own noise."""
+    growth = np.hypot(window_growth(model.windows, errors.gps_time), errors.growth)
+    position = errors.raised_position(model.raised)
+    turn_scale, turn_family, turn_time = model.attitude
+    tau = errors.correlation_time
+    signals = [
+        Signal(scale * mixing[:, None], covariance, clock)
+        for scale, mixing, covariance, clock in (
+            (model.scale, position, Covariance(model.family, model.time * tau), errors.clock),
+            (turn_scale, errors.attitude, Covariance(turn_family, turn_time * tau), None),
+            (model.fixes, errors.place, Covariance("exponential", SETTINGS.fix_time), None),
+            (1.0, growth * errors.position, Covariance("matern32", SETTINGS.window_time), None),
+        )
+        if scale > 0 and mixing.any()
+    ]
+    return factor(errors.gps_time, signals, model.noise**2 * errors.own + extra)
+
+
+def model_likelihood(
+    observations: Observations,
+    model: ErrorModel,
+    residual: np.ndarray,
+    extra: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """Log of a model's weight times the likelihood of residuals (n, k): (k,).
+
+    Parameters
+    ----------
+    observations : Observations
+    model : ErrorModel
+    residual : (n, k) array
+        Units: m.
+    extra : (n,) array, optional
+        As in ``Observations.whitener``.
+    """
+    return np.log(model.weight) + observations.whitener(model, extra).log_likelihood(residual)
+
+
+def relevant_models(
+    observations: Observations,
+    models: Iterable[ErrorModel],
+    residual: np.ndarray,
+    nuisances: Sequence[np.ndarray],
+) -> tuple[ErrorModel, ...]:
+    """Those models, and some near the best, that explain the residuals whatever acts on them.
+
+    Parameters
+    ----------
+    observations : Observations
+    models : iterable of ErrorModel
+    residual : (n, 1) array
+    nuisances : sequence of (n, q) arrays
+        What may act: a model counts if it does so with any of them.
+    """
+    cases = [observations.with_shared(nuisance) for nuisance in nuisances]
+
+    def scores(model, numbers):
+        return [
+            model_likelihood(case, model, residual)[0] if number in numbers else -np.inf
+            for number, case in enumerate(cases)
+        ]
+
+    known = {model: scores(model, range(len(cases))) for model in models}
+    stretches = observations.errors.raised.max(initial=-1) + 1
+    for number in range(len(cases)):
+        for variation in varied_models(int(stretches)):
+            for model in variation(max(known, key=lambda model: known[model][number])):
+                if model not in known or known[model][number] == -np.inf:
+                    known[model] = np.maximum(scores(model, [number]), known.get(model, -np.inf))
+    score = np.array(list(known.values()))
+    below = (score - score.max(axis=0)).max(axis=1)
+    order = np.argsort(-below, kind="stable")[: SETTINGS.shortlist]
+    models = tuple(known)
+    return tuple(models[i] for i in order if below[i] > np.log(SETTINGS.negligible))

@@ -1,0 +1,284 @@
+"""Where observed and simulated differ by more than the simulator itself predicts.
+
+With u the innovations of the residuals in the order of time and sigma_i their predicted sigmas,
+
+    G^2 = mean of sigma_i^2 (u_i^2 - 1)
+
+is what the simulator doesn't account for: zero on average when it is right, negative as often as
+positive. Each row has one term, so G^2 adds up over any split of the rows. Lengths are printed
+as sign(G^2) |G^2|^(1/2), in mm.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from mlscorr.gap.evidence.error_models import STATED, ErrorModel
+from mlscorr.gap.evidence.extent import Extent, extent_of
+from mlscorr.gap.evidence.measure import signed_root, simulated_variance
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.residuals.rows import Background, Rows
+
+SPLITS = (
+    *("time", "location", "range", "incidence", "scan_angle", "intensity"),
+    *("speed", "turn_rate", "pass", "axis", "channel"),
+)
+NAMES = {  # what a number of a split is called, and its unit
+    "time": ("time", "s"),
+    "location": ("location", "m"),
+    "range": ("range", "m"),
+    "incidence": ("incidence angle", "deg"),
+    "scan_angle": ("scan angle", "deg"),
+    "intensity": ("log intensity", "decades"),
+    "speed": ("speed", "m/s"),
+    "turn_rate": ("turn rate", "deg/s"),
+}
+PLACES = {"pass": "in pass {}", "axis": "along the axis {}", "channel": "{}"}
+CHANNELS = {
+    "target": "on the targets",
+    "surface": "on the reference surface",
+    "shared": "on planes that two passes share",
+}
+DEGREES = ("incidence", "scan_angle", "turn_rate")
+AXES = ("E", "N", "H")
+
+
+@dataclass(frozen=True)
+class Split:
+    """The gap by one covariate.
+
+    Parameters
+    ----------
+    by : str
+        One of SPLITS.
+    edges : (b + 1,) array or None
+        Of continuous ones; angles in degrees.
+    bins : tuple of str
+        Otherwise.
+    count : (b,) int array
+        Rows in each.
+    before, after : (b,) array
+        Signed gap of the rows of each bin. Units: mm.
+    share : (b,) array
+        Of the squares of what the cause moves rows by, and of the variance that it adds; without a
+        cause, of the squared gap of all rows. Sums to one.
+    band : (b, 2) array
+        95 % of what each bin's gap is when nothing is wrong. Units: mm.
+    extent : Extent or None
+        Of a continuous covariate: the stretch in which the cause acts.
+    """
+
+    by: str
+    edges: np.ndarray | None
+    bins: tuple[str, ...]
+    count: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    share: np.ndarray
+    band: np.ndarray
+    extent: Extent | None = None
+
+
+@dataclass(frozen=True)
+class Where:
+    """The gap and its splits.
+
+    Parameters
+    ----------
+    before, after : float
+        Signed; after is with the cause taken off. Units: mm.
+    null_band : (float, float)
+        95 % of what it is when nothing is wrong. Units: mm.
+    splits : tuple of Split
+    row : (n,) int array
+        Which row each innovation is of.
+    gps_time : (n,) array
+        Units: s.
+    innovation : (n, 2) array
+        u before and after.
+    sigma : (n,) array
+        Of the innovations. Units: m.
+    headline : str
+    """
+
+    before: float
+    after: float
+    null_band: tuple[float, float]
+    splits: tuple[Split, ...]
+    row: np.ndarray
+    gps_time: np.ndarray
+    innovation: np.ndarray
+    sigma: np.ndarray
+    headline: str
+
+
+def locate(
+    rows: Rows,
+    background: Background,
+    shift: np.ndarray,
+    rng: np.random.Generator,
+    replicas: Sequence[ErrorModel],
+    model: ErrorModel = STATED,
+    extra: np.ndarray | None = None,
+    acts: tuple[float, float] | None = None,
+) -> Where:
+    """Where the gap lies, before and after a cause is taken off.
+
+    Parameters
+    ----------
+    rows : Rows
+    background : Background
+    shift : (m,) array
+        What the cause makes of the residuals; zero for none.
+    rng : numpy.random.Generator
+    replicas : sequence of ErrorModel
+        Of each replica for the null band: a survey in which nothing acts, whose POS errs, and whose
+        noise has tails, as this one's do once the cause is taken off.
+    model : ErrorModel
+        Of V after: another one than stated when the cause is in the noise of the POS.
+    extra : (m,) array, optional
+        Variance that a noise of the rows' own adds, after.
+    acts : (float, float), optional
+        When the cause acts, where it is known better than by the rows. Units: s.
+    """
+    observed = Observations.of(rows, background)
+    columns = observed.columns(np.column_stack([rows.residual, rows.residual - shift]))
+    best = replace(max(replicas, key=replicas.count), windows=model.windows)
+    tails = observed.whitener(best).innovations(columns[:, 1:])[0][:, 0]
+    drawn = [
+        observed.whitener(each).draw(rng, replicas.count(each), tails)
+        for each in dict.fromkeys(replicas)
+    ]
+    u, sigma = observed.whitener().innovations(np.hstack([columns, *drawn]))
+    terms = sigma[:, None] ** 2 * (u**2 - 1)
+    has_cause = bool(shift.any()) or model != STATED or extra is not None
+    if model != STATED or extra is not None:
+        more = 0.0 if extra is None else extra[observed.row] * observed.half
+        after, wider = observed.whitener(model, more).innovations(columns[:, 1:])
+        u[:, 1] = after[:, 0]
+        terms[:, 1] = wider**2 * (after[:, 0] ** 2 - 1)
+    keep = observed.second
+    terms, row = terms[keep], observed.row[keep]
+    square = _moved(observed, shift, model, extra)[keep] if has_cause else np.zeros(len(row))
+    is_moved = bool(square.any())
+    explained = square if is_moved else terms[:, 0]
+    mean = terms.mean(axis=0)
+    low, high = (float(v) for v in np.percentile(signed_root(mean[2:]), SETTINGS.band))
+    band = low, high
+    splits = [_split(rows, row, by, terms, explained, is_moved) for by in SPLITS]
+    splits = tuple(split for split in splits if split is not None)
+    if acts is not None:
+        splits = _timed(splits, rows, row, square, acts)
+    before, after = (float(v) for v in signed_root(mean[:2]))
+    return Where(
+        before, after, band, splits, row, observed.errors.gps_time[keep], u[keep, :2], sigma[keep],
+        _headline(before, band, _of_headline(splits, acts), len(row), is_moved),
+    )  # fmt: skip
+
+
+def _moved(observed, shift, model, extra):
+    """Square (n,) of what a cause moves observations by, and the variance that it adds. m^2."""
+    stated = simulated_variance(observed, STATED)
+    more = simulated_variance(observed, model, extra) - stated
+    return shift[observed.row] ** 2 + np.maximum(more, 0.0)
+
+
+def _timed(splits, rows, row, square, acts):
+    """Splits with the extent in time that is known."""
+    first, time = rows.reference.start, rows.gps_time[row]
+    inside = (time >= acts[0]) & (time <= acts[1])
+    share = float(square[inside].sum() / (square.sum() or 1.0))
+    extent = Extent(acts[0] - first, acts[1] - first, share, float(inside.mean()))
+    return tuple(replace(s, extent=extent) if s.by == "time" else s for s in splits)
+
+
+def _split(rows, row, by, terms, explained, is_moved):
+    """The gap by one covariate, or None where it is not known or the same for all rows."""
+    edges, bins, number = _bins(rows, row, by)
+    if number is None:
+        return None
+    count = np.bincount(number, minlength=len(bins))
+    sums = np.array([np.bincount(number, column, len(bins)) for column in terms.T]).T
+    mean = signed_root(sums / np.maximum(count, 1)[:, None])
+    return Split(
+        by, edges, bins, count, mean[:, 0], mean[:, 1],
+        np.bincount(number, explained, len(bins)) / (explained.sum() or 1.0),
+        np.percentile(mean[:, 2:], SETTINGS.band, axis=1).T,
+        _extent(rows, row, by, explained) if is_moved and edges is not None else None,
+    )  # fmt: skip
+
+
+def _extent(rows, row, by, square):
+    """Extent of a cause in a covariate."""
+    values = rows.covariates[by][row]
+    turn = 360.0 if by == "scan_angle" else None
+    return extent_of(np.degrees(values) if by in DEGREES else values, square, turn)
+
+
+def _bins(rows, row, by):
+    """Edges or None, names, and the bin of each row."""
+    if by == "channel":
+        names, number = np.unique(rows.channel[row], return_inverse=True)
+        return None, tuple(str(name) for name in names), number
+    values = rows.covariates[by][row]
+    if not np.isfinite(values).all():
+        return None, (), None
+    if by in ("pass", "axis"):
+        known, number = np.unique(values.astype(int), return_inverse=True)
+        names = [AXES[k] if by == "axis" and k >= 0 else str(k) for k in known]
+        return None, tuple(names), number
+    values = np.degrees(values) if by in DEGREES else values
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, SETTINGS.bins + 1)))
+    if len(edges) < 2:
+        return None, (), None
+    number = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    return edges, tuple(f"{a:.4g} to {b:.4g}" for a, b in pairwise(edges)), number
+
+
+def _of_headline(splits, acts):
+    """The splits of which the headline may speak: of an event that of time alone."""
+    return splits if acts is None else tuple(split for split in splits if split.by == "time")
+
+
+def _headline(before, band, splits, number, is_moved):
+    """One sentence: how large, and where most of it is."""
+    low, high = band
+    measurable, chance = before > high, f"{low:.1f} to {high:.1f} mm when nothing is wrong"
+    size = f"All rows together differ by {before:.1f} mm more than predicted ({chance})"
+    if not measurable:
+        size = f"All rows together differ by no more than chance makes them ({chance})"
+    if not measurable and not is_moved:
+        return f"Nothing stands out. {size}."
+    best, largest = None, 0.0
+    for share, rows, words in _places(splits, number):
+        if share > SETTINGS.plain * rows and share - rows > largest:
+            best, largest = (share, rows, words), share - rows
+    of = "what the cause moves" if is_moved else "the gap"
+    if best is None:
+        return f"{of.capitalize()} lies everywhere alike. {size}."
+    share, rows, words = best
+    return (
+        f"{100 * min(share, 1.0):.0f} % of {of} lies {words}, where {100 * rows:.0f} % of the rows "
+        f"are. {size}."
+    )
+
+
+def _places(splits, number):
+    """Share, share of the rows and words of each stretch, and of each bin where none is known."""
+    for split in splits:
+        if split.extent is not None:
+            name, unit = NAMES[split.by]
+            low, high = split.extent.low, split.extent.high
+            words = f"at a {name} of {low:.4g} to {high:.4g} {unit}"
+            yield split.extent.share, split.extent.rows, words
+            continue
+        for share, count, bin_name in zip(split.share, split.count, split.bins, strict=True):
+            if split.edges is None:
+                words = PLACES[split.by].format(CHANNELS.get(bin_name, bin_name))
+            else:
+                name, unit = NAMES[split.by]
+                words = f"at a {name} of {bin_name} {unit}"
+            yield share, count / number, words

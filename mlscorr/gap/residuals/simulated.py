@@ -1,0 +1,294 @@
+"""A survey against the clouds that a simulator made of it: by beams, targets and patches.
+
+Beams are paired by their times; a patch whose times the simulated cloud doesn't have, or has for
+beams that went elsewhere, as under another clock, is compared with the simulated patch at its
+place.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlscorr.correction import Correction
+from mlscorr.gap.residuals.channels import return_rate, roughness
+from mlscorr.gap.residuals.pairing import patch_rows, target_rows
+from mlscorr.gap.residuals.patches import Patches
+from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals.selection import consistent, gate, moved_by, places, spread
+from mlscorr.gap.residuals.settings import SETTINGS
+from mlscorr.gap.residuals.shared_planes import compare_planes, plane_noise
+from mlscorr.gap.residuals.surfaces import OnReference
+from mlscorr.survey import Matched, PointCloud, Survey, TargetObservations
+from mlscorr.targets import Candidates
+
+
+class SimulatedBeams:
+    """The simulated points of the pulses behind a survey's patches, of chunks that it is given.
+
+    Parameters
+    ----------
+    patches : Patches
+        Of the survey.
+    correction : Correction, optional
+        Of the survey: a simulator may have its error, or not.
+    """
+
+    def __init__(self, patches: Patches, correction: Correction | None = None):
+        clouds = list(patches.cloud)
+        time = np.concatenate([np.zeros(0), *(cloud.gps_time for cloud in clouds)])
+        order = np.argsort(time, kind="stable")
+        self._time = time[order]
+        self._place = order
+        self._observed = np.vstack([np.zeros((0, 3)), *(cloud.xyz for cloud in clouds)])
+        self._moved = moved_by(correction, self._observed, time)
+        self.patch = np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds])
+        self.xyz = np.full((len(time), 3), np.nan)
+
+    def add(self, chunk: PointCloud) -> None:
+        """Take the points of the same pulses: of several of one time the nearest."""
+        if len(self._time) == 0 or len(chunk) == 0:
+            return
+        after = np.searchsorted(self._time, chunk.gps_time)
+        near = np.clip(np.stack([after - 1, after]), 0, len(self._time) - 1)
+        apart = np.abs(self._time[near] - chunk.gps_time)
+        row = near[apart.argmin(axis=0), np.arange(len(chunk))]
+        same = np.flatnonzero(apart.min(axis=0) <= SETTINGS.same_time)
+        place, xyz = self._place[row[same]], chunk.xyz[same]
+        distance, known = self._distance(xyz, place), self._distance(self.xyz[place], place)
+        closer = np.flatnonzero((distance <= SETTINGS.cell) & ~(distance >= known))
+        closer = closer[np.argsort(-distance[closer], kind="stable")]  # the nearest comes last
+        self.xyz[place[closer]] = xyz[closer]
+
+    def _distance(self, xyz, place):
+        """How far points (n, 3) lie from the observed, or the corrected one at a place."""
+        apart, moved = xyz - self._observed[place], self._moved[place]
+        return np.minimum(*(np.linalg.norm(each, axis=1) for each in (apart, apart - moved)))
+
+    @property
+    def apart(self) -> np.ndarray:
+        """How far simulated points lie from the observed ones (n, 3); NaN without one. m."""
+        return self._observed - self.xyz
+
+
+@dataclass(frozen=True)
+class SimulatedClouds:
+    """What one reading of simulated clouds gives.
+
+    Parameters
+    ----------
+    name : str
+        Of their folder.
+    matched : TargetObservations
+        Matched with the surveyed points.
+    patches : Patches or None
+    beams : SimulatedBeams or None
+        None where the survey has no patches.
+    correction : Correction, optional
+        By the same control points: what error the simulator has in it.
+    """
+
+    name: str
+    matched: TargetObservations
+    patches: Patches | None
+    beams: SimulatedBeams | None
+    correction: Correction | None = None
+
+
+def rows_against(
+    survey: Survey, matched: TargetObservations, candidates: Candidates, patches: Patches | None,
+    simulated: SimulatedClouds, correction: Correction | None = None,
+) -> tuple[Rows, str]:  # fmt: skip
+    """Rows of observed minus simulated, NaN where nothing is paired, and a sentence on the pairs.
+
+    Parameters
+    ----------
+    survey : Survey
+    matched : TargetObservations
+        Of the survey.
+    candidates : Candidates
+        The points near its targets.
+    patches : Patches or None
+        Of the survey, for which the SimulatedBeams were collected.
+    simulated : SimulatedClouds
+    correction : Correction, optional
+        Of the survey, by which patches find their like. What is compared is as recorded.
+
+    Raises
+    ------
+    ValueError
+        For clouds of another survey, place or CRS.
+    """
+    parts = [_against_targets(survey, matched, candidates, simulated)]
+    targets = int(np.isfinite(parts[0].residual).sum()) // 3
+    by_beams = by_place = 0
+    if patches is not None:
+        corrected, near = places(survey, patches, correction)[-1]
+        moved = moved_by(simulated.correction, patches.centre, patches.gps_time)
+        near = replace(near, centre=near.centre - moved)
+        direction, residual, noise = _by_beams(corrected, patches, near, simulated.beams)
+        known = np.isfinite(residual)
+        by_beams, other = int(known.sum()), None
+        if simulated.patches is not None:
+            other = _nearest(near, simulated.patches)
+            also = _by_place(corrected, patches, near, simulated.patches, other)
+            direction[~known], residual[~known], noise[~known] = (v[~known] for v in also)
+            by_place = int(np.isfinite(residual).sum()) - by_beams
+        surface = OnReference(np.arange(len(patches)), direction, residual, noise)
+        part = patch_rows(survey, patches, surface)
+        parts.append(_against_channels(part, survey, simulated.patches, other))
+    rows = Rows.concatenate(parts)
+    if not np.isfinite(rows.residual[rows.metric]).any():
+        raise ValueError(_elsewhere(survey, patches, simulated))
+    number = 0 if patches is None else len(patches)
+    elsewhere = (
+        f" No pulse of the same time has its point within {SETTINGS.cell:g} m of the real one: "
+        "another clock, other beams or another place was simulated."
+    )
+    is_elsewhere = number > 0 and not np.isfinite(simulated.beams.xyz).any()
+    is_whole = targets == len(matched) and by_beams + by_place == number
+    return rows, (
+        f"Of {simulated.name}, {targets} of {len(matched)} observed targets were paired, and "
+        f"{by_beams + by_place} of {number} patches ({by_beams} by pulses of the same times, "
+        f"{by_place} by place){'.' if is_whole else '; the rest is not compared.'}"
+        f"{elsewhere * is_elsewhere}{_beside(survey, simulated.matched) if targets else ''}"
+    )
+
+
+def spread_patches(patches: Patches) -> Patches:
+    """As many patches as are compared, spread over time and directions.
+
+    Parameters
+    ----------
+    patches : Patches
+    """
+    columns, rng = [patches.gps_time, *patches.normal.T], np.random.default_rng(0)
+    return patches[spread(columns, SETTINGS.patches, rng)]
+
+
+def without_unpaired(compared: Sequence[Rows]) -> list[Rows]:
+    """Rows against several simulated clouds, of what all of them have.
+
+    Parameters
+    ----------
+    compared : sequence of Rows
+        Of the same things, as rows_against gives them.
+    """
+    keep = np.all([np.isfinite(rows.residual) for rows in compared], axis=0)
+    return [rows.select(keep) for rows in compared]
+
+
+def _against_targets(survey, matched, candidates, simulated):
+    """Target rows, of the same name at about the same time."""
+    rows, other = target_rows(survey, matched, candidates), simulated.matched
+    residual, noise = np.full(len(rows), np.nan), rows.noise.copy()
+    for i in range(len(matched)):
+        same = np.flatnonzero(np.array(other.name, dtype=object) == matched.name[i])
+        apart = np.abs(other.gps_time[same] - matched.gps_time[i])
+        if len(same) == 0 or apart.min() > SETTINGS.pair_pause:
+            continue
+        j, on = same[np.argmin(apart)], np.flatnonzero(rows.item == i)
+        axes = rows.direction[on]
+        residual[on] = axes @ (matched.position[i] - other.position[j])
+        noise[on] += np.einsum("ai,ij,aj->a", axes, other.covariance[j], axes)
+    return replace(rows, residual=residual, noise=noise)
+
+
+def _by_beams(survey, patches, near, beams):
+    """Direction (p, 3), residual and its variance (p,) by pulses of the same times; else NaN."""
+    normal, p = patches.normal, len(patches)
+    along = np.einsum("ni,ni->n", beams.apart, normal[beams.patch])
+    residual, noise = np.full(p, np.nan), np.ones(p)
+    ends = np.searchsorted(beams.patch, np.arange(p + 1))
+    for i in range(p):
+        values = along[ends[i] : ends[i + 1]]
+        count, values = len(values), values[np.isfinite(values)]
+        if len(values) < max(SETTINGS.plane_points, SETTINGS.facet_share * count):
+            continue
+        off = np.abs(values - np.median(values))
+        scatter = max(1.4826 * np.median(off), SETTINGS.file_step)
+        values = values[off <= SETTINGS.trims[-1] * scatter]
+        if len(values) >= SETTINGS.facet_share * count:
+            residual[i] = values.mean()
+            noise[i] = values.var(ddof=1) / len(values) + SETTINGS.surface_sigma**2
+    return normal.copy(), _credible(survey, patches, near, normal, residual), noise
+
+
+def _credible(survey, patches, near, direction, residual):
+    """Residuals (p,) with NaN for those of another surface, as told where the patches belong."""
+    left = residual + np.einsum("pi,pi->p", direction, near.centre - patches.centre)
+    residual = np.where(np.abs(left) <= gate(survey, patches.gps_time), residual, np.nan)
+    known = np.flatnonzero(np.isfinite(residual))
+    agree = consistent(patches.gps_time[known], direction[known], left[known])
+    residual[known[~agree]] = np.nan
+    return residual
+
+
+def _nearest(patches, simulated):
+    """The simulated patch (p,) at each patch's place and time, parallel to it; -1 without one."""
+    radius = SETTINGS.pair_distance * SETTINGS.cell
+    near = cKDTree(simulated.centre).query_ball_point(patches.centre, radius)
+    other = np.full(len(patches), -1)
+    for i, rows in enumerate(near):
+        j = np.array(rows, dtype=int)
+        cosine = simulated.normal[j] @ patches.normal[i]
+        later = np.abs(simulated.gps_time[j] - patches.gps_time[i])
+        j = j[(cosine >= np.cos(SETTINGS.parallel / 2)) & (later <= SETTINGS.pair_pause)]
+        if len(j):
+            other[i] = j[np.argmin(np.linalg.norm(simulated.centre[j] - patches.centre[i], axis=1))]
+    return other
+
+
+def _by_place(survey, patches, near, simulated, other):
+    """As _by_beams, by patches of the same places."""
+    pair = simulated[np.maximum(other, 0)]
+    normal, between, _ = compare_planes(near, pair)
+    noise = plane_noise(patches, pair, (between**2).sum(axis=1))
+    residual = np.einsum("pi,pi->p", normal, patches.centre - pair.centre)
+    residual = np.where(other >= 0, residual, np.nan)
+    return normal, _credible(survey, patches, near, normal, residual), noise
+
+
+def _against_channels(rows, survey, simulated, other):
+    """Roughness and return rates less those of the simulated patches; NaN without one."""
+    residual, noise, believed = rows.residual.copy(), rows.noise.copy(), rows.believed.copy()
+    channels = np.isin(rows.channel, ("roughness", "return_rate"))
+    if simulated is None:
+        return replace(rows, residual=np.where(channels, np.nan, residual))
+    ratio, ratio_noise, _, flat = roughness(survey, simulated)
+    share, share_noise, counted = return_rate(simulated)
+    for channel, value, variance, known in (
+        ("roughness", ratio, ratio_noise, flat), ("return_rate", share, share_noise, counted),
+    ):  # fmt: skip
+        on = np.flatnonzero(rows.channel == channel)
+        pair = other[rows.item[on]]
+        has = (pair >= 0) & known[pair]
+        residual[on] = np.where(has, residual[on] - value[pair], np.nan)
+        noise[on] += np.where(has, variance[pair], 0.0)
+        if channel == "roughness" and has.any():
+            # a patch's own would share its chance with the residual, which then tells of noise
+            believed[on] *= np.exp(np.median(value[pair[has]]))
+    return replace(rows, residual=residual, noise=noise, believed=believed)
+
+
+def _beside(survey, matched):
+    """A sentence on how far simulated targets stand from where they were surveyed."""
+    misclosure = Matched.by_name(matched, survey.surveyed).misclosure
+    middle = "/".join(f"{v:+.3f}" for v in -np.median(misclosure, axis=0))
+    return (
+        f" In the median its targets stand {middle} m (E/N/H) beside where they were surveyed: of "
+        "that much a wrong datum can't be told."
+    )
+
+
+def _elsewhere(survey, patches, simulated):
+    """The sentence for clouds that have nothing of the survey."""
+    where = "holds neither a flat patch nor a matched target"
+    if patches is not None and simulated.patches is not None:
+        away, _ = cKDTree(simulated.patches.centre).query(patches.centre)
+        where = f"has its surfaces {np.median(away):.1f} m away in the median"
+    return (
+        f"Nothing of {simulated.name} can be paired with {survey.path}: it {where}. It is of "
+        "another survey or place, or in another CRS; simulate this survey's trajectory."
+    )

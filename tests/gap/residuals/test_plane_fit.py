@@ -1,0 +1,79 @@
+"""Planes are found with their normal and noise; what is no plane is left."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlscorr.gap.residuals.plane_fit import fit_patches, place_key
+from mlscorr.survey import PointCloud
+
+NOISE = 0.004  # m
+
+
+def wall(survey, rng, bent=0.0, beyond=0.5):
+    """A second of scan lines on a square of 0.8 m, 6 m beside the vehicle, with noise across it
+
+    So far (m) beyond a whole easting it stands.
+    """
+    start = survey.trajectory.gps_time[0] + 2.0
+    start = np.ceil(start)
+    pose = survey.trajectory.at([start + 0.5])
+    centre = np.floor(pose.position[0] + [6.0, 6.0, 1.0])
+    centre += [beyond, 0.2, 0.2]
+    u, v = np.tile(np.linspace(-0.4, 0.4, 60), 50), np.repeat(np.linspace(-0.4, 0.4, 50), 60)
+    away = rng.normal(0.0, NOISE, 3000) + bent * u**2
+    xyz = centre + np.column_stack([away, u, v])
+    time = start + np.sort(rng.uniform(0.0, 0.999, 3000))
+    return PointCloud(xyz, time, np.full(3000, 9000, np.uint16))
+
+
+def test_a_wall_gives_its_normal_and_its_noise(survey):
+    "One patch whose normal is known to 2 mrad, its variance to 10 %, with at most 400 points"
+    cloud = wall(survey, np.random.default_rng(1))
+    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
+    assert len(patches) == 1
+    assert np.abs(patches.normal[0] @ [1.0, 0.0, 0.0]) == pytest.approx(1.0, abs=2e-6)
+    assert np.sqrt(patches.variance[0]) == pytest.approx(NOISE, rel=0.1)
+    assert 300 <= len(patches.cloud[0]) <= 400
+    assert patches.ripple[0] == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_wall_on_a_whole_metre_has_all_of_its_noise(survey):
+    "Models have walls and floors there: no cell's face halves their noise"
+    cloud = wall(survey, np.random.default_rng(1), beyond=0.0)
+    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
+    assert np.sqrt(patches.variance) == pytest.approx([NOISE], rel=0.1)
+    assert patches.centre[0, 0] == pytest.approx(cloud.xyz[:, 0].mean(), abs=NOISE / 20)  # m
+
+
+def test_points_in_a_line_are_no_wall(survey):
+    "Their least variance is zero, which rounding must not make less"
+    cloud = wall(survey, np.random.default_rng(1))
+    for seed in range(50):
+        along = np.random.default_rng(seed).uniform(-0.3, 0.3, len(cloud))
+        place = np.floor(cloud.xyz[:1]) + 0.4 + along[:, None] * [0.36, 0.48, 0.8]
+        line = replace(cloud, xyz=place)
+        assert fit_patches(survey, line, *[np.arange(len(line))] * 2) is None
+
+
+def test_a_wall_in_a_face_of_cells_is_left(survey):
+    "Both cells would hold half of its noise, 0.8 sigmas off the wall"
+    cloud = wall(survey, np.random.default_rng(1), beyond=2.0 / 3.0)
+    assert fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2) is None
+
+
+def test_what_is_bent_is_rougher_than_its_noise(survey):
+    "A bow of 5 cm has ten times the variance of the noise, or is no patch at all"
+    cloud = wall(survey, np.random.default_rng(1), bent=0.3)
+    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
+    assert patches is None or patches.ripple[0] > 3
+
+
+def test_a_key_tells_cells_and_moments_apart():
+    "Points of one cubic metre and second share a number; those of the next ones don't"
+    place = np.array([[523_000.2, 3_378_000.3, 40.4]] * 4)
+    place[1] += 0.2
+    place[2, 0] += 1.0
+    key = place_key(place, np.array([413_200.1, 413_200.9, 413_200.1, 413_201.1]))
+    assert key[0] == key[1] and len(set(key.tolist())) == 3
