@@ -23,7 +23,8 @@ from mlscorr.io.surveys.survey_paths import (
     matching,
 )
 from mlscorr.io.surveys.survey_sections import CloudSection, SurveyFile
-from mlscorr.io.tables.control import NOTHING_SURVEYED, read_surveyed
+from mlscorr.io.surveys.surveyed_points import read_surveyed
+from mlscorr.io.tables.control import NOTHING_SURVEYED
 from mlscorr.io.trajectories.projection import check_crs
 from mlscorr.io.trajectories.trajectory_sessions import check_systems
 from mlscorr.survey import ControlPoints, InputFile, Trajectory

@@ -17,7 +17,7 @@ from mlscorr.io.surveys.session_points import check_belongings
 from mlscorr.io.surveys.survey_paths import SurveyPaths, files_of
 from mlscorr.io.surveys.survey_scanners import clouds_of, mounted_scanners, scanner_notes
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile, SurveyFile
-from mlscorr.io.tables.control import read_surveyed
+from mlscorr.io.surveys.surveyed_points import read_surveyed
 from mlscorr.io.trajectories.projection import check_crs
 from mlscorr.io.trajectories.time_systems import ADJUSTMENT, match_times
 from mlscorr.io.trajectories.trajectory_sessions import Sessions, read_sessions

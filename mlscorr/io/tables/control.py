@@ -2,7 +2,6 @@
 
 import re
 import warnings
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,13 +27,11 @@ from mlscorr.io.tables.control_lists import (
     with_check_points,
     word_places,
 )
-from mlscorr.io.tables.nearness import check_together
 from mlscorr.io.tables.sheets import SUFFIX
 from mlscorr.io.tables.table_rows import read_rows
 from mlscorr.io.tables.table_sections import ControlSection
 from mlscorr.io.tables.tables import read_layout
-from mlscorr.io.trajectories.projection import map_factors
-from mlscorr.survey import ControlPoints, SurveyFileError, Trajectory
+from mlscorr.survey import ControlPoints, Trajectory
 
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
 ROLES = tuple(WORDS["role"])
@@ -119,73 +116,6 @@ def read_control(
     is_plain = layout.is_own and not layout.unused
     sentence = None if is_plain else sentence_on(layout, has_axes, given, section.check)
     return ControlList(control, check, sentence)
-
-
-def read_surveyed(
-    path: Path | None, section: ControlSection, trajectory: Trajectory, crs: str | None = None
-) -> ControlList:
-    """Points of a list that lies near a trajectory; none of none, and of an empty file.
-
-    Parameters
-    ----------
-    path : Path or None
-    section : ControlSection
-    trajectory : Trajectory
-    crs : str, optional
-        Of the survey, for control in ground distances.
-
-    Raises
-    ------
-    ValueError
-        As of read_control and check_together.
-    """
-    if path is None or not holds_points(path):
-        return NOTHING_SURVEYED
-    points = scaled(read_control(path, section, trajectory), section, crs)
-    check_together(path, points.control + points.check, trajectory)
-    return points
-
-
-def scaled(points: ControlList, section: ControlSection, crs: str | None) -> ControlList:
-    """Points whose eastings and northings are multiplied as [control] says, about its origin.
-
-    Parameters
-    ----------
-    points : ControlList
-    section : ControlSection
-        Without a scale_origin it is the middle of the control points (of all, where all are check
-        points), which then stays where it is.
-    crs : str or None
-        Of the survey.
-
-    Raises
-    ------
-    SurveyFileError
-        For ground distances without a CRS.
-    """
-    if section.scale_factor is None:
-        return points
-    middle = (points.control if len(points.control) else points.check).position.mean(axis=0)
-    origin = np.array([*(section.scale_origin or middle[:2]), 0.0])
-    if section.scale_factor == "ground":
-        if crs is None:
-            raise SurveyFileError(
-                'scale_factor = "ground" under [control] takes the scale of the map, and '
-                "survey.toml has no crs: add it, or give scale_factor as a number."
-            )
-        ground = map_factors(crs, middle)
-        factor, words = ground.combined, f", from ground distances to {crs}: {ground}"
-    else:
-        factor, words = float(section.scale_factor), ""
-    sentence = (
-        f"Eastings and northings of the control were multiplied by {factor:.7f} about E "
-        f"{origin[0]:.3f}, N {origin[1]:.3f} m (scale_factor under [control]{words})."
-    )
-    control, check = (
-        replace(part, position=origin + (part.position - origin) * [factor, factor, 1.0])
-        for part in (points.control, points.check)
-    )
-    return ControlList(control, check, " ".join(filter(None, [points.layout, sentence])))
 
 
 def holds_points(path: str | Path) -> bool:
