@@ -21,8 +21,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from mlscorr.correction import Correction
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.clouds.las import sample_gps_times
-from mlscorr.io.clouds.las_copy import CorrectedPart, write_parts
+from mlscorr.io.clouds import CorrectedPart, sample_gps_times, write_parts
 from mlscorr.survey import CloudFile, Trajectory
 
 START = 357_900.0  # s of week

@@ -14,8 +14,15 @@ from rich.console import Console
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation import Noise, Signal, SparseRows, collocate, collocate_rows_dense
-from mlscorr.collocation.covariance import FAMILIES, Covariance
+from mlscorr.collocation import (
+    FAMILIES,
+    Covariance,
+    Noise,
+    Signal,
+    SparseRows,
+    collocate,
+    collocate_rows_dense,
+)
 
 try:
     import celerite2

@@ -16,11 +16,11 @@ from rich.console import Console
 from rich.table import Table
 
 from mlscorr.frames import attitude_from_angles as attitude
-from mlscorr.io.settings import SETTINGS
-from mlscorr.report.render.camera import Camera
-from mlscorr.report.render.drawing import draw
-from mlscorr.report.render.sheet import Sheet
-from mlscorr.report.render.views import PictureOptions, View
+from mlscorr.io import SETTINGS
+from mlscorr.report.render import draw
+from mlscorr.report.render._camera import Camera
+from mlscorr.report.render._sheet import Sheet
+from mlscorr.report.render._views import PictureOptions, View
 from mlscorr.survey import ControlPoints, PointCloud, Survey, Trajectory
 
 CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # UTM

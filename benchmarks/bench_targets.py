@@ -23,12 +23,12 @@ from sklearn.cluster import DBSCAN
 from sklearn.metrics import adjusted_rand_score
 
 import mlscorr
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import PointCloud
 from mlscorr.targets import collect
-from mlscorr.targets.clusters import connected
+from mlscorr.targets._clusters import connected
 
 CHUNK = 1_000_000  # points
 LINK = 0.12  # m, as for targets of 0.6 m

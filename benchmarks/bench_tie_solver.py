@@ -21,15 +21,15 @@ from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation import (
+    Covariance,
     Noise,
     Signal,
     SparseRows,
     collocate_rows,
     leave_each_out,
 )
-from mlscorr.collocation.block_cholesky import factorise, invert_in_place, solve_in_place
-from mlscorr.collocation.covariance import Covariance
-from mlscorr.collocation.knots import knot_step
+from mlscorr.collocation._block_cholesky import factorise, invert_in_place, solve_in_place
+from mlscorr.collocation._knots import knot_step
 
 START = 413_200.0  # s of week
 DRIFT = Covariance("matern32", 60.0)

@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 import mlscorr
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.ties import TieCollector, search_ties
 

@@ -21,12 +21,11 @@ from pathlib import Path
 import numpy as np
 
 import mlscorr
+from mlscorr.estimate import MOUNTING_COMPONENTS as COMPONENTS
 from mlscorr.estimate import estimate_mounting
-from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS as COMPONENTS
-from mlscorr.evaluate.scores import misclosures
+from mlscorr.evaluate import misclosures
 from mlscorr.frames import georeference, to_scanner
-from mlscorr.simulate import Scenario, simulate
-from mlscorr.simulate.scenario_file import read_scenario
+from mlscorr.simulate import Scenario, read_scenario, simulate
 from mlscorr.survey import Matched, TargetObservations
 
 SCENARIO = Path(__file__).parents[1] / "examples" / "scenarios" / "calibration.toml"

@@ -28,7 +28,7 @@ from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.store import TaskStore
 from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.matching import Matches
 from mlscorr.pipeline.finding import Finding

@@ -16,14 +16,11 @@ from feature_errors import errors
 from gap_mechanisms import STUDIED, sized
 from gap_study import Bed
 
-from mlscorr.gap.closure import cause_for_simulator, close_gap
+from mlscorr.gap.closure import FoundCause, cause_for_simulator, close_gap
 from mlscorr.gap.closure.folds import make_folds, predict_whole
-from mlscorr.gap.closure.found_cause import FoundCause
-from mlscorr.gap.evidence.causes import infer_causes
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.residuals.rows import background
-from mlscorr.gap.signatures.expectation import expected
-from mlscorr.gap.signatures.signatures import select
+from mlscorr.gap.evidence import Observations, infer_causes
+from mlscorr.gap.residuals import background
+from mlscorr.gap.signatures import expected, select
 
 SIZES = (3.0, 5.0, 8.0)  # MDB
 CHECKED = 6  # targets that are check points

@@ -21,7 +21,7 @@ import numpy as np
 from feature_surveys import feature_survey, scenarios
 from pos_study import bumped, unfixed
 
-from mlscorr.evaluate.datum import datum_differences
+from mlscorr.evaluate import datum_differences
 from mlscorr.simulate.scenario import DriveScenario, PosScenario
 from mlscorr.survey import Pos
 

@@ -17,7 +17,7 @@ from gap_training.cases import known_mechanisms
 from gap_training.fit import figures, out_of_fold
 from gap_training.records import collect
 
-from mlscorr.gap.evidence.decision import OPERATING_POINTS
+from mlscorr.gap.evidence import OPERATING_POINTS
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

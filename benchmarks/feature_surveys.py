@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.evaluate.scores import misclosures
+from mlscorr.evaluate import misclosures
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.simulate import DEMO, read_scenario, simulate
 from mlscorr.simulate.scenario import DriveScenario, PosScenario

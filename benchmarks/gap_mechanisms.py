@@ -6,10 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence.error_models import ErrorModel
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.evidence import SETTINGS, ErrorModel, Observations
+from mlscorr.gap.signatures import Bench
 
 
 class Outside:

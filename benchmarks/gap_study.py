@@ -17,13 +17,10 @@ from feature_errors import errors
 from gap_mechanisms import ACTUAL, NOISES, STUDIED, Outside, metric, noisy, sized
 from gap_training.features import Geometry, geometry
 
-from mlscorr.gap.evidence.causes import cause_of
+from mlscorr.gap.evidence import Observations, cause_of, compare_signatures, weigh_labels
+from mlscorr.gap.evidence._verdict import decide, joint_score
 from mlscorr.gap.evidence.decision import learned
-from mlscorr.gap.evidence.labels import weigh_labels
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.separability import compare_signatures
-from mlscorr.gap.evidence.verdict import decide, joint_score
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.signatures import signatures
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from gap_training.records import collect
 from gap_training.report import print_figures, study_arguments
 
-from mlscorr.blind.cases import outside_mechanisms
+from mlscorr.blind import outside_mechanisms
 from mlscorr.gap.evidence.decision import learned
 
 

@@ -17,18 +17,23 @@ from gap_training.features import geometry
 
 from mlscorr.effects import effect_class
 from mlscorr.effects.catalogue import SYSTEMATIC
-from mlscorr.gap.evidence.columns import column_table
-from mlscorr.gap.evidence.decision import Costs, cheapest
-from mlscorr.gap.evidence.error_models import STATED, error_models
-from mlscorr.gap.evidence.events import refine_events
+from mlscorr.gap.evidence import (
+    SETTINGS,
+    Costs,
+    Observations,
+    column_table,
+    error_models,
+    unknown_blocks,
+)
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence._events import refine_events
+from mlscorr.gap.evidence.decision import cheapest
 from mlscorr.gap.evidence.evidence import suited_models, weigh_blocks, without_known
 from mlscorr.gap.evidence.labels import block_scores
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.evidence.unknown import unknown_blocks
-from mlscorr.gap.plan.sizing import Ruler, draw_effect
-from mlscorr.gap.residuals.rows import background
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.plan import Ruler
+from mlscorr.gap.plan.sizing import draw_effect
+from mlscorr.gap.residuals import background
+from mlscorr.gap.signatures import signatures
 
 CLEAN = 0.3  # share of cases in which nothing acts
 SIZES = (1.0, 8.0)  # MDB, between which sizes are drawn evenly by their logs, as in training

@@ -24,9 +24,9 @@ import numpy as np
 from feature_surveys import feature_survey, scenarios
 from real_windows import interval, windows
 
-from mlscorr.collocation.covariance import FAMILIES
+from mlscorr.collocation import FAMILIES
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.prediction import predict_under
+from mlscorr.estimate._prediction import predict_under
 
 FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 COUNTS = (3, 4, 6, 8, 12, 16, 24, 40, 60)

@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.trajectories.pos_error_series import read_pos_error_series
+from mlscorr.io.trajectories import read_pos_error_series
 from mlscorr.matching import match
 from mlscorr.simulate.pos import given_error, pos_error
 from mlscorr.simulate.scenario import PosScenario

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import mlscorr
-from mlscorr.io.clouds.las_copy import CorrectedPart, write_parts
+from mlscorr.io.clouds import CorrectedPart, write_parts
 from mlscorr.simulate import DEMO, simulate
 
 EVERY = 20  # points; neighbours have the same pose and hardly tell more

@@ -6,13 +6,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
-from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.assembly import position_equations
-from mlscorr.estimate.prediction import predict_under
-from mlscorr.estimate.prior import position_prior
-from mlscorr.estimate.signals import SignalParameters
+from mlscorr.estimate import (
+    SignalParameters,
+    estimate_correction,
+    position_equations,
+    position_prior,
+)
+from mlscorr.estimate._prediction import predict_under
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.trajectories.pos_error_series import read_pos_error_series
+from mlscorr.io.trajectories import read_pos_error_series
 from mlscorr.survey import ControlPoints, Matched, Pos, TargetObservations, Trajectory
 
 WINDOW, USED = 248.0, 357_881.0  # s: the windows' length; where a shared survey took its own

@@ -21,7 +21,7 @@ from ties_study import feature_ties, measure
 
 from mlscorr.estimate import believed_correction, estimate_correction, with_ties
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.trajectories.pos_error_series import read_pos_error_series
+from mlscorr.io.trajectories import read_pos_error_series
 from mlscorr.survey import ControlPoints, Pos, TargetObservations, Trajectory
 
 LENGTH = EVERY  # s of a pass, in which GNSS was withheld once

@@ -27,8 +27,8 @@ from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.estimate import believed_correction, estimate_correction
-from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import find_control
 from mlscorr.pipeline.tying import tie_passes
 from mlscorr.simulate import read_scenario, simulate

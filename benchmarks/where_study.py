@@ -18,9 +18,9 @@ from gap_mechanisms import sized
 from gap_study import Bed
 from gap_training.errors import process
 
-from mlscorr.gap.evidence.causes import infer_causes
-from mlscorr.gap.residuals.rows import background
-from mlscorr.gap.signatures.displacements import displacements
+from mlscorr.gap.evidence import infer_causes
+from mlscorr.gap.residuals import background
+from mlscorr.gap.signatures import displacements
 
 HALF = np.sqrt(2 * np.log(2))  # of a Gaussian's sigma, at which it is half as large
 BANDS = {  # direction of the error, covariate, share of the rows, times the size, by name

@@ -26,8 +26,7 @@ import mlscorr
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.simulate import SimulatedSurvey, simulate
 from mlscorr.simulate.scan import Surfaces
-from mlscorr.simulate.scene import Mesh, build_scene
-from mlscorr.simulate.scene.section import section
+from mlscorr.simulate.scene import Mesh, build_scene, section
 from mlscorr.survey import Trajectory
 from mlscorr.ties import SETTINGS, pair_features
 

@@ -17,8 +17,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mlscorr
-from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS as COMPONENTS
-from mlscorr.evaluate.scores import misclosures
+from mlscorr.estimate import MOUNTING_COMPONENTS as COMPONENTS
+from mlscorr.evaluate import misclosures
 
 PICTURES = Path(__file__).parents[1] / "build" / "examples"
 WRONG = (

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib import rc_context
 
 import mlscorr
-from mlscorr.report.comparison_page import comparison_figure
+from mlscorr.report import comparison_figure
 from mlscorr.report.style import STYLE
 
 ROOT = Path(__file__).parents[1]

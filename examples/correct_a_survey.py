@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mlscorr
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 
 PICTURES = Path(__file__).parents[1] / "build" / "examples"
 REACH = 1.2  # m, drawn about the surveyed target

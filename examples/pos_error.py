@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.trajectories.pos_error_series import read_pos_error_series
+from mlscorr.io.trajectories import read_pos_error_series
 from mlscorr.simulate.pos import pos_error
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Trajectory

@@ -8,20 +8,22 @@ from mlscorr.compiled_loops import choose_folder
 
 if TYPE_CHECKING:  # what editors and type checkers see of the names that are loaded when used
     from mlscorr import simulate
-    from mlscorr.io.surveys.survey_file import read_survey
-    from mlscorr.pipeline.applying import apply
-    from mlscorr.pipeline.calibration import calibrate
-    from mlscorr.pipeline.checking import check
-    from mlscorr.pipeline.comparison import compare
-    from mlscorr.pipeline.correction import correct
-    from mlscorr.pipeline.diagnosis import diagnose
-    from mlscorr.pipeline.extraction import extract
-    from mlscorr.pipeline.installation import doctor
-    from mlscorr.pipeline.planning import plan
-    from mlscorr.pipeline.rendering import render
-    from mlscorr.pipeline.starting import init
-    from mlscorr.pipeline.ties import find_ties
-    from mlscorr.simulate.simulator_file import read_simulator
+    from mlscorr.io.surveys import read_survey
+    from mlscorr.pipeline import (
+        apply,
+        calibrate,
+        check,
+        compare,
+        correct,
+        diagnose,
+        doctor,
+        extract,
+        find_ties,
+        init,
+        plan,
+        render,
+    )
+    from mlscorr.simulate import read_simulator
 
 __all__ = [
     "apply", "calibrate", "check", "compare", "correct", "diagnose", "doctor", "extract",

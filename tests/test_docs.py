@@ -14,8 +14,8 @@ from typer.main import get_command
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import catalogue, known_effects
+from mlscorr.io.surveys import SurveyFile
 from mlscorr.io.surveys.project_sections import ProjectFile
-from mlscorr.io.surveys.survey_sections import SurveyFile
 from mlscorr.simulate import Scenario
 from mlscorr.simulate.simulator_file import SimulatorFile
 from tests.beds.places import ROOT

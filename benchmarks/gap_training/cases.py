@@ -10,14 +10,14 @@ from numpy.random import Generator
 
 from gap_training.errors import process
 from gap_training.worlds import World
-from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC, effect_class
-from mlscorr.gap.plan.draws import draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.plan.sizing import Ruler, draw_effect
-from mlscorr.gap.residuals.channels import with_loss_variance
-from mlscorr.gap.residuals.rows import Background, Rows
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import Signature
-from mlscorr.simulate.mechanisms import Described, described, load_mechanisms, training_mechanisms
+from mlscorr.effects import effect_class
+from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
+from mlscorr.gap.plan import Ruler, draw_effects, draw_mechanism, names_to_try
+from mlscorr.gap.plan.sizing import draw_effect
+from mlscorr.gap.residuals import Background, Rows, with_loss_variance
+from mlscorr.gap.signatures import Bench, Signature
+from mlscorr.simulate import Described, described, load_mechanisms
+from mlscorr.simulate._mechanisms import training_mechanisms
 from mlscorr.simulate.pos import interpolate
 from mlscorr.survey import Survey
 

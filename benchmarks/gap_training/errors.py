@@ -7,9 +7,8 @@ smoother; survey and extraction errors often have heavier tails than assumed.
 import numpy as np
 from numpy.random import Generator
 
-from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.residuals.settings import SETTINGS
+from mlscorr.gap.evidence import SETTINGS as INFERENCE
+from mlscorr.gap.residuals import SETTINGS, Rows
 from mlscorr.survey import Scanner
 
 ODD_SHARE = 0.12  # at most, estimated: of 5 surveys by ray casting 2 have more than a twentieth

@@ -10,9 +10,8 @@ from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles, to_scanner
-from mlscorr.gap.residuals.assemble import assemble, sample_pulses
-from mlscorr.gap.residuals.rows import Background, Rows, SamplePulses, background
-from mlscorr.gap.residuals.settings import SETTINGS
+from mlscorr.gap.residuals import SETTINGS, Background, Rows, assemble, background, sample_pulses
+from mlscorr.gap.residuals.rows import SamplePulses
 from mlscorr.survey import ControlPoints, Mounting, Pos, Scanner, Survey, Trajectory
 
 START, ORIGIN = 413200.0, np.array([523000.0, 3378000.0, 20.0])

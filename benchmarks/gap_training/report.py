@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gap_training.fit import figures
 from gap_training.records import Record
-from mlscorr.gap.evidence.decision import OPERATING_POINTS
+from mlscorr.gap.evidence import OPERATING_POINTS
 
 
 def study_arguments(about: str | None, first: int, worlds: int) -> argparse.ArgumentParser:

@@ -16,9 +16,8 @@ from numpy.random import Generator
 from gap_training.errors import odd_patches, process, scatter
 from gap_training.features import Geometry, geometry
 from mlscorr.frames import georeference
-from mlscorr.gap.residuals.channels import with_loss_variance
-from mlscorr.gap.residuals.rows import Background, Rows, background
-from mlscorr.gap.signatures.signatures import Signature, signatures
+from mlscorr.gap.residuals import Background, Rows, background, with_loss_variance
+from mlscorr.gap.signatures import Signature, signatures
 from mlscorr.simulate.pos import PosError, interpolate, pos_error
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Survey

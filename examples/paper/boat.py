@@ -29,7 +29,7 @@ from tables import (
 
 from mlscorr.baselines import fit_horizontal_and_height, fit_polynomial
 from mlscorr.estimate import estimate_correction
-from mlscorr.evaluate.scores import misclosures
+from mlscorr.evaluate import misclosures
 from mlscorr.report.style import BLUE, GREEN, GREY, STYLE, VERMILLION
 
 ORDER = 4

@@ -25,9 +25,9 @@ from tables import (
     told_axes,
 )
 
+from mlscorr.estimate import MOUNTING_COMPONENTS as COMPONENTS
 from mlscorr.estimate import estimate_mounting
-from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS as COMPONENTS
-from mlscorr.evaluate.scores import misclosures
+from mlscorr.evaluate import misclosures
 from mlscorr.report.style import BLUE, GREEN, GREY, STYLE, VERMILLION
 from mlscorr.simulate import read_scenario, simulate
 from mlscorr.survey import Matched

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.collocation import LiteralSignal, Noise, collocate_literal
-from mlscorr.collocation.trend import polynomial_design
+from mlscorr.collocation import LiteralSignal, Noise, collocate_literal, polynomial_design
 
 
 @dataclass(frozen=True)

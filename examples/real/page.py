@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from mlscorr.effects.labels import lowered, titles
+from mlscorr.effects import lowered, titles
 from mlscorr.report.pages import data_uri, environment, now, versions
 from mlscorr.report.style import STYLE
 

@@ -8,8 +8,7 @@ from page import SHARED
 
 from mlscorr.frames import georeference
 from mlscorr.gap.residuals.pairing import target_rows
-from mlscorr.io.trajectories.pos_error_series import read_pos_error_series
-from mlscorr.io.trajectories.poses import read_poses
+from mlscorr.io.trajectories import read_pos_error_series, read_poses
 from mlscorr.simulate import Scenario
 from mlscorr.simulate.drive import drive
 from mlscorr.simulate.pos import PosError, pos_error, record

@@ -3,7 +3,7 @@
 import numpy as np
 from pos_drive import FIRST, LEAD, OUTAGE, PERIOD
 
-from mlscorr.gap.evidence.measure import signed_root
+from mlscorr.gap.evidence import signed_root
 from mlscorr.report.style import AFTER, BEFORE, GREY
 
 UPPER = "Error of a real MEMS GNSS/INS; grey: without GNSS"

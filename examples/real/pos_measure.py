@@ -13,10 +13,7 @@ from pos_drive import (
 )
 from scipy.stats import binomtest
 
-from mlscorr.gap.evidence.causes import infer_causes
-from mlscorr.gap.evidence.measure import signed_root
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.evidence import SETTINGS, Observations, infer_causes, signed_root
 from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import signatures
 from mlscorr.simulate.pos import record

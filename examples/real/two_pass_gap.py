@@ -21,10 +21,9 @@ from two_pass_page import draw_slice, turns, write
 
 from mlscorr.estimate import believed_mounting, calibration_with_ties
 from mlscorr.frames import georeference, to_scanner
-from mlscorr.gap.evidence.causes import infer_causes
-from mlscorr.gap.residuals import background
-from mlscorr.gap.residuals.patch_search import find_patches
-from mlscorr.gap.residuals.shared_planes import shared_rows
+from mlscorr.gap.evidence import infer_causes
+from mlscorr.gap.residuals import background, find_patches
+from mlscorr.gap.residuals._shared_planes import shared_rows
 from mlscorr.gap.signatures import signatures
 from mlscorr.pipeline.tied_calibration import tie_mounting
 from mlscorr.survey import (

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.baselines.settings import SETTINGS
+from mlscorr.baselines._settings import SETTINGS
 from mlscorr.survey import Matched
 
 SHAPES = ("point", "line", "plane")  # that targets must not all lie on, by dimensions less one

@@ -2,11 +2,9 @@
 
 import numpy as np
 
+from mlscorr.baselines._settings import SETTINGS
 from mlscorr.baselines.pairs import Undetermined
-from mlscorr.baselines.settings import SETTINGS
-from mlscorr.collocation import LiteralSignal, Noise, collocate_literal
-from mlscorr.collocation.interpolation import CHUNK
-from mlscorr.collocation.trend import polynomial_design
+from mlscorr.collocation import CHUNK, LiteralSignal, Noise, collocate_literal, polynomial_design
 from mlscorr.correction import Correction
 from mlscorr.frames import pose_partials
 from mlscorr.pos import stated_sigma

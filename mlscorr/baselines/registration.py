@@ -7,8 +7,8 @@ import numpy as np
 import open3d
 from scipy.spatial import cKDTree
 
+from mlscorr.baselines._settings import SETTINGS
 from mlscorr.baselines.pairs import CentredPairs
-from mlscorr.baselines.settings import SETTINGS
 from mlscorr.baselines.transformation import Transformation
 from mlscorr.survey import Matched, PointCloud
 

@@ -7,15 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.blind.grading import grading_mechanisms
-from mlscorr.blind.mix import Case, causes
-from mlscorr.gap.plan.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.plan.sizing import Ruler
-from mlscorr.gap.residuals.pairing import build_rows
-from mlscorr.gap.residuals.patch_search import find_patches
-from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.simulate.mechanisms import Described, described, load_mechanisms
+from mlscorr.blind._grading import grading_mechanisms
+from mlscorr.blind._mix import Case, causes
+from mlscorr.gap.plan import ATTEMPTS, Ruler, draw_effects, draw_mechanism, names_to_try
+from mlscorr.gap.residuals import build_rows, find_patches
+from mlscorr.gap.signatures import signatures
+from mlscorr.io.surveys import read_survey
+from mlscorr.simulate import Described, described, load_mechanisms
 
 TRUTH = ("truth.json", "truth.npz")
 
@@ -65,8 +63,7 @@ def make_case(
 
 def _drawn(name, case, entropy, find_targets, mechanisms):
     """Label and SimulatedSurvey of one try; the label is None when nothing shows."""
-    from mlscorr.simulate.displacement import DisplacedSurvey
-    from mlscorr.simulate.random_survey import random_survey
+    from mlscorr.simulate import DisplacedSurvey, random_survey
 
     survey, rng = random_survey((*entropy, 0), name), np.random.default_rng((*entropy, 1))
     pos = survey.scenario.pos

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import binomtest, bootstrap, kstest
 
-from mlscorr.blind.answers import AnsweredCase
-from mlscorr.blind.settings import SETTINGS
-from mlscorr.gap.evidence.calibration import calibration_error
-from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
+from mlscorr.blind._answers import AnsweredCase
+from mlscorr.blind._settings import SETTINGS
+from mlscorr.gap.evidence import SETTINGS as INFERENCE
+from mlscorr.gap.evidence import calibration_error
 
 
 def score(cases: dict[str, tuple[dict, dict]]) -> dict:

@@ -28,7 +28,7 @@ def apply(
     """Take a clock offset, datum or mounting that was found out of clouds and trajectory."""
     import numpy as np
 
-    from mlscorr.pipeline.found_effects import read_effects
+    from mlscorr.pipeline import read_effects
 
     with exit_code(Exit.USAGE):
         effects = [read_effects(source) for source in sources]

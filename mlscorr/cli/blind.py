@@ -32,7 +32,7 @@ def make(
 ) -> None:
     """Make surveys, seal their labels, and put those into key.json. Goes on where it stopped."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
-        from mlscorr.pipeline.blind import make_blind
+        from mlscorr.pipeline import make_blind
 
         made = make_blind(out, cases, seed, workers, mechanisms, progress, effects)
     say(f"{made} surveys are in {out / 'cases'}, their seals in {out / 'seals.json'}.")
@@ -42,7 +42,7 @@ def make(
 def run(out: Check, effects: Effects = None, workers: Workers = 2, quiet: Quiet = False) -> None:
     """Diagnose each survey that has no answer yet, from its folder alone."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
-        from mlscorr.pipeline.blind import run_blind
+        from mlscorr.pipeline import run_blind
 
         answered, failed = run_blind(out, workers, progress, effects)
     say(f"{answered} surveys are diagnosed ({failed} could not be): {out / 'answers'}.")
@@ -54,7 +54,7 @@ def score_(
 ) -> None:
     """Verify the seals and compare answers with labels."""
     with exit_code(Exit.BAD_DATA):
-        from mlscorr.pipeline.blind import score_blind
+        from mlscorr.pipeline import score_blind
 
         score = score_blind(out)
     print_json(score, as_json)

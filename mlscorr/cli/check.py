@@ -14,8 +14,8 @@ CODES = {"survey.toml": Exit.USAGE, "data": Exit.BAD_DATA, "system": Exit.READ_O
 def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
     """Tell in seconds all that is wrong with a survey or project, and what correcting it takes."""
     with exit_code(Exit.BAD_DATA):
-        from mlscorr.io.surveys.project_file import is_project
-        from mlscorr.survey.summary import counted
+        from mlscorr.io.surveys import is_project
+        from mlscorr.survey import counted
 
         if is_project(survey):
             from mlscorr.pipeline.project import check_project

@@ -26,7 +26,7 @@ def compare(
 ) -> None:
     """Correct a survey by every method, and score them by the same check points."""
     with terminal.exit_code(terminal.Exit.USAGE):
-        from mlscorr.pipeline.methods import method_named
+        from mlscorr.pipeline import method_named
 
         clouds = list(dict.fromkeys(method_named(name).name for name in clouds))
     with work(out, overwrite, survey) as progress:

@@ -65,11 +65,10 @@ def correct(
 ) -> None:
     """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
     with terminal.exit_code(terminal.Exit.USAGE):
-        from mlscorr.evaluate.quality import failures, read_gate
-        from mlscorr.io.clouds.extra_bytes import add_sigma_fields
-        from mlscorr.io.clouds.las_checks import read_layout
-        from mlscorr.io.surveys.project_file import is_project
-        from mlscorr.io.trajectories.trajectory_exports import check_exports
+        from mlscorr.evaluate import failures, read_gate
+        from mlscorr.io.clouds import add_sigma_fields, read_layout
+        from mlscorr.io.surveys import is_project
+        from mlscorr.io.trajectories import check_exports
 
         check_exports(trajectory)
         gates = [read_gate(text) for text in fail_if]
@@ -117,7 +116,7 @@ def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
     page : bool
         Whether report.html was written.
     """
-    from mlscorr.report.tie_words import tie_sentences
+    from mlscorr.report import tie_sentences
 
     print_json(report, as_json)
     terminal.say_statements(report["statements"])

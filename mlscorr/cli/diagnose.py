@@ -49,7 +49,7 @@ def diagnose(
 ) -> None:
     """Find where reality and simulation differ, why, and how far the gap can be closed."""
     with terminal.exit_code(terminal.Exit.USAGE):
-        from mlscorr.simulate.simulator_file import read_simulator
+        from mlscorr.simulate import read_simulator
 
         believed = read_simulator(simulator) if simulator else None
         chosen = _costs(costs)
@@ -67,7 +67,7 @@ def diagnose(
     with work(out, overwrite, survey, [path for path in inputs if path.is_file()]) as progress:
         recorded = mlscorr.read_survey(survey)
         if until_none:
-            from mlscorr.pipeline.rounds import diagnose_until_none
+            from mlscorr.pipeline import diagnose_until_none
 
             diagnosed = diagnose_until_none(recorded, believed, progress=progress, costs=chosen)
         else:
@@ -84,7 +84,7 @@ def diagnose(
 
 def _costs(text):
     """Costs by the name of an operating point, or of three numbers."""
-    from mlscorr.gap.evidence.decision import OPERATING_POINTS, Costs
+    from mlscorr.gap.evidence import OPERATING_POINTS, Costs
 
     if text in OPERATING_POINTS:
         return OPERATING_POINTS[text]
@@ -113,8 +113,8 @@ def _tell(content):
 
 def _tell_rounds(ablation):
     """The gap with each effect by itself, and after each round."""
-    from mlscorr.effects.labels import title
-    from mlscorr.report.gap.numbers import signed
+    from mlscorr.effects import title
+    from mlscorr.report.gap import signed
 
     terminal.say(f"{'In the simulator':34s}{'gap before':>12s}{'after':>10s}")
     for row in ablation["alone"]:

@@ -9,7 +9,7 @@ from mlscorr.cli.work import print_json
 
 def doctor(as_json: Json = False) -> None:
     """Tell what is installed, what is missing, and the line that installs it."""
-    from mlscorr.io.store.output import document
+    from mlscorr.io.store import document
 
     installation = mlscorr.doctor()
     for part in installation.parts:

@@ -11,7 +11,7 @@ def extract(
 ) -> None:  # fmt: skip
     """List all target-like objects in the cloud of a survey, with or without control points."""
     with work(out, overwrite, survey) as progress:
-        from mlscorr.survey.summary import counted
+        from mlscorr.survey import counted
 
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.extract(recorded, progress=progress).write(out, overwrite)

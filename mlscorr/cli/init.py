@@ -44,7 +44,7 @@ def init(
         warn(f"Question: {question}")
     for place in started.places:
         warn(f"Open: {place.key} ({place})")
-    from mlscorr.survey.summary import counted
+    from mlscorr.survey import counted
 
     number = counted(len(started.places), "open place")
     warn(f'Written: {started.path}, with {number}. Fill in each "?" in it, then: {check}')

@@ -12,7 +12,7 @@ def plan(
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
     with work(out, overwrite, survey, planned=True):
         content = mlscorr.plan(mlscorr.read_survey(survey, planned=True)).write(out, overwrite)
-    from mlscorr.effects.labels import lowered, parameter_title, titles
+    from mlscorr.effects import lowered, parameter_title, titles
     from mlscorr.report.gap import accuracy_sentence
 
     print_json(content, as_json)

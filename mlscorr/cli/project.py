@@ -11,7 +11,7 @@ from mlscorr.cli import terminal
 from mlscorr.cli.work import print_json
 
 if TYPE_CHECKING:
-    from mlscorr.evaluate.quality import Gate
+    from mlscorr.evaluate import Gate
     from mlscorr.pipeline.project import Options
 
 RESUMPTION = "what was done stays, and the same command with --resume goes on"
@@ -37,8 +37,8 @@ def correct_drives(
     typer.Exit
         Where something failed.
     """
-    from mlscorr.evaluate.quality import failures
-    from mlscorr.io.surveys.project_file import read_project, stated_project
+    from mlscorr.evaluate import failures
+    from mlscorr.io.surveys import read_project, stated_project
     from mlscorr.pipeline.project import check_engine, check_project_output, correct_project
 
     with terminal.exit_code(terminal.Exit.USAGE):

@@ -20,12 +20,12 @@ def simulate(
 ) -> None:
     """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
     with exit_code(Exit.USAGE):
-        from mlscorr.simulate.scenario_file import read_scenario, scenario_files
+        from mlscorr.simulate import read_scenario, scenario_files
 
         inputs = [scenario, *scenario_files(read_scenario(scenario))]
     with work(out, overwrite, inputs=inputs) as progress:
         from mlscorr.pipeline import simulate_survey
-        from mlscorr.survey.summary import counted
+        from mlscorr.survey import counted
 
         made = simulate_survey(scenario, out, seed, overwrite, progress)
     print_json(made, as_json)

@@ -86,7 +86,7 @@ def path_or_url(name: str) -> Path:
     ------
     typer.Exit
     """
-    from mlscorr.io.store.storage import as_path
+    from mlscorr.io.store import as_path
 
     with exit_code(Exit.USAGE):
         return as_path(name)

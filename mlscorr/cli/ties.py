@@ -10,7 +10,7 @@ def ties(
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
-    from mlscorr.survey.summary import counted
+    from mlscorr.survey import counted
 
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)

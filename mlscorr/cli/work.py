@@ -40,10 +40,8 @@ def work(
         See progress_bars.
     """
     with exit_code(Exit.USAGE):
-        from mlscorr.io.store.inputs import check_unchanged, input_file
-        from mlscorr.io.store.output import check_output
-        from mlscorr.io.store.preparation import announced
-        from mlscorr.io.surveys.survey_file import input_files
+        from mlscorr.io.store import announced, check_output, check_unchanged, input_file
+        from mlscorr.io.surveys import input_files
 
         files = input_files(survey, planned) if survey is not None else []
         check_output(out, [*files, *inputs], overwrite)
@@ -67,7 +65,7 @@ def work(
 @contextmanager
 def _noise_said():
     """Say in the end how many points were left out as noise, where there were any."""
-    from mlscorr.io.clouds.noise import counted_noise
+    from mlscorr.io.clouds import counted_noise
 
     with counted_noise() as noise:
         try:

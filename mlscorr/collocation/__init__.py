@@ -11,7 +11,9 @@
 - literal: the paper's own predictor, whose covariances don't fit each other
 """
 
+from mlscorr.collocation.covariance import FAMILIES, INTEGRATED, Covariance
 from mlscorr.collocation.dense import collocate_rows_dense, covariance_given
+from mlscorr.collocation.interpolation import CHUNK
 from mlscorr.collocation.linked import collocate_rows, leave_each_out, reweight
 from mlscorr.collocation.literal import LiteralSignal, collocate_literal
 from mlscorr.collocation.markov import collocate
@@ -19,4 +21,5 @@ from mlscorr.collocation.model import Collocation, Signal
 from mlscorr.collocation.noise import Noise
 from mlscorr.collocation.slopes import likelihood_changes
 from mlscorr.collocation.sparse_rows import SparseRows
+from mlscorr.collocation.trend import polynomial_design
 from mlscorr.collocation.whitening import Whitener, factor

@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from scipy.linalg import LinAlgError, block_diag, cholesky, solve_triangular
 
+from mlscorr.collocation._states import Layout
 from mlscorr.collocation.covariance import correlation
 from mlscorr.collocation.model import LARGEST_ERROR, NOT_POSITIVE, Collocation, solve_trend
 from mlscorr.collocation.sparse_rows import SparseRows
-from mlscorr.collocation.states import Layout
 
 CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
 # Time lag in units of 1 / rate at which rounding leaves no correlation, of exp(-x / 2) neither

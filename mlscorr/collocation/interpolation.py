@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
-from mlscorr.collocation.conditional import Epochs, fill_spans, neighbours, predict_between
-from mlscorr.collocation.knots import Knots, enter_cell
-from mlscorr.collocation.pattern import Pattern, locate, panel_width
-from mlscorr.collocation.states import Layout
+from mlscorr.collocation._conditional import Epochs, fill_spans, neighbours, predict_between
+from mlscorr.collocation._knots import Knots, enter_cell
+from mlscorr.collocation._pattern import Pattern, locate, panel_width
+from mlscorr.collocation._states import Layout
 
 CHUNK = 1 << 16  # epochs predicted at once: copies of broadcast designs and mixings stay small
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.collocation.information import InformationSolver
+from mlscorr.collocation._information import InformationSolver
 from mlscorr.collocation.model import SMALLEST_INFORMATION, Collocation, solve_trend
 from mlscorr.collocation.sparse_rows import SparseRows
 

@@ -6,10 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mlscorr.collocation.interpolation import interpolate, predictor_by
-from mlscorr.collocation.model import NOT_POSITIVE, Collocation, Signal, signal_clocks, solve_trend
-from mlscorr.collocation.noise import Noise
-from mlscorr.collocation.recursion import (
+from mlscorr.collocation._recursion import (
     Recursion,
     filter_columns,
     filter_covariance,
@@ -17,7 +14,10 @@ from mlscorr.collocation.recursion import (
     smooth_columns,
     smooth_covariance,
 )
-from mlscorr.collocation.states import Layout
+from mlscorr.collocation._states import Layout
+from mlscorr.collocation.interpolation import interpolate, predictor_by
+from mlscorr.collocation.model import NOT_POSITIVE, Collocation, Signal, signal_clocks, solve_trend
+from mlscorr.collocation.noise import Noise
 
 
 def collocate(

@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mlscorr.collocation.knots import Knots, knot_gains
+from mlscorr.collocation._knots import Knots, knot_gains
+from mlscorr.collocation._matrices import assign, whitening_root
+from mlscorr.collocation._pattern import Pattern
+from mlscorr.collocation._states import Layout
 from mlscorr.collocation.markov import check_finite
-from mlscorr.collocation.matrices import assign, whitening_root
 from mlscorr.collocation.model import NOT_POSITIVE, Signal, signal_clocks
 from mlscorr.collocation.noise import Noise
-from mlscorr.collocation.pattern import Pattern
-from mlscorr.collocation.states import Layout
 
 
 @dataclass(frozen=True)

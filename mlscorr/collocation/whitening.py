@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from mlscorr.collocation._recursion import Recursion, filter_covariance
+from mlscorr.collocation._scalar import common_innovations, whiten_columns
+from mlscorr.collocation._states import Layout
 from mlscorr.collocation.model import NOT_POSITIVE, Signal, signal_clocks
-from mlscorr.collocation.recursion import Recursion, filter_covariance
-from mlscorr.collocation.scalar import common_innovations, whiten_columns
-from mlscorr.collocation.states import Layout
 
 CHUNK = 64  # columns filtered at once: their states stay in the first cache
 

@@ -9,10 +9,9 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.correction.kernel import fill_increments, move_integers, require_times
+from mlscorr.correction._kernel import fill_increments, move_integers, require_times
 from mlscorr.frames import angle_sigma
-from mlscorr.survey import Mounting, PointCloud, Trajectory
-from mlscorr.survey.summary import Summary, counted
+from mlscorr.survey import Mounting, PointCloud, Summary, Trajectory, counted
 
 
 @dataclass(frozen=True, repr=False)

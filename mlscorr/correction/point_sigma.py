@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mlscorr.correction.kernel import locate, require_times
+from mlscorr.correction._kernel import locate, require_times
 from mlscorr.correction.pair import Correction
 from mlscorr.frames import map_root, skew
 from mlscorr.survey import Mounting, Scanner

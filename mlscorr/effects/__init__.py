@@ -24,18 +24,33 @@ sources, how it enters an observation, and its words in a report. ``register`` m
 one's own known.
 """
 
+from mlscorr.effects._quantity import quantity
 from mlscorr.effects.catalogue import (
     EFFECTS,
     apply_effects,
     effect_class,
     effect_streams,
+    effects_by_name,
     in_order,
     known_effects,
     make_effect,
     register,
 )
 from mlscorr.effects.effect import Effect
-from mlscorr.effects.own import register_file
-from mlscorr.effects.quantity import quantity
+from mlscorr.effects.labels import OTHERS, family, lowered, meaning, parameter_title, title, titles
+from mlscorr.effects.mounting import Boresight, LeverArm
+from mlscorr.effects.own import register_file, run_file
+from mlscorr.effects.ranging import Dropout
 from mlscorr.effects.stages import STAGES, Reference, Returns
-from mlscorr.effects.wording import SizeEstimate
+from mlscorr.effects.vehicle import PositionNoise
+from mlscorr.effects.wording import (
+    DASH,
+    SizeEstimate,
+    figures,
+    joined,
+    known,
+    percent,
+    scale,
+    size,
+    with_articles,
+)

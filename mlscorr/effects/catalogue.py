@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.effects import control, encoder, mounting, ranging, timing, vehicle
+from mlscorr.effects import _control as control
+from mlscorr.effects import _encoder as encoder
+from mlscorr.effects import _timing as timing
+from mlscorr.effects import mounting, ranging, vehicle
 from mlscorr.effects.effect import Effect
 from mlscorr.effects.stages import STAGES, Reference
 

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mlscorr.effects.guard import checked_change
-from mlscorr.effects.quantity import Quantity
+from mlscorr.effects._guard import checked_change
+from mlscorr.effects._quantity import Quantity
 from mlscorr.effects.stages import STAGES, Reference
 from mlscorr.effects.wording import SizeEstimate, amplitude, known, size, vector
 

@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from mlscorr.effects._quantity import quantity
+from mlscorr.effects._settings import SETTINGS
 from mlscorr.effects.effect import Effect
-from mlscorr.effects.quantity import quantity
-from mlscorr.effects.settings import SETTINGS
 
 
 @dataclass(frozen=True)

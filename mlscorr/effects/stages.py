@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns
 
 STAGES = {  # in the order of a survey, and the field of the stage's value that an error adds to
     "beam": None,

@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from mlscorr.effects._quantity import quantity
 from mlscorr.effects.effect import Effect
-from mlscorr.effects.quantity import quantity
 from mlscorr.effects.stages import EAST_NORTH_UP, MAP
 from mlscorr.effects.wording import DASH, SizeEstimate, joined, known, size
 

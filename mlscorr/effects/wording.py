@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from mlscorr.effects.settings import SETTINGS
+from mlscorr.effects._settings import SETTINGS
 
 SCALES = {  # unit of a document: (from which absolute value on, factor, its word)
     "s": ((1.0, 1.0, "s"), (1e-3, 1e3, "ms"), (0.0, 1e6, "µs")),

@@ -10,6 +10,7 @@ from itertools import compress
 import numpy as np
 
 from mlscorr.correction import Correction
+from mlscorr.estimate._screening import Screening
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.guards import Guards, few_targets, global_test_warnings
 from mlscorr.estimate.mounting_estimate import (
@@ -18,12 +19,10 @@ from mlscorr.estimate.mounting_estimate import (
     clock_warnings,
 )
 from mlscorr.estimate.posterior import Posterior
-from mlscorr.estimate.screening import Screening
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tied import TieResiduals
-from mlscorr.survey import Mounting, Ties, Trajectory
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Mounting, Summary, Ties, Trajectory
 
 SCANNER_COMPONENTS = ("range offset", "encoder scale")
 

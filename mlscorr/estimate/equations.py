@@ -19,14 +19,13 @@ from mlscorr.collocation import (
     collocate_rows,
     collocate_rows_dense,
     likelihood_changes,
+    polynomial_design,
 )
-from mlscorr.collocation.trend import polynomial_design
+from mlscorr.estimate._tie_equations import TieEquations
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
-from mlscorr.estimate.tie_equations import TieEquations
 from mlscorr.pos import StatedSigma, stated_sigma
-from mlscorr.survey import SAME_EPOCH, Pos, Trajectory
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import SAME_EPOCH, Pos, Summary, Trajectory
 
 NO_TREND = -1  # the order of a polynomial without any coefficient
 

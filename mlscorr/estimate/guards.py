@@ -7,14 +7,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtri
 
-from mlscorr.collocation.covariance import INTEGRATED
+from mlscorr.collocation import INTEGRATED
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.frames import angle_sigma
-from mlscorr.survey import Trajectory, control_epochs
-from mlscorr.survey.summary import counted
+from mlscorr.survey import Trajectory, control_epochs, counted
 
 COMPONENTS = ("easting", "northing", "height", "roll", "pitch", "heading")
 

@@ -12,6 +12,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
+from mlscorr.estimate._prediction import predict_pose_error
+from mlscorr.estimate._screening import Screening, screen
 from mlscorr.estimate.assembly import mounting_equations, position_equations
 from mlscorr.estimate.calibration import Calibration
 from mlscorr.estimate.equations import Equations
@@ -22,9 +24,7 @@ from mlscorr.estimate.mounting_estimate import (
     combined_correction,
     corrected_mountings,
 )
-from mlscorr.estimate.prediction import predict_pose_error
 from mlscorr.estimate.prior import mounting_prior
-from mlscorr.estimate.screening import Screening, screen
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import SAME_EPOCH, Matched, Mounting, Pos, Trajectory

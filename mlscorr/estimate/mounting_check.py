@@ -9,12 +9,12 @@ import numpy as np
 from scipy.special import chdtri
 from threadpoolctl import threadpool_limits
 
-from mlscorr.estimate.added_unknowns import AddedUnknowns
+from mlscorr.estimate._added_unknowns import AddedUnknowns
+from mlscorr.estimate._tie_equations import mounting_columns
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.tie_equations import mounting_columns
 from mlscorr.frames import mounting_partials, partials_by_scanner
 from mlscorr.survey import Matched, Mounting
 

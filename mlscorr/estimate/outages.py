@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from mlscorr.collocation.covariance import INTEGRATED
+from mlscorr.collocation import INTEGRATED
 from mlscorr.estimate.assembly import with_fallbacks
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.posterior import Objective

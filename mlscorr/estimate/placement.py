@@ -10,13 +10,13 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation.covariance import FAMILIES
+from mlscorr.collocation import FAMILIES
+from mlscorr.estimate._outlook import Outlook
+from mlscorr.estimate._prediction import predict_under
 from mlscorr.estimate.assembly import position_equations
 from mlscorr.estimate.inputs import checked_inputs
-from mlscorr.estimate.outlook import Outlook
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.posterior import Objective
-from mlscorr.estimate.prediction import predict_under
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.survey import Matched, Pos, Trajectory

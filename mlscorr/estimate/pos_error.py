@@ -8,6 +8,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
+from mlscorr.estimate._prediction import GridPredictions, pose_rows, predict_pose_error
+from mlscorr.estimate._refusals import weighed_refusals
+from mlscorr.estimate._runs import find_windows, with_windows
+from mlscorr.estimate._screening import Screening, screen
+from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate._tie_weights import robust_ties
 from mlscorr.estimate.assembly import position_equations, with_fallbacks, with_mountings
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_warnings
@@ -15,20 +21,13 @@ from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.orders import Alternative, affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.outages import with_drift_history
-from mlscorr.estimate.prediction import GridPredictions, pose_rows, predict_pose_error
 from mlscorr.estimate.prior import position_prior
-from mlscorr.estimate.refusals import weighed_refusals
-from mlscorr.estimate.runs import find_windows, with_windows
-from mlscorr.estimate.screening import Screening, screen
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import Support, find_support
 from mlscorr.estimate.target_tests import TargetTest
-from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tie_weights import robust_ties
 from mlscorr.estimate.tied import TieResiduals, screen_with_ties
-from mlscorr.survey import Matched, Mounting, Pos, Ties, Trajectory
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Matched, Mounting, Pos, Summary, Ties, Trajectory
 
 
 @dataclass(frozen=True, repr=False)

@@ -10,7 +10,7 @@ from scipy.linalg import cholesky
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
-from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
+from mlscorr.collocation import FAMILIES, INTEGRATED
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.prior import NAMES, Prior
 from mlscorr.estimate.settings import SETTINGS

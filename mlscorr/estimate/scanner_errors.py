@@ -11,13 +11,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
-from mlscorr.estimate.added_unknowns import AddedUnknowns, with_added
+from mlscorr.estimate._added_unknowns import AddedUnknowns, with_added
+from mlscorr.estimate._prediction import predict_pose_error
+from mlscorr.estimate._tie_equations import along_ties
 from mlscorr.estimate.calibration import SCANNER_COMPONENTS, Calibration, ScannerErrors
 from mlscorr.estimate.mounting import is_determined, with_shift
 from mlscorr.estimate.mounting_estimate import MountingEstimate, combined_correction
-from mlscorr.estimate.prediction import predict_pose_error
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.tie_equations import along_ties
 from mlscorr.frames import georeferenced_anew, partials_by_scanner, scanner_partials
 from mlscorr.survey import Matched
 

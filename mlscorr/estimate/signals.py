@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlscorr.collocation import Signal
-from mlscorr.collocation.covariance import INTEGRATED, Covariance
+from mlscorr.collocation import INTEGRATED, Covariance, Signal
 from mlscorr.pos import StatedSigma
 
 

@@ -15,16 +15,16 @@ import numpy as np
 from scipy.special import ndtri
 
 from mlscorr.correction import Correction, increments_by_scanner
+from mlscorr.estimate._prediction import GridPredictions
+from mlscorr.estimate._screening import Screening, may_go
+from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate._tie_weights import robust_ties, solved_ties, student
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.outages import with_likely_starts
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters
-from mlscorr.estimate.prediction import GridPredictions
-from mlscorr.estimate.screening import Screening, may_go
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import all_tests
-from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tie_weights import robust_ties, solved_ties, student
 from mlscorr.survey import Ties
 
 WRONG_BUT_USED = "It is used, as too few are left to tell which point is wrong"

@@ -13,14 +13,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
+from mlscorr.estimate._prediction import pose_rows
+from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate._tie_weights import WeighedTies, graduated
 from mlscorr.estimate.calibration import Calibration, mounted_corrections
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.mounting import calibration_by, linearized
 from mlscorr.estimate.mounting_estimate import combined_correction, corrected_mountings
-from mlscorr.estimate.prediction import pose_rows
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tie_weights import WeighedTies, graduated
 from mlscorr.estimate.tied import screen_with_ties
 from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import Matched, Mounting, Ties

@@ -8,3 +8,12 @@
 - accuracy: the ASPRS standard
 - quality: gates that make a command fail
 """
+
+from mlscorr.evaluate.beams import BeamCheck, outside_warnings
+from mlscorr.evaluate.datum import DatumDifference, datum_differences
+from mlscorr.evaluate.model import largest_sigma, model_section
+from mlscorr.evaluate.quality import Gate, failures, read_gate
+from mlscorr.evaluate.rows import SEEN_BY_OTHERS, PointCounts, Score, Statistics, TargetRow
+from mlscorr.evaluate.scores import accuracy, misclosures, score
+from mlscorr.evaluate.target_rows import surveyed_rows, unseen_rows
+from mlscorr.evaluate.ties import misfit, misfit_section, tie_section

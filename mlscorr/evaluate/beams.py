@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from mlscorr.evaluate.settings import SETTINGS
+from mlscorr.evaluate._settings import SETTINGS
 from mlscorr.frames import to_scanner
-from mlscorr.io.settings import SETTINGS as IO
-from mlscorr.io.trajectories.time_systems import lacks_time, listed_times, utc_lag
+from mlscorr.io import SETTINGS as IO
+from mlscorr.io.trajectories import lacks_time, listed_times, utc_lag
 from mlscorr.survey import CloudFile, PointCloud, Survey
 
 

@@ -21,18 +21,21 @@ import numpy as np
 from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
+from mlscorr.collocation import FAMILIES, INTEGRATED
 from mlscorr.estimate import SETTINGS as ESTIMATE
-from mlscorr.estimate.assembly import position_equations, with_mountings
-from mlscorr.estimate.equations import Equations
-from mlscorr.estimate.inputs import filled_sigmas
-from mlscorr.estimate.outages import with_drift_history
-from mlscorr.estimate.posterior import Objective
-from mlscorr.estimate.prior import position_prior
-from mlscorr.estimate.signals import SignalParameters
-from mlscorr.evaluate.settings import SETTINGS
-from mlscorr.io.trajectories.projection import MapFactors, map_factors
-from mlscorr.matching.settings import SETTINGS as MATCHING
+from mlscorr.estimate import (
+    Equations,
+    Objective,
+    SignalParameters,
+    filled_sigmas,
+    position_equations,
+    position_prior,
+    with_drift_history,
+    with_mountings,
+)
+from mlscorr.evaluate._settings import SETTINGS
+from mlscorr.io.trajectories import MapFactors, map_factors
+from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Matched, Pos, Trajectory
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.evaluate.accuracy import positional_accuracy
+from mlscorr.evaluate._accuracy import positional_accuracy
 from mlscorr.evaluate.rows import Score, Statistics
 from mlscorr.survey import Correcting, Matched, PointCloud
 

@@ -11,4 +11,14 @@ The story, a room each:
 - advice, document: what to do about it, and all of it as plain numbers and words
 """
 
+from mlscorr.gap.advice import NOTHING_TO_DO, no_cause
+from mlscorr.gap.document import (
+    assumed_document,
+    cause_document,
+    gap_document,
+    map_document,
+    separability_document,
+    windows_document,
+)
 from mlscorr.gap.evidence import Costs
+from mlscorr.gap.open_scale import likely_scale, open_sigmas, with_scale

@@ -4,15 +4,11 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from mlscorr.effects import effect_class
-from mlscorr.effects.labels import lowered, title
-from mlscorr.effects.wording import percent, size, with_articles
-from mlscorr.gap.agreement import Agreement
-from mlscorr.gap.closure.closure import Closure
-from mlscorr.gap.evidence.causes import Cause, Inference
-from mlscorr.gap.evidence.parameters import CauseParameter
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.plan.additions import NextData
+from mlscorr.effects import effect_class, lowered, percent, size, title, with_articles
+from mlscorr.gap._agreement import Agreement
+from mlscorr.gap.closure import Closure
+from mlscorr.gap.evidence import SETTINGS, Cause, CauseParameter, Inference
+from mlscorr.gap.plan import NextData
 
 NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
 ONLY_DRIFT = (

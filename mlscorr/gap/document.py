@@ -6,19 +6,15 @@ from dataclasses import asdict
 
 import numpy as np
 
-from mlscorr.effects import Effect
-from mlscorr.effects.wording import with_articles
+from mlscorr.effects import Effect, with_articles
+from mlscorr.gap._agreement import agreements
+from mlscorr.gap._headline import headline
 from mlscorr.gap.advice import advice_of, distinct_parameters, excess_of, sentence_of
-from mlscorr.gap.agreement import agreements
-from mlscorr.gap.closure.closure import Closure
-from mlscorr.gap.evidence.causes import Cause, Inference
-from mlscorr.gap.evidence.separability import Separability
-from mlscorr.gap.evidence.where import NAMES
-from mlscorr.gap.headline import headline
+from mlscorr.gap.closure import Closure
+from mlscorr.gap.evidence import NAMES, Cause, Inference, Separability
 from mlscorr.gap.open_scale import open_sigmas
-from mlscorr.gap.plan.additions import NextData
-from mlscorr.gap.residuals.absence import Absence
-from mlscorr.gap.residuals.rows import Rows, background
+from mlscorr.gap.plan import NextData
+from mlscorr.gap.residuals import Absence, Rows, background
 from mlscorr.survey import Survey
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page

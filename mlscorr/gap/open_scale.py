@@ -12,10 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.evidence.labels import weigh_labels
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.rows import Rows, background
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.evidence import SETTINGS, weigh_labels
+from mlscorr.gap.residuals import Rows, background
+from mlscorr.gap.signatures import Signature
 from mlscorr.survey import Pos, Survey
 
 SIGMAS = ("position_sigma", "attitude_sigma")

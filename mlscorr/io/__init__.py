@@ -6,3 +6,5 @@
 - clouds: points by chunks, and corrected copies of them
 - surveys: survey.toml and project.toml with all that they name
 """
+
+from mlscorr.io.settings import SETTINGS

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlscorr.matching.beliefs import build_chain
+from mlscorr.matching._beliefs import build_chain
+from mlscorr.matching._marginals import marginals
+from mlscorr.matching._pairs import find_pairs
 from mlscorr.matching.decision import decide, moved_share_by_others
-from mlscorr.matching.marginals import marginals
-from mlscorr.matching.pairs import find_pairs
 from mlscorr.matching.reasons import Refusal, explain
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import (

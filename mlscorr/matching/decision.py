@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import betaln, expit, logit
 
-from mlscorr.matching.marginals import Marginals
-from mlscorr.matching.pairs import CandidatePairs
+from mlscorr.matching._marginals import Marginals
+from mlscorr.matching._pairs import CandidatePairs
 from mlscorr.matching.settings import SETTINGS
 
 

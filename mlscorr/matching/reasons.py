@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mlscorr.matching._pairs import CandidatePairs, same_appearance
 from mlscorr.matching.decision import Decision
-from mlscorr.matching.pairs import CandidatePairs, same_appearance
 from mlscorr.matching.settings import SETTINGS
 from mlscorr.survey import ControlPoints, TargetObservations
 

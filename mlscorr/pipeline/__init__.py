@@ -1,24 +1,28 @@
 """The story from files to files, one module a command, each loaded when it is used."""
 
-from importlib import import_module
-from typing import Any
+import lazy_loader
 
-_OFFERED = {
-    "applying": ("AppliedSurvey", "apply"),
-    "calibration": ("CalibratedScanners", "CalibratedSurvey", "calibrate"),
-    "checking": ("CheckedSurvey", "check"), "compared_survey": ("ComparedSurvey",),
-    "comparison": ("compare",), "corrected_survey": ("CorrectedSurvey",),
-    "correction": ("correct",), "diagnosis": ("DiagnosedSurvey", "diagnose"),
-    "extraction": ("ExtractedSurvey", "extract"), "installation": ("Installation", "doctor"),
-    "planning": ("PlannedSurvey", "plan"), "rendering": ("render",),
-    "simulation": ("demo", "simulate_survey"), "starting": ("StartedSurvey", "init"),
-    "ties": ("TiedSurvey", "find_ties"),
-}  # fmt: skip
-
-
-def __getattr__(name: str) -> Any:
-    """Load the module that offers a name, and the libraries it needs, only then."""
-    for module, names in _OFFERED.items():
-        if name in names:
-            return getattr(import_module(f"mlscorr.pipeline.{module}"), name)
-    raise AttributeError(f"module 'mlscorr.pipeline' has no attribute '{name}'")
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "applying": ["AppliedSurvey", "apply"],
+        "blind": ["make_blind", "run_blind", "score_blind"],
+        "calibration": ["CalibratedScanners", "CalibratedSurvey", "calibrate"],
+        "checking": ["CheckedSurvey", "check"],
+        "compared_survey": ["ComparedSurvey"],
+        "comparison": ["compare"],
+        "corrected_survey": ["CorrectedSurvey"],
+        "correction": ["correct"],
+        "diagnosis": ["DiagnosedSurvey", "diagnose"],
+        "extraction": ["ExtractedSurvey", "extract"],
+        "found_effects": ["read_effects"],
+        "installation": ["Installation", "doctor"],
+        "methods": ["method_named"],
+        "planning": ["PlannedSurvey", "plan"],
+        "rendering": ["render"],
+        "rounds": ["diagnose_until_none"],
+        "simulation": ["demo", "simulate_survey"],
+        "starting": ["StartedSurvey", "init"],
+        "ties": ["TiedSurvey", "find_ties"],
+    },
+)

@@ -10,20 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.correction import Correction
-from mlscorr.effects import Effect
-from mlscorr.effects.wording import joined
-from mlscorr.estimate.mounting_estimate import corrected_mounting
-from mlscorr.io.clouds.conversion import written_name
-from mlscorr.io.store.output import document, output_folder, write_json
-from mlscorr.io.surveys.survey_copy import write_survey_copy
-from mlscorr.io.surveys.survey_file import FILE_NAME
-from mlscorr.io.trajectories.trajectory import write_trajectory_csv
+from mlscorr.effects import Effect, joined
+from mlscorr.estimate import corrected_mounting
+from mlscorr.io.clouds import written_name
+from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.io.surveys import FILE_NAME, write_survey_copy
+from mlscorr.io.trajectories import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import CLOCK, DATUM, MOUNTING, TAKEN_OUT, FoundEffects
 from mlscorr.pipeline.near_points import remounting_fault
-from mlscorr.survey import Survey, SurveyFileError, check_survey
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Summary, Survey, SurveyFileError, check_survey
 
 
 def apply(

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.line_rate import sampled_beams, turning_rate
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import CloudFile, PointCloud, Survey, Trajectory

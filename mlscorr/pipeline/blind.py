@@ -17,12 +17,10 @@ from time import monotonic
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.blind.cases import make_case, outside_mechanisms
-from mlscorr.blind.mix import mix
-from mlscorr.blind.scoring import score
+from mlscorr.blind import make_case, mix, outside_mechanisms, score
 from mlscorr.effects import EFFECTS, known_effects, register_file
-from mlscorr.io.store.output import document, output_file, write_json
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.store import document, output_file, write_json
+from mlscorr.io.surveys import read_survey
 from mlscorr.pipeline.finding import find_targets, silent
 
 SECRET = ("truth*", "key*")  # names of files that no diagnosis may see

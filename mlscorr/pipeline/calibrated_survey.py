@@ -9,24 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mlscorr.estimate import Calibration
-from mlscorr.estimate.calibration import SCANNER_COMPONENTS
-from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.evaluate.scores import score
-from mlscorr.evaluate.target_rows import surveyed_rows
-from mlscorr.evaluate.ties import misfit_section
-from mlscorr.io.clouds.conversion import written_name
-from mlscorr.io.store.output import document, output_folder, write_json
-from mlscorr.io.surveys.survey_copy import mounting_values, write_survey_copy
-from mlscorr.io.surveys.survey_file import FILE_NAME
-from mlscorr.io.trajectories.trajectory import write_trajectory_csv
+from mlscorr.estimate import MOUNTING_COMPONENTS, SCANNER_COMPONENTS, Calibration
+from mlscorr.evaluate import TargetRow, misfit_section, score, surveyed_rows
+from mlscorr.io.clouds import written_name
+from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.io.surveys import FILE_NAME, mounting_values, write_survey_copy
+from mlscorr.io.trajectories import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import cloud_rows
-from mlscorr.survey import Matched, Survey
-from mlscorr.survey.data_frame import rows_frame
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Matched, Summary, Survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -79,7 +71,7 @@ class CalibrationResult(Summary):
         ValueError, OSError
             As ``CorrectedSurvey.write`` does.
         """
-        from mlscorr.report.calibration_page import calibration_page
+        from mlscorr.report import calibration_page
 
         survey, parts = self.survey, self.parts
         read = {"clouds": cloud_rows(survey), "files": []}
@@ -178,7 +170,7 @@ class CalibratedSurvey(CalibrationResult):
         with_drift : bool
             Whether with what the POS error beside the mounting explains.
         """
-        from mlscorr.report.calibration_page import calibration_screen
+        from mlscorr.report import calibration_screen
 
         calibration, rows = self.calibration, self._rows(self.calibration.correction())
         content = {

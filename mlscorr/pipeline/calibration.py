@@ -10,10 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from mlscorr.estimate import Calibration
-from mlscorr.evaluate.rows import SEEN_BY_OTHERS
-from mlscorr.evaluate.target_rows import unseen_rows
-from mlscorr.evaluate.ties import misfit_section
-from mlscorr.io.clouds.las import sample_gps_times
+from mlscorr.evaluate import SEEN_BY_OTHERS, misfit_section, unseen_rows
+from mlscorr.io.clouds import sample_gps_times
 from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
 from mlscorr.pipeline.near_points import remounting_fault, reuse_warnings
@@ -148,7 +146,7 @@ class CalibratedScanners(CalibrationResult):
         with_drift : bool
             As of ``CalibratedSurvey.report``.
         """
-        from mlscorr.report.calibration_page import scanners_screen
+        from mlscorr.report import scanners_screen
 
         first, *others = self.by_scanner
         content = {

@@ -6,19 +6,21 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.estimate import SETTINGS, few_targets
-from mlscorr.estimate.inputs import checked_inputs
-from mlscorr.evaluate.beams import outside_warnings
-from mlscorr.evaluate.datum import DatumDifference, datum_differences
-from mlscorr.io.clouds.conversion import read_in_part
-from mlscorr.io.clouds.las import timed_records
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_crs import cloud_box, crs_conflict, stated_crs
-from mlscorr.io.clouds.noise import counted_noise
-from mlscorr.io.store.preparation import glance
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.io.tables.nearness import far_cloud
-from mlscorr.io.trajectories.projection import crs_code, crs_name
+from mlscorr.estimate import SETTINGS, checked_inputs, few_targets
+from mlscorr.evaluate import DatumDifference, datum_differences, outside_warnings
+from mlscorr.io.clouds import (
+    cloud_box,
+    counted_noise,
+    crs_conflict,
+    read_in_part,
+    read_layout,
+    stated_crs,
+    timed_records,
+)
+from mlscorr.io.store import glance
+from mlscorr.io.surveys import read_survey
+from mlscorr.io.tables import far_cloud
+from mlscorr.io.trajectories import crs_code, crs_name
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pipeline import needs
 from mlscorr.pipeline.faults import Fault, Faults, find_faults

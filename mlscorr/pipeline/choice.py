@@ -4,14 +4,18 @@ import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
-from mlscorr.io.clouds.las_crs import cloud_box, crs_conflict, stated_crs
-from mlscorr.io.store.open_places import PLACE_OF_CRS, OpenQuestion
-from mlscorr.io.surveys.crs_checks import check_area
-from mlscorr.io.surveys.folder_roles import FileRole
-from mlscorr.io.tables.control import ControlList, holds_points, read_control
-from mlscorr.io.tables.nearness import check_together, far_cloud
-from mlscorr.io.tables.table_sections import ControlSection
-from mlscorr.io.trajectories.projection import check_crs, crs_code, crs_name
+from mlscorr.io.clouds import cloud_box, crs_conflict, stated_crs
+from mlscorr.io.store import PLACE_OF_CRS, OpenQuestion
+from mlscorr.io.surveys import FileRole, check_area
+from mlscorr.io.tables import (
+    ControlList,
+    ControlSection,
+    check_together,
+    far_cloud,
+    holds_points,
+    read_control,
+)
+from mlscorr.io.trajectories import check_crs, crs_code, crs_name
 from mlscorr.pipeline.drives import Cloud, Drive, ambiguous
 from mlscorr.survey import Trajectory
 

@@ -10,9 +10,7 @@ import numpy as np
 
 from mlscorr.correction import Correction, PointSigma
 from mlscorr.estimate import Support
-from mlscorr.io.clouds.conversion import written_name
-from mlscorr.io.clouds.las import sha256
-from mlscorr.io.clouds.las_copy import CorrectedPart, write_parts
+from mlscorr.io.clouds import CorrectedPart, sha256, write_parts, written_name
 from mlscorr.survey import Correcting, Survey
 
 

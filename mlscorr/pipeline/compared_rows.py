@@ -13,7 +13,7 @@ from mlscorr.estimate import estimate_correction
 from mlscorr.gap import contrast, residuals
 from mlscorr.gap.closure import Beams, BeamSimulator, Surroundings, collect_beams
 from mlscorr.gap.signatures import expected, without_effects
-from mlscorr.io.surveys.simulated_clouds import simulated_survey
+from mlscorr.io.surveys import simulated_survey
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.planning import check_enough
 from mlscorr.survey import Matched, Survey, TargetObservations

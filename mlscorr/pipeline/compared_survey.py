@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.evaluate.target_rows import surveyed_rows
-from mlscorr.io.store.output import document, output_folder, write_json
+from mlscorr.evaluate import TargetRow, surveyed_rows
+from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.methods import method_named
-from mlscorr.survey import Matched, Survey
-from mlscorr.survey.data_frame import rows_frame
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Matched, Summary, Survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -66,7 +63,7 @@ class ComparedSurvey(Summary):
     @property
     def document(self) -> dict:
         """The document of compare.json."""
-        from mlscorr.report.comparison_screen import comparison_screen
+        from mlscorr.report import comparison_screen
 
         content = {
             "name": self.survey.name,
@@ -90,7 +87,7 @@ class ComparedSurvey(Summary):
 
     def plot(self) -> Figure:
         """The RMSE of every method on each axis, the best at the top."""
-        from mlscorr.report.comparison_page import comparison_figure
+        from mlscorr.report import comparison_figure
 
         return comparison_figure(self.document)
 
@@ -130,7 +127,7 @@ class ComparedSurvey(Summary):
         OSError
             When writing fails.
         """
-        from mlscorr.report.comparison_page import write_comparison
+        from mlscorr.report import write_comparison
 
         for name in clouds:
             why = self.row(method_named(name).name)["why"]

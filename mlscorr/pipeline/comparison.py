@@ -7,9 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from mlscorr.baselines import Undetermined
-from mlscorr.evaluate.rows import Statistics
-from mlscorr.evaluate.scores import misclosures
-from mlscorr.evaluate.target_rows import unseen_rows
+from mlscorr.evaluate import Statistics, misclosures, unseen_rows
 from mlscorr.pipeline.compared_survey import ComparedSurvey
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.methods import METHODS, Observed, load_open3d
@@ -76,7 +74,7 @@ def compare(
         rows.append(row)
         if correction is not None:
             corrections[method.name] = correction
-    from mlscorr.report.comparison_screen import method_warnings
+    from mlscorr.report import method_warnings
 
     for sentence in method_warnings(rows):
         warnings.warn(sentence, stacklevel=2)

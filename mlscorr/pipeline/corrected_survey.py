@@ -12,30 +12,37 @@ import numpy as np
 
 from mlscorr.correction import PointSigma
 from mlscorr.estimate import Estimate, NextControl, Support, find_jumps, place_control
-from mlscorr.evaluate.datum import DatumDifference
-from mlscorr.evaluate.model import largest_sigma, model_section
-from mlscorr.evaluate.rows import PointCounts, Score, TargetRow
-from mlscorr.evaluate.scores import accuracy, score
-from mlscorr.evaluate.target_rows import surveyed_rows
-from mlscorr.evaluate.ties import tie_section
-from mlscorr.io.clouds.las import sha256
-from mlscorr.io.store.output import document, output_folder, write_json
-from mlscorr.io.tables.result_tables import write_targets_csv
-from mlscorr.io.trajectories.trajectory import write_trajectory_csv
-from mlscorr.io.trajectories.trajectory_exports import check_exports, export_trajectory
-from mlscorr.io.trajectories.weak_files import write_weak
+from mlscorr.evaluate import (
+    DatumDifference,
+    PointCounts,
+    Score,
+    TargetRow,
+    accuracy,
+    largest_sigma,
+    model_section,
+    score,
+    surveyed_rows,
+    tie_section,
+)
+from mlscorr.io.clouds import sha256
+from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.io.tables import write_targets_csv
+from mlscorr.io.trajectories import (
+    check_exports,
+    export_trajectory,
+    write_trajectory_csv,
+    write_weak,
+)
 from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
 from mlscorr.pipeline.finding import silent
-from mlscorr.survey import Matched, Survey, Trajectory
-from mlscorr.survey.data_frame import rows_frame
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Matched, Summary, Survey, Trajectory, rows_frame
 from mlscorr.targets import FittedTarget
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-    from mlscorr.report.correction_report import CorrectionReport
+    from mlscorr.report import CorrectionReport
 
 
 @dataclass(frozen=True, repr=False)
@@ -104,7 +111,7 @@ class CorrectedSurvey(Summary):
 
     @property
     def accuracy(self) -> dict[str, object]:
-        """Accuracy by ASPRS 2023, as report.json has it: mlscorr.evaluate.accuracy."""
+        """Accuracy by ASPRS 2023, as report.json has it: mlscorr.evaluate._accuracy."""
         return accuracy(
             self.matched_check,
             self.matched_control,
@@ -135,8 +142,7 @@ class CorrectedSurvey(Summary):
         ValueError
             Where there is no such figure.
         """
-        from mlscorr.report.figures import correction_figures
-        from mlscorr.report.style import draw
+        from mlscorr.report import correction_figures, draw
 
         estimate = self.estimate
         return draw(correction_figures(estimate.correction, self._draft, estimate.ties), name)
@@ -204,7 +210,7 @@ class CorrectedSurvey(Summary):
         page: bool = True, trajectories: Sequence[str] = (),
     ) -> dict:  # fmt: skip
         """Write all but the clouds into a folder that is there, as ``write`` does."""
-        from mlscorr.report.headline import first_screen
+        from mlscorr.report import first_screen
 
         write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
         exports = [
@@ -224,14 +230,14 @@ class CorrectedSurvey(Summary):
 
     def _draw(self, folder, report, progress):
         """Write report.html and the pictures."""
-        from mlscorr.report import cloud, correction_page, figures
+        from mlscorr.report import view_cloud, write_pictures, write_report
 
         correction, ties = self.estimate.correction, self.estimate.ties
-        views = cloud.view_cloud(self.survey, correction, report.targets, progress, ties)
+        views = view_cloud(self.survey, correction, report.targets, progress, ties)
         shown = self.survey, correction, report, views, self.fitted, ties
-        correction_page.write_report(folder / "report.html", *shown)
+        write_report(folder / "report.html", *shown)
         (folder / "pictures").mkdir()
-        figures.write_pictures(folder / "pictures", correction, report, ties)
+        write_pictures(folder / "pictures", correction, report, ties)
 
     @cached_property
     def next_control(self) -> tuple[NextControl, ...]:
@@ -256,7 +262,7 @@ class CorrectedSurvey(Summary):
 
     def _report(self, folder, written, exports, weak_names):
         """The CorrectionReport, once all that it names stands in the folder."""
-        from mlscorr.report.correction_report import FileRow
+        from mlscorr.report import FileRow
 
         def described(what, path):
             return FileRow(path.name, sha256(path), what, bytes=path.stat().st_size)
@@ -283,7 +289,7 @@ class CorrectedSurvey(Summary):
     @cached_property
     def _draft(self) -> CorrectionReport:
         """What figures show of the correction: all but files, counts of points, next control."""
-        from mlscorr.report.correction_report import CorrectionReport, Coverage
+        from mlscorr.report import CorrectionReport, Coverage
 
         start, end = self.estimate.guards.longest_gap
         return CorrectionReport(

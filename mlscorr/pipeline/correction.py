@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from mlscorr.estimate import SETTINGS, Estimate
-from mlscorr.evaluate.datum import datum_differences
-from mlscorr.evaluate.target_rows import unseen_rows
+from mlscorr.evaluate import datum_differences, unseen_rows
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.finding import Finding
 from mlscorr.pipeline.near_points import reuse_warnings

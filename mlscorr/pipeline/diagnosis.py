@@ -11,24 +11,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlscorr.effects import Effect, known_effects
-from mlscorr.gap import contrast
-from mlscorr.gap.advice import NOTHING_TO_DO
+from mlscorr.gap import (
+    NOTHING_TO_DO,
+    assumed_document,
+    contrast,
+    gap_document,
+    likely_scale,
+    open_sigmas,
+    with_scale,
+)
 from mlscorr.gap.closure import Closure, FoundCause, cause_for_simulator, close_gap
-from mlscorr.gap.document import assumed_document, gap_document
 from mlscorr.gap.evidence import Costs, Inference, infer_causes
-from mlscorr.gap.open_scale import likely_scale, open_sigmas, with_scale
 from mlscorr.gap.plan import NextData, next_data
 from mlscorr.gap.residuals import Absence, Rows, background
 from mlscorr.gap.signatures import Signature, as_believed, curvature, select, signatures, with_cause
-from mlscorr.io.store.output import document, output_folder, write_json
+from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import cloud_rows
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.simulate.simulator_file import Simulator, beliefs_of, write_simulator
-from mlscorr.survey import Survey, check_rng, check_survey
-from mlscorr.survey.data_frame import rows_frame
-from mlscorr.survey.summary import Summary
+from mlscorr.simulate import Simulator, beliefs_of, write_simulator
+from mlscorr.survey import Summary, Survey, check_rng, check_survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -250,8 +253,8 @@ class DiagnosedSurvey(Summary):
         ValueError
             Where there is no such figure, or nothing to show in it.
         """
+        from mlscorr.report import draw
         from mlscorr.report.gap import diagnosis_figures
-        from mlscorr.report.style import draw
 
         return draw(diagnosis_figures(self.document), name)
 

@@ -10,20 +10,21 @@ from pathlib import Path
 import numpy as np
 from pyproj import Transformer
 
-from mlscorr.io.clouds.las import spread_records
-from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.store.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion, places_of
-from mlscorr.io.surveys.folder_roles import FileRole
-from mlscorr.io.trajectories.poses import utm_zone
-from mlscorr.io.trajectories.time_systems import TimeMatch, lacks_time, match_times
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
-from mlscorr.io.trajectories.trajectory_sessions import (
+from mlscorr.io.clouds import LasLayout, spread_records
+from mlscorr.io.store import PLACE_OF_CRS, OpenPlace, OpenQuestion, places_of
+from mlscorr.io.surveys import FileRole
+from mlscorr.io.trajectories import (
     SessionFile,
     Sessions,
+    TimeMatch,
+    TrajectorySection,
     across_week_end,
     check_systems,
     join_sessions,
+    lacks_time,
+    match_times,
     read_sessions,
+    utm_zone,
 )
 from mlscorr.survey import CloudFile, Pos, Trajectory
 

@@ -11,15 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.store.output import document, output_folder, write_json
-from mlscorr.io.tables.result_tables import write_extracted_csv
+from mlscorr.io.clouds import read_chunks
+from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.io.tables import write_extracted_csv
 from mlscorr.pipeline.beam_origin import with_beam_origin
 from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, silent, unmatched
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Survey, TargetObservations, check_rng, check_survey
-from mlscorr.survey.data_frame import rows_frame
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Summary, Survey, TargetObservations, check_rng, check_survey, rows_frame
 from mlscorr.targets import BY_EDGES, distinct, search_targets, why_useless
 
 if TYPE_CHECKING:
@@ -219,7 +217,7 @@ class ExtractedSurvey(Summary):
         OSError
             When writing fails.
         """
-        from mlscorr.report.target_figures import write_contact_sheet
+        from mlscorr.report import write_contact_sheet
 
         rows = self.targets
         content = document(

@@ -7,27 +7,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_crs import crs_conflict
-from mlscorr.io.store.toml_file import read_toml
-from mlscorr.io.surveys.crs_checks import crs_notes
-from mlscorr.io.surveys.session_points import check_belongings
-from mlscorr.io.surveys.survey_file import cloud_file, stated_pos, survey_toml
-from mlscorr.io.surveys.survey_paths import (
+from mlscorr.io.clouds import crs_conflict, read_layout
+from mlscorr.io.store import read_toml
+from mlscorr.io.surveys import (
+    SurveyFile,
+    check_belongings,
     check_distinct,
     check_sessions,
+    cloud_file,
+    crs_notes,
     given_file,
     matching,
+    mounted_scanners,
     session_file,
+    stated_pos,
+    survey_toml,
 )
-from mlscorr.io.surveys.survey_scanners import mounted_scanners
-from mlscorr.io.surveys.survey_sections import SurveyFile
-from mlscorr.io.tables.control import holds_points, read_control
-from mlscorr.io.tables.control_faults import ListError
-from mlscorr.io.tables.control_lists import AxesError
-from mlscorr.io.tables.nearness import check_together
-from mlscorr.io.trajectories.projection import check_crs
-from mlscorr.io.trajectories.trajectory_sessions import read_sessions
+from mlscorr.io.tables import AxesError, ListError, check_together, holds_points, read_control
+from mlscorr.io.trajectories import check_crs, read_sessions
 from mlscorr.survey import SurveyFileError, Trajectory
 
 Place = Literal["survey.toml", "data", "system"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, read_into, unmatched
 from mlscorr.survey import PointCloud, Survey, TieFeatures
 from mlscorr.targets import NO_POINTS, Candidates, PassTarget, number_passes

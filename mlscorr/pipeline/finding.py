@@ -7,7 +7,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.matching import Matches, match
 from mlscorr.pipeline.near_points import NearPoints, check_control, no_control, nothing_found
 from mlscorr.pipeline.settings import SETTINGS

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.effects import Effect, effect_class, make_effect
-from mlscorr.effects.wording import joined
-from mlscorr.estimate.calibration import sigma_note
-from mlscorr.io.store.identity import FileIdentity
+from mlscorr.effects import Effect, effect_class, joined, make_effect
+from mlscorr.estimate import sigma_note
+from mlscorr.io.store import FileIdentity
 from mlscorr.survey import Survey
 
 CLOCK = "time_offset"

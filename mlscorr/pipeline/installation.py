@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import Summary
 
 PACKAGES = (  # of numbers and points, of maps and texts, of commands and pages
     *("numpy", "scipy", "laspy", "lazrs", "pye57", "open3d", "threadpoolctl", "numba"),

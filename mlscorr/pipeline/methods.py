@@ -70,7 +70,7 @@ def _icp(observed, matched):
     problem = load_open3d()
     if problem is not None:
         raise baselines.Undetermined(problem)
-    from mlscorr.baselines.registration import fit_icp
+    from mlscorr.baselines import fit_icp
 
     candidates = observed.candidates
     registration = fit_icp(matched, candidates.cloud, candidates.pass_number)

@@ -6,12 +6,11 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlscorr.evaluate.beams import BeamCheck
-from mlscorr.io.surveys.project_file import ProjectParts
+from mlscorr.evaluate import BeamCheck
+from mlscorr.io.surveys import ProjectParts
 from mlscorr.pipeline.beam_origin import with_beam_origin
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import CloudFile, PointCloud, Survey, SurveyFileError
-from mlscorr.survey.summary import counted
+from mlscorr.survey import CloudFile, PointCloud, Survey, SurveyFileError, counted
 from mlscorr.targets import BY_EDGES, Candidates, search_radius, why_useless
 
 

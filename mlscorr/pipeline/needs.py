@@ -4,14 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter
 
-from mlscorr.evaluate.beams import BeamCheck
-from mlscorr.io.clouds.conversion import recorded_points
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.settings import SETTINGS as IO
+from mlscorr.evaluate import BeamCheck
+from mlscorr.io import SETTINGS as IO
+from mlscorr.io.clouds import read_chunks, recorded_points
 from mlscorr.pipeline.quick_look import QuickLook
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import CloudFile, PointCloud, Survey
-from mlscorr.survey.summary import counted
+from mlscorr.survey import CloudFile, PointCloud, Survey, counted
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mlscorr.effects import Effect, known_effects
-from mlscorr.effects.labels import lowered, parameter_title, titles
+from mlscorr.effects import Effect, known_effects, lowered, parameter_title, titles
 from mlscorr.estimate import COMPONENTS, PlannedAccuracy, predict_accuracy
-from mlscorr.gap.document import map_document, separability_document
+from mlscorr.gap import map_document, separability_document
 from mlscorr.gap.evidence import Observations, Separability, compare_signatures
 from mlscorr.gap.plan import NextData, event_sizes, next_data, planned_rows
 from mlscorr.gap.residuals import Rows, background
 from mlscorr.gap.signatures import signatures
-from mlscorr.io.store.output import document, output_folder, write_json
-from mlscorr.survey import Matched, Survey, TargetObservations, check_survey
-from mlscorr.survey.data_frame import rows_frame
-from mlscorr.survey.summary import Summary
+from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.survey import Matched, Summary, Survey, TargetObservations, check_survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -189,8 +186,8 @@ class PlannedSurvey(Summary):
         ValueError
             Where there is no such figure, or nothing to show in it.
         """
+        from mlscorr.report import draw
         from mlscorr.report.gap import plan_figures
-        from mlscorr.report.style import draw
 
         return draw(plan_figures(self.document), name)
 

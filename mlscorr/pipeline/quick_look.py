@@ -6,8 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
-from mlscorr.io.clouds.las_windows import read_windows
-from mlscorr.io.tables.nearness import nearest_epochs
+from mlscorr.io.clouds import read_windows
+from mlscorr.io.tables import nearest_epochs
 from mlscorr.pipeline.finding import (
     fit_while_reading,
     match_targets,

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mlscorr.correction import Correction
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.store.output import check_output, document, output_folder
-from mlscorr.io.trajectories.trajectory import read_trajectory
+from mlscorr.evaluate import TargetRow
+from mlscorr.io.store import check_output, document, output_folder
+from mlscorr.io.trajectories import read_trajectory
 from mlscorr.pipeline.correction import correct
 from mlscorr.survey import Survey, check_survey
 

@@ -6,16 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.effects.labels import lowered, title
-from mlscorr.gap.advice import no_cause
+from mlscorr.effects import lowered, title
+from mlscorr.gap import cause_document, no_cause, windows_document
 from mlscorr.gap.closure import LoneEffect, lone_effects
-from mlscorr.gap.document import cause_document, windows_document
 from mlscorr.gap.evidence import Costs
-from mlscorr.io.store.output import document
+from mlscorr.io.store import document
 from mlscorr.pipeline.compared_rows import NEXT_RUN
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.simulate.simulator_file import Simulator
+from mlscorr.simulate import Simulator
 from mlscorr.survey import Survey
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.store.output import check_output, document, output_folder
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.store import check_output, document, output_folder
+from mlscorr.io.surveys import read_survey
 from mlscorr.pipeline.correction import correct
 
 
@@ -31,8 +31,7 @@ def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
     ValueError for a scenario that no survey can have, or a folder that holds an input or, without
     overwrite, anything; OSError when writing fails.
     """
-    from mlscorr.simulate import simulate
-    from mlscorr.simulate.scenario_file import read_scenario, scenario_files
+    from mlscorr.simulate import read_scenario, scenario_files, simulate
 
     scenario = read_scenario(scenario_path)
     check_output(out, [scenario_path, *scenario_files(scenario)], overwrite)

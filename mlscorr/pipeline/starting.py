@@ -14,34 +14,33 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.clouds.conversion import is_foreign, recorded_points
-from mlscorr.io.clouds.copies import find_copies
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.store.open_places import (
+from mlscorr.io.clouds import find_copies, is_foreign, read_chunks, read_layout, recorded_points
+from mlscorr.io.store import (
     PLACE_OF_CRS,
     OpenPlace,
     OpenQuestion,
+    files_like,
+    glance,
+    output_file,
     places_of,
+    validate,
 )
-from mlscorr.io.store.output import output_file
-from mlscorr.io.store.preparation import glance
-from mlscorr.io.store.storage import files_like
-from mlscorr.io.store.toml_file import validate
-from mlscorr.io.surveys.folder_roles import SIMULATED, FileRole, sort_files
-from mlscorr.io.surveys.survey_file import FILE_NAME, read_survey
-from mlscorr.io.surveys.survey_sections import PlannedSurveyFile
-from mlscorr.io.tables.control import holds_points, read_control
-from mlscorr.io.tables.control_lists import AxesError
-from mlscorr.io.tables.table_sections import ControlSection
+from mlscorr.io.surveys import (
+    FILE_NAME,
+    SIMULATED,
+    FileRole,
+    PlannedSurveyFile,
+    read_survey,
+    sort_files,
+)
+from mlscorr.io.tables import AxesError, ControlSection, holds_points, read_control
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pipeline.choice import choose_control, choose_crs
 from mlscorr.pipeline.drives import Cloud, choose_accuracy, choose_trajectory
 from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.survey_text import SurveyText
-from mlscorr.survey import PointCloud, Trajectory
-from mlscorr.survey.summary import counted
+from mlscorr.survey import PointCloud, Trajectory, counted
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 import tomlkit
 
-from mlscorr.io.store.open_places import MARK, OpenPlace
+from mlscorr.io.store import MARK, OpenPlace
 
 COLUMN = 40  # characters, behind which comments start
 HEAD = "# Made by mlscorr init. Lines behind # are not known, or need not be: docs/survey.md."

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mlscorr.evaluate.ties import misfit
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.store.output import document, output_folder, write_json
-from mlscorr.io.tables.result_tables import write_ties_csv
+from mlscorr.evaluate import misfit
+from mlscorr.io.clouds import read_chunks
+from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.io.tables import write_ties_csv
 from mlscorr.pipeline.finding import silent
-from mlscorr.survey import TIE_KINDS, Survey, TieFeatures, check_survey
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import TIE_KINDS, Summary, Survey, TieFeatures, check_survey
 from mlscorr.ties import (
     SETTINGS,
     TieCollector,

@@ -11,6 +11,7 @@ from mlscorr.correction import Correction, PointSigma
 from mlscorr.estimate import (
     Estimate,
     believed_correction,
+    check_order,
     estimate_correction,
     find_mounting_error,
     mounting_warnings,
@@ -18,8 +19,7 @@ from mlscorr.estimate import (
     scanner_warnings,
     with_ties,
 )
-from mlscorr.estimate.inputs import check_order
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.survey import Matched, Survey, TieFeatures, Ties, time_spans
 from mlscorr.ties import (

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.pos.settings import SETTINGS
-from mlscorr.survey import Trajectory
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns, Trajectory
 
 NOWHERE = np.empty(0)  # s
 

@@ -1,1 +1,22 @@
 """The report of a correction: figures and one self-contained page."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "_calibration_page": ["calibration_page", "calibration_screen", "scanners_screen"],
+        "_comparison_screen": ["comparison_screen", "method_warnings"],
+        "cloud": ["view_cloud"],
+        "comparison_page": ["comparison_figure", "write_comparison"],
+        "correction_page": ["write_report"],
+        "correction_report": ["CorrectionReport", "Coverage", "FileRow"],
+        "figures": ["correction_figures", "write_pictures"],
+        "headline": ["RATINGS", "capped", "first_screen", "statements_section"],
+        "project_page": ["write_project"],
+        "_statement": ["Statement"],
+        "style": ["draw"],
+        "target_figures": ["write_contact_sheet"],
+        "tie_words": ["tie_sentences"],
+    },
+)

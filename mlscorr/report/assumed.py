@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from mlscorr.effects.wording import joined, known
-from mlscorr.report.statement import Statement
+from mlscorr.effects import joined, known
+from mlscorr.report._statement import Statement
 from mlscorr.report.tables import length_in_words
-from mlscorr.survey.summary import counted
+from mlscorr.survey import counted
 
 NAMES = {  # of a key of survey.toml
     "pos.position_sigma": "Position of the POS",

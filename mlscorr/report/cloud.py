@@ -10,18 +10,24 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.evaluate import TargetRow
+from mlscorr.io.clouds import read_chunks
 from mlscorr.report import tables
+from mlscorr.report._viewer import viewer_data
 from mlscorr.report.correction_report import ordered
 from mlscorr.report.pages import data_uri
-from mlscorr.report.render import Picture, PictureOptions, draw
-from mlscorr.report.render.quantities import LABELS, colour_table, swatches
-from mlscorr.report.render.section import worst_facades
-from mlscorr.report.render.symbols import MARK
+from mlscorr.report.render import (
+    LABELS,
+    MARK,
+    Picture,
+    PictureOptions,
+    colour_table,
+    draw,
+    swatches,
+    worst_facades,
+)
 from mlscorr.report.sample import gather
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.viewer import viewer_data
 from mlscorr.survey import Survey
 
 Progress = Callable[[str, int], Callable[[int], None]]

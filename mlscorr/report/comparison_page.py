@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from mlscorr.report import style
-from mlscorr.report.comparison_screen import ranking, undetermined
+from mlscorr.report._comparison_screen import ranking, undetermined
 from mlscorr.report.pages import Page, data_uri
 
 SECTIONS = {  # in their order; one without anything to show is left out

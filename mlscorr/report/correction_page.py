@@ -7,17 +7,17 @@ import numpy as np
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
 from mlscorr.report import tables
+from mlscorr.report._provenance import coverage, files, systems
 from mlscorr.report.cloud import CloudViews, cloud_content
 from mlscorr.report.correction_report import GROUPS, CorrectionReport, ordered
 from mlscorr.report.figures import correction_figures
 from mlscorr.report.headline import statements, statements_section
 from mlscorr.report.pages import Page, data_uri, drawn
-from mlscorr.report.provenance import coverage, files, systems
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.target_figures import target_drawings
 from mlscorr.report.tie_words import tie_sentences
 from mlscorr.survey import Survey
-from mlscorr.targets.fit import FittedTarget
+from mlscorr.targets import FittedTarget
 
 SECTIONS = {  # in their order; one without anything to show is left out
     "statistics": "How far off",

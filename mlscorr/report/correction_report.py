@@ -4,11 +4,8 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from mlscorr.estimate import NextControl, Support
-from mlscorr.estimate.jumps import Jump
-from mlscorr.estimate.support import DRIFT, REASONS
-from mlscorr.evaluate.datum import DatumDifference
-from mlscorr.evaluate.rows import PointCounts, Score, Statistics, TargetRow
+from mlscorr.estimate import DRIFT, REASONS, Jump, NextControl, Support
+from mlscorr.evaluate import DatumDifference, PointCounts, Score, Statistics, TargetRow
 from mlscorr.survey import Assumption, PointCloud
 
 GROUPS = ("control", "check", "unused")
@@ -97,7 +94,7 @@ class CorrectionReport:
         One for each surveyed point and pass.
     control, check : Score
     accuracy : dict or None
-        As mlscorr.evaluate.accuracy has it.
+        As mlscorr.evaluate._accuracy has it.
     model : dict
         As mlscorr.evaluate.model.model_section has it.
     coverage : Coverage

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
+from mlscorr.report._residuals import residual_figure
+from mlscorr.report._tie_map import tie_figure
+from mlscorr.report._timeline import attitude_figure, correction_figure
 from mlscorr.report.correction_report import CorrectionReport
-from mlscorr.report.residuals import residual_figure
 from mlscorr.report.style import Figures, png
 from mlscorr.report.target_map import map_figure
-from mlscorr.report.tie_map import tie_figure
-from mlscorr.report.timeline import attitude_figure, correction_figure
 
 
 def correction_figures(

@@ -5,13 +5,13 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from mlscorr.evaluate.rows import SEEN_BY_OTHERS, PointCounts
+from mlscorr.evaluate import SEEN_BY_OTHERS, PointCounts
+from mlscorr.report._statement import RATINGS, Statement
 from mlscorr.report.assumed import assumed_statement
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.statement import RATINGS, Statement
 from mlscorr.report.tables import length_in_words, percent, verdict
-from mlscorr.survey.summary import counted
+from mlscorr.survey import counted
 
 NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.settings import SETTINGS as IO_SETTINGS
+from mlscorr.evaluate import TargetRow
+from mlscorr.io import SETTINGS as IO_SETTINGS
 from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import PointCloud
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from mlscorr.estimate.settings import SETTINGS as ESTIMATE
-from mlscorr.evaluate.rows import Statistics
+from mlscorr.estimate import SETTINGS as ESTIMATE
+from mlscorr.evaluate import Statistics
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
-from mlscorr.survey.summary import counted
+from mlscorr.survey import counted
 
 AXES = ("E", "N", "H")
 QUANTITIES = ("Easting", "Northing", "Height (vertical)", "Horizontal distance", "3D distance")

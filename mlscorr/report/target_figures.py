@@ -9,10 +9,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Ellipse, Patch, Polygon
 from matplotlib.ticker import MaxNLocator
 
-from mlscorr.evaluate.rows import TargetRow
+from mlscorr.evaluate import TargetRow
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import BLUE, MARKS, STYLE, VERMILLION, label, png, styled
-from mlscorr.targets.fit import FittedTarget
+from mlscorr.targets import FittedTarget
 
 BEAMS = ("dark", "bright", "went by")  # 0, 1 and -1 in a TargetView, and so counted as here
 

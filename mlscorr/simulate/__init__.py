@@ -1,19 +1,17 @@
 """Simulated surveys: a street, a drive, scanners, a POS, and their errors."""
 
-from importlib import import_module
+import lazy_loader
 
-from mlscorr.simulate.scenario import DEMO, Scenario
-
-__all__ = ["DEMO", "Scenario", "SimulatedSurvey", "read_scenario", "simulate"]
-_HOMES = {
-    "SimulatedSurvey": "mlscorr.simulate.survey",
-    "read_scenario": "mlscorr.simulate.scenario_file",
-    "simulate": "mlscorr.simulate.survey",
-}
-
-
-def __getattr__(name):
-    """Load what is asked for, and the libraries it needs, only then."""
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'mlscorr.simulate' has no attribute '{name}'")
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "_mechanisms": ["Described", "Mechanism", "described", "load_mechanisms", "mechanisms"],
+        "_random_survey": ["random_survey"],
+        "displacement": ["DisplacedSurvey", "RecordedPoints"],
+        "scenario": ["DEMO", "Scenario", "SceneScenario"],
+        "scenario_file": ["read_scenario", "scenario_files"],
+        "settings": ["SETTINGS"],
+        "simulator_file": ["Simulator", "beliefs_of", "read_simulator", "write_simulator"],
+        "survey": ["SimulatedSurvey", "simulate"],
+    },
+)

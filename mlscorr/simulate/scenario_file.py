@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from mlscorr.io.store.toml_file import read_toml
-from mlscorr.io.trajectories.projection import check_crs
+from mlscorr.io.store import read_toml
+from mlscorr.io.trajectories import check_crs
 from mlscorr.simulate.scenario import Scenario
 
 FILES = (("scene", "file"), ("drive", "file"), ("pos", "error_file"))  # that a scenario may name

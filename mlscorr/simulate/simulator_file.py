@@ -11,8 +11,8 @@ from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
 from mlscorr.effects import Effect, in_order
-from mlscorr.io.store.toml_file import Positive, TomlSection, read_toml
-from mlscorr.io.surveys.survey_sections import MountingSection, PosSection, ScannerSection
+from mlscorr.io.store import Positive, TomlSection, read_toml
+from mlscorr.io.surveys import MountingSection, PosSection, ScannerSection
 from mlscorr.simulate.scenario import EffectScenario
 from mlscorr.survey import Mounting, Pos, Scanner, Survey
 

@@ -10,14 +10,13 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.effects import Reference, apply_effects, effect_streams
-from mlscorr.io.trajectories.projection import check_crs
+from mlscorr.io.trajectories import check_crs
 from mlscorr.simulate import recording
 from mlscorr.simulate.drive import drive
 from mlscorr.simulate.scan import MeasuredPulses, Platform, Surfaces, pulses_of_a_pass, shoot
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene import Mesh, Scene, build_scene, static_scan
-from mlscorr.survey import ControlPoints, Mounting, PointCloud, Trajectory, check_rng
-from mlscorr.survey.summary import Summary
+from mlscorr.survey import ControlPoints, Mounting, PointCloud, Summary, Trajectory, check_rng
 
 STREAMS = 7  # drive, scene, scan, POS, control, effects, reference: each leaves all others
 

@@ -12,11 +12,9 @@ import numpy as np
 import tomlkit
 
 from mlscorr.frames import angles_from_attitude
-from mlscorr.io.clouds.las_writer import cloud_writer
-from mlscorr.io.clouds.ply import write_ply
-from mlscorr.io.store.npz import NpzWriter
-from mlscorr.io.store.output import output_folder
-from mlscorr.io.trajectories.trajectory import write_trajectory_csv
+from mlscorr.io.clouds import cloud_writer, write_ply
+from mlscorr.io.store import NpzWriter, output_folder
+from mlscorr.io.trajectories import write_trajectory_csv
 from mlscorr.simulate.survey import SimulatedSurvey
 from mlscorr.survey import Pos
 

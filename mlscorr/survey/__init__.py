@@ -4,7 +4,9 @@ float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forwar
 """
 
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Assumption, Pos, Scanner
-from mlscorr.survey.clouds import NOISE_CLASSES, CloudFile, Correcting, PointCloud
+from mlscorr.survey.clouds import NOISE_CLASSES, WEEK, CloudFile, Correcting, PointCloud, counted_on
+from mlscorr.survey.columns import Columns
+from mlscorr.survey.data_frame import AXES, rows_frame
 from mlscorr.survey.recording import (
     InputFile,
     MountedScanner,
@@ -13,6 +15,7 @@ from mlscorr.survey.recording import (
     check_rng,
     check_survey,
 )
+from mlscorr.survey.summary import Summary, counted
 from mlscorr.survey.targets import KINDS, ControlPoints, Matched, TargetObservations
-from mlscorr.survey.ties import PAINTED, TIE_KINDS, TieFeatures, Ties, time_spans
+from mlscorr.survey.ties import PAINTED, PAUSE, TIE_KINDS, TieFeatures, Ties, time_spans
 from mlscorr.survey.trajectory import GAP_FACTOR, SAME_EPOCH, Mounting, Trajectory, control_epochs

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from mlscorr.io.settings import SETTINGS as IO
+from mlscorr.io import SETTINGS as IO
 
 
 class Neighbourhoods:

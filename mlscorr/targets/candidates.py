@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mlscorr.io.settings import SETTINGS as IO
+from mlscorr.io import SETTINGS as IO
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import ControlPoints, PointCloud, Survey
 from mlscorr.targets.balls import Neighbourhoods

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.survey import PointCloud, Survey, TargetObservations
+from mlscorr.targets._visits import motion_covariance, split_visits
 from mlscorr.targets.balls import Neighbourhoods
 from mlscorr.targets.candidates import search_radius
 from mlscorr.targets.fit import FittedTarget, fit_targets
@@ -13,7 +14,6 @@ from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.search import fit_piece, pieces
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import BY_EDGES
-from mlscorr.targets.visits import motion_covariance, split_visits
 
 PassTarget = tuple[int, FittedTarget]  # number of a pass, or of its segment, and a target of it
 

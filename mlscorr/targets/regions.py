@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mlscorr.targets.clusters import OCTAVE, root_of
-from mlscorr.targets.jaccard import jaccard_index
+from mlscorr.targets._clusters import OCTAVE, root_of
+from mlscorr.targets._jaccard import jaccard_index
+from mlscorr.targets._voxels import key_of, neighbours, number_voxels, sort_by_voxel
 from mlscorr.targets.settings import SETTINGS
-from mlscorr.targets.voxels import key_of, neighbours, number_voxels, sort_by_voxel
 
 LEVELS = OCTAVE * np.iinfo(np.uint16).bits
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import PointCloud, Scanner, Survey
+from mlscorr.targets._visits import split_visits
 from mlscorr.targets.balls import Neighbourhoods
 from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
 from mlscorr.targets.regions import BrightRegion, bright_regions
 from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.settings import SETTINGS
-from mlscorr.targets.visits import split_visits
 
 
 def search_targets(

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures, Trajectory
-from mlscorr.ties.cells import CellTable
-from mlscorr.ties.markings import find_markings, window_of
-from mlscorr.ties.paint import Crossings, find_crossings
+from mlscorr.ties._cells import CellTable
+from mlscorr.ties._markings import find_markings, window_of
+from mlscorr.ties._paint import Crossings, find_crossings
+from mlscorr.ties._shapes import find_shapes
 from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.shapes import find_shapes
 from mlscorr.ties.thinning import thin
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.survey import PAINTED, TIE_KINDS, TieFeatures, Ties
-from mlscorr.ties.candidates import candidate_pairs, visit_number
+from mlscorr.ties._candidates import candidate_pairs, visit_number
 from mlscorr.ties.settings import SETTINGS
 from mlscorr.ties.thinning import direction_class, integer_hash, kind_number
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Survey, TieFeatures, Ties, time_spans
+from mlscorr.ties._candidates import visit_number
 from mlscorr.ties.agreement import NORMAL_SCATTER, consistent_ties, residuals, weigh_by_time
-from mlscorr.ties.candidates import visit_number
 from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.pairing import pair_features
 from mlscorr.ties.settings import SETTINGS

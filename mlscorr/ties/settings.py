@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mlscorr.survey.ties import PAUSE
+from mlscorr.survey import PAUSE
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.baselines import Undetermined
-from mlscorr.baselines.registration import fit_icp
-from mlscorr.evaluate.scores import misclosures
+from mlscorr.baselines import Undetermined, fit_icp
+from mlscorr.evaluate import misclosures
 from mlscorr.survey import PointCloud
 from tests.beds.streets import SHIFT, START, TIME, observed, on_a_line, targets
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mlscorr.baselines.settings import SETTINGS
-from mlscorr.estimate.settings import SETTINGS as ESTIMATE
+from mlscorr.baselines._settings import SETTINGS
+from mlscorr.estimate import SETTINGS as ESTIMATE
 
 
 def test_distances_are_in_their_order():

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.baselines import RAW, fit_affine, fit_horizontal_and_height, fit_rigid, fit_shift
 from mlscorr.estimate import estimate_correction
-from mlscorr.evaluate.scores import misclosures
+from mlscorr.evaluate import misclosures
 from mlscorr.survey import PointCloud
 from tests.beds.streets import SHIFT, SIGMA, START, observed, on_a_line, targets, trajectory
 

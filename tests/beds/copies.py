@@ -1,6 +1,6 @@
 """Corrected copies of one cloud file."""
 
-from mlscorr.io.clouds.las_copy import CorrectedPart, write_parts
+from mlscorr.io.clouds import CorrectedPart, write_parts
 
 
 def write_corrected(cloud_file, target, correction, watch=None, sigma=None):

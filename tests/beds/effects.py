@@ -9,7 +9,7 @@ from mlscorr.effects import (
     Returns,
     make_effect,
 )
-from mlscorr.effects.settings import SETTINGS
+from mlscorr.effects._settings import SETTINGS
 from mlscorr.frames import attitude_from_angles, georeference
 from mlscorr.survey import ControlPoints, Mounting, Trajectory
 

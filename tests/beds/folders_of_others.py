@@ -20,8 +20,7 @@ from openpyxl import Workbook
 
 import mlscorr
 from mlscorr.frames import angles_from_attitude
-from mlscorr.io.trajectories.trajectory import read_trajectory, write_trajectory_csv
-from mlscorr.io.trajectories.trajectory_exports import export_trajectory
+from mlscorr.io.trajectories import export_trajectory, read_trajectory, write_trajectory_csv
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import Trajectory
 from tests.beds.checked import verdicts

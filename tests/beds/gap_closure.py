@@ -7,15 +7,11 @@ import numpy as np
 from gap_mechanisms import ACTUAL
 from gap_training import features
 
-from mlscorr.gap.closure.closure import close_gap
+from mlscorr.gap.closure import FoundCause, close_gap
 from mlscorr.gap.closure.folds import make_folds, predict_whole
-from mlscorr.gap.closure.found_cause import FoundCause
-from mlscorr.gap.evidence.causes import cause_of
-from mlscorr.gap.evidence.labels import weigh_labels
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.residuals.rows import background
-from mlscorr.gap.signatures.expectation import expected
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.evidence import Observations, cause_of, weigh_labels
+from mlscorr.gap.residuals import background
+from mlscorr.gap.signatures import expected, signatures
 from tests.beds.gap_inference import surveyed
 
 

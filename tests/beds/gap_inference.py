@@ -5,12 +5,11 @@ from dataclasses import replace
 import gap_study
 import numpy as np
 
-from mlscorr.collocation.covariance import Covariance
+from mlscorr.collocation import Covariance
+from mlscorr.gap.evidence import SETTINGS, weigh_labels
+from mlscorr.gap.evidence._verdict import decide, joint_score
 from mlscorr.gap.evidence.decision import learned
-from mlscorr.gap.evidence.labels import weigh_labels
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.evidence.verdict import decide, joint_score
-from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.signatures import Bench
 
 
 def surveyed(g, seed, *effects, kind="sines", outside=None):

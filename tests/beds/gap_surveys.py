@@ -4,12 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.gap.closure.beams import collect_beams
-from mlscorr.gap.closure.surroundings import Surroundings
-from mlscorr.gap.residuals.pairing import build_rows
-from mlscorr.gap.residuals.patch_search import PatchCollector
-from mlscorr.gap.residuals.patches import Patches
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.gap.closure import Surroundings, collect_beams
+from mlscorr.gap.residuals import PatchCollector, Patches, build_rows
+from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces
 
 

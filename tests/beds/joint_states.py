@@ -5,10 +5,9 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag, expm, solve_continuous_lyapunov
 
-from mlscorr.collocation import Signal
-from mlscorr.collocation.covariance import FAMILIES, INTEGRATED, Covariance
-from mlscorr.collocation.recursion import Recursion, filter_covariance
-from mlscorr.collocation.states import Layout
+from mlscorr.collocation import FAMILIES, INTEGRATED, Covariance, Signal
+from mlscorr.collocation._recursion import Recursion, filter_covariance
+from mlscorr.collocation._states import Layout
 
 START = 413_200.0  # s of week
 ALL_FAMILIES = (*FAMILIES, INTEGRATED)

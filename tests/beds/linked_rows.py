@@ -5,8 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mlscorr.collocation import Noise, Signal, SparseRows
-from mlscorr.collocation.covariance import INTEGRATED, Covariance
+from mlscorr.collocation import INTEGRATED, Covariance, Noise, Signal, SparseRows
 
 START = 413_200.0  # s of week
 LENGTH = 300.0  # s of both passes

@@ -3,7 +3,7 @@
 import laspy
 import numpy as np
 
-from mlscorr.io.tables.control import read_control
+from mlscorr.io.tables import read_control
 
 EACH = 800  # points about a target
 SCATTER = 0.25  # m

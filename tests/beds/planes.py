@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.targets.plane import Plane
+from mlscorr.targets._plane import Plane
 
 
 def plane_through(origin, normal):

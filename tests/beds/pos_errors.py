@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.assembly import position_equations
-from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate import estimate_correction, position_equations, position_prior
 from mlscorr.frames import attitude_from_angles
 from mlscorr.survey import Matched, Pos, Trajectory
 from tests.beds.discs import observed_discs, surveyed_discs

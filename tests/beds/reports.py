@@ -8,12 +8,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction
-from mlscorr.estimate import Support, WeakStretch
-from mlscorr.estimate.support import REASONS
-from mlscorr.evaluate.rows import Score, Statistics, TargetRow
+from mlscorr.estimate import REASONS, Support, WeakStretch
+from mlscorr.evaluate import Score, Statistics, TargetRow
 from mlscorr.frames import attitude_from_angles
+from mlscorr.report import CorrectionReport, Coverage, FileRow
 from mlscorr.report.correction_page import write_report
-from mlscorr.report.correction_report import CorrectionReport, Coverage, FileRow, array
+from mlscorr.report.correction_report import array
 from mlscorr.survey import CloudFile, ControlPoints, Survey, Trajectory
 
 START = 357881.0  # s, GPS week seconds

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction
-from mlscorr.evaluate.rows import TargetRow
+from mlscorr.evaluate import TargetRow
 from mlscorr.survey import PointCloud, Trajectory
 
 ORIGIN = np.array([532000.0, 3374000.0, 42.0])  # m

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 from target_rays import ORIGIN, TARGETS, view
 
-from mlscorr.targets.echoes import Echoes
-from mlscorr.targets.scanner_path import ScannerPath
+from mlscorr.targets import ScannerPath
+from mlscorr.targets._echoes import Echoes
 
 SIZE = 0.6  # m
 TOLERANCE = 0.03  # m

@@ -6,7 +6,7 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
-from mlscorr.evaluate.ties import misfit_section
+from mlscorr.evaluate import misfit_section
 from mlscorr.survey import Trajectory
 from tests.beds.reports import fabricate
 from tests.beds.tied_passes import tied_passes

@@ -6,10 +6,9 @@ import numpy as np
 
 import mlscorr
 from mlscorr.gap.contrast import SampleCollector
-from mlscorr.gap.residuals import PatchCollector
-from mlscorr.gap.residuals.covariates import scanner_origin
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.surveys.simulated_clouds import simulated_survey
+from mlscorr.gap.residuals import PatchCollector, scanner_origin
+from mlscorr.io.clouds import read_chunks
+from mlscorr.io.surveys import simulated_survey
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.simulate.recording import (
     recorded_passes,

@@ -5,8 +5,9 @@ import re
 
 import pytest
 
-from mlscorr.blind.grading import grading_mechanisms
-from mlscorr.simulate.mechanisms import mechanisms, training_mechanisms
+from mlscorr.blind._grading import grading_mechanisms
+from mlscorr.simulate import mechanisms
+from mlscorr.simulate._mechanisms import training_mechanisms
 from tests.beds.places import ROOT
 
 FOLDERS = (
@@ -59,18 +60,18 @@ def test_no_study_opens_the_grading_half(path):
 
 
 @pytest.mark.parametrize("text", [
-    "from mlscorr.blind.grading import grading_mechanisms",
+    "from mlscorr.blind._grading import grading_mechanisms",
     "from mlscorr.blind.cases import outside_mechanisms",
     "from mlscorr.blind import cases",
     "from mlscorr import blind",
     "import mlscorr.blind.cases as cases",
     "from mlscorr.pipeline.blind import make_cases",
-    "from mlscorr.simulate.mechanisms import mechanisms",
+    "from mlscorr.simulate._mechanisms import mechanisms",
     "from mlscorr.simulate import mechanisms as every",
-    "import mlscorr.simulate.mechanisms as all_of_them",
+    "import mlscorr.simulate._mechanisms as all_of_them",
     "half = [each for each in known if not each.is_for_training]",
     "half = getattr(each, 'is_for_training')",
-    "importlib.import_module('mlscorr.blind.grading')",
+    "importlib.import_module('mlscorr.blind._grading')",
 ])  # fmt: skip
 def test_every_way_to_the_grading_half_is_seen(text):
     "By its own name, through cases of the blind check, by the whole grammar, or by a text"
@@ -79,5 +80,5 @@ def test_every_way_to_the_grading_half_is_seen(text):
 
 def test_the_training_half_is_open_to_all():
     "What trains may be imported by its name, and a command may be spoken of"
-    assert not opened("from mlscorr.simulate.mechanisms import training_mechanisms, described")
+    assert not opened("from mlscorr.simulate._mechanisms import training_mechanisms, described")
     assert not opened("'as `mlscorr blind score` has written'")

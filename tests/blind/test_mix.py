@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.blind.mix import causes, mix
-from mlscorr.blind.settings import SETTINGS
+from mlscorr.blind import mix
+from mlscorr.blind._mix import causes
+from mlscorr.blind._settings import SETTINGS
 from mlscorr.effects import catalogue, register
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
 from tests.beds.own_effects import Squat

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.blind.scoring import score
+from mlscorr.blind import score
 from tests.beds.places import BENCHMARKS
 
 

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from mlscorr.cli import app
 from mlscorr.cli.work import work
-from mlscorr.io.store.output import output_folder
+from mlscorr.io.store import output_folder
 from tests.beds.documents import undocumented
 from tests.beds.places import MLSCORR, ROOT
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation.block_cholesky import factorise, invert_in_place, solve_in_place
-from mlscorr.collocation.pattern import Pattern, diagonal, locate
+from mlscorr.collocation._block_cholesky import factorise, invert_in_place, solve_in_place
+from mlscorr.collocation._pattern import Pattern, diagonal, locate
 from tests.collocation.test_pattern import places, random_graph
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Noise, Signal, collocate
-from mlscorr.collocation.covariance import Covariance
+from mlscorr.collocation import Covariance, Noise, Signal, collocate
 from tests.beds.dense import collocate_dense
 
 START = 413200.0  # s

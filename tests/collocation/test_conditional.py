@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Signal
-from mlscorr.collocation.conditional import (
+from mlscorr.collocation import Covariance, Signal
+from mlscorr.collocation._conditional import (
     Epochs,
     _invert,
     fill_gains,
@@ -12,8 +12,7 @@ from mlscorr.collocation.conditional import (
     neighbours,
     predict_between,
 )
-from mlscorr.collocation.covariance import Covariance
-from mlscorr.collocation.states import Layout, fill_noise
+from mlscorr.collocation._states import Layout, fill_noise
 from tests.beds.joint_states import ALL_FAMILIES, carried, stationary
 
 

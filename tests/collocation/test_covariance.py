@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from sklearn.gaussian_process.kernels import Matern
 
-from mlscorr.collocation.covariance import FAMILIES, Covariance, process_noise, transition
+from mlscorr.collocation import FAMILIES, Covariance
+from mlscorr.collocation.covariance import process_noise, transition
 
 START = 413_200.0  # s of week
 SMOOTHNESS = {"exponential": 0.5, "matern32": 1.5, "matern52": 2.5}

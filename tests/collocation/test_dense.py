@@ -5,13 +5,15 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from mlscorr.collocation import (
+    FAMILIES,
+    INTEGRATED,
+    Covariance,
     Noise,
     Signal,
     SparseRows,
     collocate_rows_dense,
     covariance_given,
 )
-from mlscorr.collocation.covariance import FAMILIES, INTEGRATED, Covariance
 from tests.beds.dense import collocate_correlated
 from tests.beds.linked_rows import Street
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Noise, Signal, SparseRows, collocate, collocate_rows
-from mlscorr.collocation.covariance import Covariance
+from mlscorr.collocation import Covariance, Noise, Signal, SparseRows, collocate, collocate_rows
 from tests.beds.joint_states import ALL_FAMILIES
 from tests.beds.linked_rows import LENGTH, START, Street
 

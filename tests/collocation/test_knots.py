@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Signal
-from mlscorr.collocation.block_cholesky import factorise, solve_in_place
-from mlscorr.collocation.covariance import Covariance
-from mlscorr.collocation.knots import (
+from mlscorr.collocation import Covariance, Signal
+from mlscorr.collocation._block_cholesky import factorise, solve_in_place
+from mlscorr.collocation._knots import (
     SHARE,
     Knots,
     add_prior,
@@ -15,8 +14,8 @@ from mlscorr.collocation.knots import (
     prior_roots,
     thinned,
 )
-from mlscorr.collocation.pattern import Pattern, diagonal
-from mlscorr.collocation.states import Layout
+from mlscorr.collocation._pattern import Pattern, diagonal
+from mlscorr.collocation._states import Layout
 from tests.beds.joint_states import ALL_FAMILIES, START, carried, stationary
 
 

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation import LiteralSignal, Noise, collocate_literal
-from mlscorr.collocation.covariance import Covariance
+from mlscorr.collocation import Covariance, LiteralSignal, Noise, collocate_literal
 
 START = 413_200.0  # s of week
 SPAN = 186.0  # s, as the paper's first experiment

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Noise, Signal, collocate
-from mlscorr.collocation.covariance import FAMILIES, Covariance
+from mlscorr.collocation import FAMILIES, Covariance, Noise, Signal, collocate
 from tests.beds.dense import collocate_dense
 
 START = 413_200.0  # s of week

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.collocation.matrices import (
+from mlscorr.collocation._matrices import (
     make_symmetric,
     multiply,
     multiply_transposed,

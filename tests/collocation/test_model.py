@@ -6,6 +6,7 @@ from scipy.linalg import lstsq
 from scipy.stats import multivariate_normal
 
 from mlscorr.collocation import (
+    Covariance,
     Noise,
     Signal,
     SparseRows,
@@ -13,7 +14,6 @@ from mlscorr.collocation import (
     collocate_rows,
     collocate_rows_dense,
 )
-from mlscorr.collocation.covariance import Covariance
 from mlscorr.collocation.model import signal_clocks, solve_trend
 from tests.beds.dense import collocate_dense
 from tests.beds.shared_noise import noise_of, written_out

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation.pattern import Pattern, diagonal, locate, panel_width
+from mlscorr.collocation._pattern import Pattern, diagonal, locate, panel_width
 
 
 def random_graph(seed, count=25):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from mlscorr.collocation.recursion import (
+from mlscorr.collocation._recursion import (
     filter_columns,
     filter_covariance,
     precision_between,

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation.graph import information_edges
-from mlscorr.collocation.pattern import Pattern
-from mlscorr.collocation.row_loops import (
+from mlscorr.collocation._graph import information_edges
+from mlscorr.collocation._pattern import Pattern
+from mlscorr.collocation._row_loops import (
     add_information,
     observe,
     row_covariances,

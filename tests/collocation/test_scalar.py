@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation.recursion import Recursion, filter_columns
-from mlscorr.collocation.scalar import common_innovations, whiten_columns
+from mlscorr.collocation._recursion import Recursion, filter_columns
+from mlscorr.collocation._scalar import common_innovations, whiten_columns
 from tests.beds.joint_states import Bed
 
 

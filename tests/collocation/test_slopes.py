@@ -5,8 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Signal, collocate_rows_dense, likelihood_changes
-from mlscorr.collocation.covariance import FAMILIES, INTEGRATED, Covariance
+from mlscorr.collocation import (
+    FAMILIES,
+    INTEGRATED,
+    Covariance,
+    Signal,
+    collocate_rows_dense,
+    likelihood_changes,
+)
 from tests.beds.linked_rows import Street
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation.knots import Knots, knot_step
+from mlscorr.collocation._knots import Knots, knot_step
+from mlscorr.collocation._states import Layout
 from mlscorr.collocation.sparse_rows import Sides
-from mlscorr.collocation.states import Layout
 from tests.beds.joint_states import ALL_FAMILIES
 from tests.beds.linked_rows import Street
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from mlscorr.collocation import Signal
-from mlscorr.collocation.covariance import Covariance
-from mlscorr.collocation.states import (
+from mlscorr.collocation import Covariance, Signal
+from mlscorr.collocation._states import (
     Layout,
     add_blocks,
     carry,

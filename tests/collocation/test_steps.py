@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mlscorr.collocation import Noise, collocate_rows
-from mlscorr.collocation.knots import knot_step
-from mlscorr.collocation.steps import LARGEST_SHARE, sufficient_steps
-from mlscorr.estimate.settings import SETTINGS
+from mlscorr.collocation._knots import knot_step
+from mlscorr.collocation._steps import LARGEST_SHARE, sufficient_steps
+from mlscorr.estimate import SETTINGS
 from tests.beds.joint_states import ALL_FAMILIES
 from tests.beds.linked_rows import Street
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation.trend import polynomial_design
+from mlscorr.collocation import polynomial_design
 
 START = 413_200.0  # s of week
 SPAN = START + 3.0, START + 103.0

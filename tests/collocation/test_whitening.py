@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Signal, factor
-from mlscorr.collocation.covariance import FAMILIES, Covariance
+from mlscorr.collocation import FAMILIES, Covariance, Signal, factor
 
 START = 413_200.0  # s of week
 N, SHARED = 90, 4

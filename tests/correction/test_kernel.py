@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.correction.kernel import fill_increments, locate, move_integers
+from mlscorr.correction._kernel import fill_increments, locate, move_integers
 
 START = 413_200.0  # s of week
 EPOCHS = START + np.arange(200) * 0.005

@@ -2,8 +2,7 @@
 
 import pytest
 
-from mlscorr.effects import known_effects
-from mlscorr.effects.labels import family, lowered, meaning, parameter_title, title, titles
+from mlscorr.effects import family, known_effects, lowered, meaning, parameter_title, title, titles
 
 NAMES = [kind.name for kind in known_effects()]
 

@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 
 from mlscorr.cli import app
 from mlscorr.effects import catalogue, effect_class, register_file
-from mlscorr.gap.signatures.expectation import expected
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.signatures import expected, signatures
 
 CLASS = """
 from dataclasses import dataclass

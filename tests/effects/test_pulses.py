@@ -8,7 +8,7 @@ from mlscorr.effects import (
     Returns,
     make_effect,
 )
-from mlscorr.effects.pulses import pulse_number
+from mlscorr.effects._pulses import pulse_number
 from tests.beds.effects import (
     REFERENCE,
     RETURNS,

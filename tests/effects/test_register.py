@@ -17,11 +17,10 @@ from mlscorr.effects import (
     make_effect,
     register,
 )
-from mlscorr.gap.plan.planned_rows import planned_rows
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.plan import planned_rows
+from mlscorr.gap.signatures import signatures
 from mlscorr.report.gap import diagnosis_page, plan_page
-from mlscorr.simulate import Scenario, simulate
-from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator
+from mlscorr.simulate import Scenario, beliefs_of, read_simulator, simulate, write_simulator
 from tests.beds.documents import undocumented
 from tests.beds.gap_documents import gap_document, parameter
 from tests.beds.own_effects import Rattle, Squat

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from mlscorr.effects.settings import SETTINGS
+from mlscorr.effects._settings import SETTINGS
 
 
 def test_a_grazing_footprint_is_ten_times_as_long_as_wide():

@@ -2,8 +2,7 @@
 
 import pytest
 
-from mlscorr.effects import EFFECTS, SizeEstimate, effect_class
-from mlscorr.effects.wording import size
+from mlscorr.effects import EFFECTS, SizeEstimate, effect_class, size
 
 
 @pytest.mark.parametrize("kind", EFFECTS, ids=lambda kind: kind.name)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from mlscorr.estimate.posterior import Objective, choose_parameters
+from mlscorr.estimate import Objective
+from mlscorr.estimate.posterior import choose_parameters
 from tests.beds.pos_errors import smooth_case
 
 

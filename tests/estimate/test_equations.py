@@ -7,12 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.collocation import SparseRows, collocate_rows, collocate_rows_dense
-from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
-from mlscorr.collocation.trend import polynomial_design
-from mlscorr.estimate import estimate_correction, with_ties
+from mlscorr.collocation import (
+    FAMILIES,
+    INTEGRATED,
+    SparseRows,
+    collocate_rows,
+    collocate_rows_dense,
+    polynomial_design,
+)
+from mlscorr.estimate import Objective, estimate_correction, with_ties
 from mlscorr.estimate.assembly import with_fallbacks
-from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.signals import drift_alone, pose_signals
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps

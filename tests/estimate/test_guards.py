@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from mlscorr.estimate import estimate_correction, with_ties
+from mlscorr.estimate import Objective, estimate_correction, guards_of, with_ties
 from mlscorr.estimate.guards import (
     GlobalTest,
     Guards,
@@ -15,10 +15,9 @@ from mlscorr.estimate.guards import (
     find_guards,
     global_test_warnings,
     guard_warnings,
-    guards_of,
     sparse_warnings,
 )
-from mlscorr.estimate.posterior import Objective, choose_parameters
+from mlscorr.estimate.posterior import choose_parameters
 from mlscorr.survey import Trajectory
 from tests.beds.pos_errors import CONSTANT, EPOCHS, START, Case, even, smooth_case, waves
 from tests.beds.tied_passes import LENGTH, tied_passes

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.inputs import checked_inputs
+from mlscorr.estimate import checked_inputs, estimate_correction
 from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, START, Case, even, rms, smooth_case
 

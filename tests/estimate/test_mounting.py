@@ -17,7 +17,7 @@ import mlscorr
 from mlscorr.effects import make_effect
 from mlscorr.estimate import believed_mounting, estimate_mounting, mounting
 from mlscorr.estimate.mounting import prior_sigma
-from mlscorr.evaluate.scores import misclosures
+from mlscorr.evaluate import misclosures
 from mlscorr.frames import (
     attitude_from_angles,
     georeference,
@@ -25,7 +25,7 @@ from mlscorr.frames import (
     mounting_partials,
     to_scanner,
 )
-from mlscorr.io.surveys.survey_copy import mounting_values, write_survey_copy
+from mlscorr.io.surveys import mounting_values, write_survey_copy
 from mlscorr.io.surveys.survey_file import read_survey_file
 from mlscorr.io.surveys.survey_sections import CalibratedMountingSection
 from mlscorr.pipeline.calibration import warn_of_scanners

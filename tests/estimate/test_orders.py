@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from mlscorr.collocation.trend import polynomial_design
+from mlscorr.collocation import polynomial_design
+from mlscorr.estimate import Objective
 from mlscorr.estimate.orders import affordable_order, compare_orders, leave_targets_out
-from mlscorr.estimate.posterior import Objective, most_probable
+from mlscorr.estimate.posterior import most_probable
 from mlscorr.estimate.signals import pose_signals
-from mlscorr.evaluate.model import model_section
+from mlscorr.evaluate import model_section
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, smooth_case
 
 

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from mlscorr.baselines import fit_linear
-from mlscorr.estimate import estimate_correction, with_ties
-from mlscorr.estimate.assembly import position_equations, with_fallbacks
-from mlscorr.estimate.outages import with_drift_history
-from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate import (
+    estimate_correction,
+    position_equations,
+    position_prior,
+    with_drift_history,
+    with_ties,
+)
+from mlscorr.estimate.assembly import with_fallbacks
 from mlscorr.pos import Steps
 from mlscorr.survey import Matched, Pos, Ties, Trajectory
 from tests.beds.lying_pos import START, TIME, survey, walk

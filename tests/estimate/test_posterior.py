@@ -7,18 +7,17 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
-from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.assembly import position_equations
-from mlscorr.estimate.posterior import (
-    IMPROBABLE,
+from mlscorr.collocation import FAMILIES, INTEGRATED
+from mlscorr.estimate import (
+    SETTINGS,
     Objective,
-    choose_parameters,
-    most_probable,
+    estimate_correction,
+    position_equations,
+    position_prior,
 )
-from mlscorr.estimate.prior import NAMES, Prior, mounting_prior, position_prior
-from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate.posterior import IMPROBABLE, choose_parameters, most_probable
+from mlscorr.estimate.prior import NAMES, Prior, mounting_prior
 from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, smooth_case
 from tests.beds.tied_passes import tied_passes

@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate.assembly import position_equations
-from mlscorr.estimate.outages import with_drift_history
-from mlscorr.estimate.posterior import Posterior, choose_parameters
-from mlscorr.estimate.prediction import (
+from mlscorr.estimate import SETTINGS, position_equations, position_prior, with_drift_history
+from mlscorr.estimate._prediction import (
     GridPredictions,
     bridge_steps,
     predict_pose_error,
     predict_under,
 )
-from mlscorr.estimate.prior import position_prior
-from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.posterior import Posterior, choose_parameters
 from mlscorr.estimate.target_tests import all_tests
 from mlscorr.pos import find_steps
 from mlscorr.survey import Matched, Pos, Trajectory

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate.assembly import position_equations
+from mlscorr.estimate import position_equations, position_prior
 from mlscorr.estimate.equations import NO_TREND
-from mlscorr.estimate.prior import NAMES, SPLIT, mounting_prior, position_prior
+from mlscorr.estimate.prior import NAMES, SPLIT, mounting_prior
 from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, outage_case
 

@@ -5,11 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate.assembly import position_equations
-from mlscorr.estimate.posterior import Objective
-from mlscorr.estimate.prior import position_prior
-from mlscorr.estimate.refusals import drift_odds
-from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate import SETTINGS, Objective, position_equations, position_prior
+from mlscorr.estimate._refusals import drift_odds
 from mlscorr.survey import Matched, Pos
 from tests.beds.pos_errors import EPOCHS, Case, even, rms, waves
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.runs import DriftWindow, with_windows
+from mlscorr.estimate._runs import DriftWindow, with_windows
 from mlscorr.survey import Matched, Trajectory
 from tests.beds.discs import observed_discs
 from tests.beds.pos_errors import EPOCHS, NOISE, START, Case, even, outage, rms

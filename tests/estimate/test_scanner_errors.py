@@ -5,8 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate import calibration_with_ties, estimate_mounting, with_scanner_errors
-from mlscorr.estimate.mounting import believed_mounting
+from mlscorr.estimate import (
+    believed_mounting,
+    calibration_with_ties,
+    estimate_mounting,
+    with_scanner_errors,
+)
 from mlscorr.frames import georeference, scanner_partials, to_scanner
 from tests.beds.tied_site import RECORDED, tied_site
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.posterior import Objective, Posterior
-from mlscorr.estimate.screening import _doubtful_pairs
+from mlscorr.estimate import Objective, estimate_correction
+from mlscorr.estimate._screening import _doubtful_pairs
+from mlscorr.estimate.posterior import Posterior
 from mlscorr.survey import Matched
 from tests.beds import lying_pos
 from tests.beds.pos_errors import (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate import SETTINGS
 
 
 def test_what_is_detectable_is_baardas():

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.collocation.covariance import FAMILIES, INTEGRATED
-from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
+from mlscorr.collocation import FAMILIES, INTEGRATED
+from mlscorr.estimate import SignalParameters
+from mlscorr.estimate.signals import drift_alone, pose_signals
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Pos, Trajectory
 

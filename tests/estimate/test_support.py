@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import Support, WeakStretch, estimate_correction, place_control
-from mlscorr.evaluate.model import largest_sigma
+from mlscorr.evaluate import largest_sigma
 from mlscorr.survey import Pos
 from tests.beds.lying_pos import START, TIME, survey, walk
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from mlscorr.estimate.posterior import Objective, Posterior
-from mlscorr.estimate.target_tests import TargetTest, all_tests, single_test
+from mlscorr.estimate import Objective, TargetTest
+from mlscorr.estimate.posterior import Posterior
+from mlscorr.estimate.target_tests import all_tests, single_test
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, rms, smooth_case
 
 

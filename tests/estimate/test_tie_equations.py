@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.correction import Correction
-from mlscorr.estimate.tie_equations import TieEquations
+from mlscorr.estimate._tie_equations import TieEquations
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Pos
 from tests.beds.tied_passes import tied_passes

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import (
+    SETTINGS,
+    TieResiduals,
     believed_correction,
     estimate_correction,
     previewed_correction,
     with_ties,
 )
-from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.tie_equations import TieEquations
-from mlscorr.estimate.tied import TieResiduals, sample
+from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate.tied import sample
 from mlscorr.ties import weigh_by_time
 from tests.beds.tied_passes import tied_passes
 

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate import calibration_with_ties, estimate_mounting
+from mlscorr.estimate import calibration_with_ties, corrected_mounting, estimate_mounting
 from mlscorr.estimate.mounting import linearized
-from mlscorr.estimate.mounting_estimate import corrected_mounting
 from mlscorr.estimate.tied_mounting import georeferenced_ties
 from tests.beds.tied_site import RECORDED, tied_site
 

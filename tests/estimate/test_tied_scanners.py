@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import estimate_correction, place_control, scanner_warnings, with_ties
-from mlscorr.estimate.mounting_estimate import corrected_mounting
+from mlscorr.estimate import (
+    corrected_mounting,
+    estimate_correction,
+    place_control,
+    scanner_warnings,
+    with_ties,
+)
 from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import Mounting
 from tests.beds.tied_passes import LENGTH, NOISE, ORIGIN, SPEED, START, drift, tied_passes

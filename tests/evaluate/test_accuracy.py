@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.evaluate.accuracy import positional_accuracy
+from mlscorr.evaluate._accuracy import positional_accuracy
 
 
 def test_survey_error_counts_into_the_accuracy():

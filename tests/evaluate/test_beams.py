@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.evaluate.beams import BeamCheck
+from mlscorr.evaluate import BeamCheck
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.clouds import read_chunks
+from mlscorr.io.surveys import read_survey
 from mlscorr.survey import PointCloud, Trajectory
 
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.evaluate.datum import TERMS, UNITS, DatumDifference, datum_differences
-from mlscorr.io.trajectories.projection import map_factors
+from mlscorr.evaluate import DatumDifference, datum_differences
+from mlscorr.evaluate.datum import TERMS, UNITS
+from mlscorr.io.trajectories import map_factors
 from mlscorr.survey import Pos
 from tests.beds.streets import observed, targets, trajectory
 

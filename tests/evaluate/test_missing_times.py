@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import mlscorr
-from mlscorr.evaluate.beams import BeamCheck
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.evaluate import BeamCheck
+from mlscorr.io.clouds import read_chunks
 from tests.beds.missing_times import write_survey
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import COMPONENTS
-from mlscorr.evaluate.model import model_section
+from mlscorr.evaluate import model_section
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, smooth_case
 
 

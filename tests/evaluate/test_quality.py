@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.evaluate.quality import failures, quantities, read_gate
-from mlscorr.evaluate.rows import Statistics
+from mlscorr.evaluate import Statistics, failures, read_gate
+from mlscorr.evaluate.quality import quantities
 
 RESIDUALS = np.array([[0.03, 0.00, -0.05], [-0.03, 0.04, 0.05]])
 COUNTS = {"n_surveyed": 9, "n_seen": 7, "n_scored": 6, "n_unseen": 1}

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.evaluate.rows import PointCounts, Score, Statistics, TargetRow
+from mlscorr.evaluate import PointCounts, Score, Statistics, TargetRow
 
 PLACE = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 UNKNOWN = np.full(3, np.nan)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.evaluate.scores import accuracy, misclosures, score
+from mlscorr.evaluate import accuracy, misclosures, score
 from tests.beds.streets import SHIFT, SIGMA, observed, targets
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.evaluate.accuracy import positional_accuracy
-from mlscorr.evaluate.settings import SETTINGS
+from mlscorr.evaluate._accuracy import positional_accuracy
+from mlscorr.evaluate._settings import SETTINGS
 
 
 @pytest.mark.parametrize("more, conformant", [(-1, False), (0, True)])

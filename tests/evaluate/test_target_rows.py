@@ -8,8 +8,8 @@ import pytest
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TargetTest
-from mlscorr.evaluate.rows import PointCounts
-from mlscorr.evaluate.target_rows import surveyed_rows, target_rows, unseen_rows
+from mlscorr.evaluate import PointCounts, surveyed_rows, unseen_rows
+from mlscorr.evaluate.target_rows import target_rows
 from mlscorr.matching import Refusal
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.targets import NO_POINTS, Candidates

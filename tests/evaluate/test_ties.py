@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import TieResiduals, estimate_correction, with_ties
-from mlscorr.evaluate.ties import tie_section
+from mlscorr.evaluate import tie_section
 from tests.beds.tied_passes import tied_passes
 
 

@@ -7,7 +7,7 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.tables.control import read_control
+from mlscorr.io.tables import read_control
 from tests.beds.places import ROOT
 from tests.faults.sizes import IS_FULL
 from tests.faults.stage import Stage

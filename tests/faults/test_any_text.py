@@ -8,11 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.store.toml_file import read_toml
-from mlscorr.io.surveys.survey_sections import SurveyFile
-from mlscorr.io.tables.control import read_control
-from mlscorr.io.tables.table_sections import ControlSection
-from mlscorr.io.trajectories.trajectory import read_trajectory, write_trajectory_csv
+from mlscorr.io.store import read_toml
+from mlscorr.io.surveys import SurveyFile
+from mlscorr.io.tables import ControlSection, read_control
+from mlscorr.io.trajectories import read_trajectory, write_trajectory_csv
 from mlscorr.survey import Trajectory
 from tests.faults.sizes import tries
 

@@ -6,8 +6,8 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds.las import read_records, sample_gps_times
-from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds import read_layout, sample_gps_times
+from mlscorr.io.clouds.las import read_records
 from mlscorr.survey import CloudFile
 from tests.beds.copies import write_corrected
 from tests.io.clouds.test_las import START, correction, write_street

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds.ply import write_ply
+from mlscorr.io.clouds import write_ply
 from mlscorr.simulate.scene.mesh import _read_ply
 from tests.faults.sizes import tries
 

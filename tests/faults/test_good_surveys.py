@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.evaluate.datum import datum_differences
-from mlscorr.simulate.random_survey import random_scenario
+from mlscorr.evaluate import datum_differences
+from mlscorr.simulate._random_survey import random_scenario
 from mlscorr.survey import Pos
 from tests.beds.places import BENCHMARKS
 from tests.faults.sizes import IS_FULL, tries

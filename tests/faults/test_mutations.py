@@ -9,12 +9,12 @@ import warnings
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds.las import read_records, sample_gps_times
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.store.toml_file import read_toml
-from mlscorr.io.surveys.survey_sections import SurveyFile
-from mlscorr.io.tables.control import read_control
-from mlscorr.io.trajectories.trajectory import read_trajectory
+from mlscorr.io.clouds import read_layout, sample_gps_times
+from mlscorr.io.clouds.las import read_records
+from mlscorr.io.store import read_toml
+from mlscorr.io.surveys import SurveyFile
+from mlscorr.io.tables import read_control
+from mlscorr.io.trajectories import read_trajectory
 from mlscorr.survey import CloudFile
 from tests.beds.copies import write_corrected
 from tests.faults.sizes import IS_FULL, tries

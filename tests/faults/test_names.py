@@ -5,7 +5,7 @@ import matplotlib.pyplot as plt
 import pytest
 
 from mlscorr.cli.terminal import warn
-from mlscorr.io.store.text_files import shown
+from mlscorr.io.store import shown
 from mlscorr.report.style import STYLE, label
 
 

@@ -13,10 +13,9 @@ import pytest
 import typer
 
 from mlscorr.cli.terminal import Exit, exit_code
-from mlscorr.io.store import folders, output
-from mlscorr.io.store.inputs import check_unchanged, input_file
-from mlscorr.io.store.output import check_output, output_folder
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.store import _folders as folders
+from mlscorr.io.store import check_output, check_unchanged, input_file, output, output_folder
+from mlscorr.io.surveys import read_survey
 from tests.beds.places import ROOT
 
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from pydantic import Field
 
-from mlscorr.io.store.toml_file import TomlSection, read_toml
-from mlscorr.io.tables.control import read_control
-from mlscorr.io.tables.result_tables import write_targets_csv
-from mlscorr.io.trajectories.trajectory import read_trajectory
+from mlscorr.io.store import TomlSection, read_toml
+from mlscorr.io.tables import read_control, write_targets_csv
+from mlscorr.io.trajectories import read_trajectory
 from tests.faults.sizes import IS_FULL
 
 HEADER = "gps_time,easting,northing,height,roll,pitch,heading\n"

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.surveys.crs_checks import check_area, check_scale, crs_notes
-from mlscorr.io.trajectories.projection import check_crs, convergence_at
+from mlscorr.io.surveys import check_area, crs_notes
+from mlscorr.io.surveys.crs_checks import check_scale
+from mlscorr.io.trajectories import check_crs
+from mlscorr.io.trajectories.projection import convergence_at
 from mlscorr.io.trajectories.sbet import read_sbet
 from mlscorr.survey import Trajectory
 

@@ -8,12 +8,12 @@ import lazrs
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.store.toml_file import read_toml
-from mlscorr.io.surveys.survey_sections import SurveyFile
-from mlscorr.io.tables.control import read_control
+from mlscorr.io.clouds import read_layout
+from mlscorr.io.store import read_toml
+from mlscorr.io.surveys import SurveyFile
+from mlscorr.io.tables import read_control
+from mlscorr.io.trajectories import read_trajectory
 from mlscorr.io.trajectories.sbet import read_sbet
-from mlscorr.io.trajectories.trajectory import read_trajectory
 from tests.faults.sizes import tries
 from tests.faults.test_times_and_places import recorded
 from tests.io.clouds.test_las import write_street

@@ -5,21 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.advice import (
-    ADVICE,
-    NOTHING_TO_DO,
-    ONLY_DRIFT,
-    advice_of,
-    excess_of,
-    sentence_of,
-)
-from mlscorr.gap.agreement import Agreement
-from mlscorr.gap.closure.closure import Closure, Gap
-from mlscorr.gap.closure.over_sigma import OverSigma
-from mlscorr.gap.evidence.causes import Cause, Inference
-from mlscorr.gap.evidence.verdict import GapVerdict
-from mlscorr.gap.evidence.where import Where
-from mlscorr.gap.plan.additions import NextData
+from mlscorr.gap import NOTHING_TO_DO
+from mlscorr.gap._agreement import Agreement
+from mlscorr.gap.advice import ADVICE, ONLY_DRIFT, advice_of, excess_of, sentence_of
+from mlscorr.gap.closure import Closure
+from mlscorr.gap.closure._over_sigma import OverSigma
+from mlscorr.gap.closure.closure import Gap
+from mlscorr.gap.evidence import Cause, Inference, Where
+from mlscorr.gap.evidence._verdict import GapVerdict
+from mlscorr.gap.plan import NextData
 
 BAND = (-0.4, 0.7)  # mm
 AGAIN = NextData("the same road again", "two passes share errors")

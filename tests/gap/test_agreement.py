@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_training import features
 
-from mlscorr.gap.agreement import agreements
+from mlscorr.gap._agreement import agreements
 
 
 @pytest.mark.long

@@ -8,14 +8,12 @@ import pytest
 from gap_training import features
 
 from mlscorr.effects import effect_class, make_effect
+from mlscorr.gap import map_document, separability_document, windows_document
 from mlscorr.gap.advice import distinct_parameters
-from mlscorr.gap.document import map_document, separability_document, windows_document
-from mlscorr.gap.evidence.causes import Cause
-from mlscorr.gap.evidence.error_models import STATED
-from mlscorr.gap.evidence.parameters import CauseParameter
-from mlscorr.gap.evidence.separability import Separability
-from mlscorr.gap.signatures.signatures import signatures
-from mlscorr.report.gap.labels import parameters_of
+from mlscorr.gap.evidence import Cause, CauseParameter, Separability
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.signatures import signatures
+from mlscorr.report.gap._labels import parameters_of
 
 
 def test_separability_is_told_in_plain_numbers():

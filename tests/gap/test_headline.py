@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.effects.catalogue import EFFECTS
-from mlscorr.gap.evidence.extent import Extent
-from mlscorr.gap.evidence.where import SPLITS, Split, Where
-from mlscorr.gap.headline import ACTS_ON, headline
+from mlscorr.effects import EFFECTS
+from mlscorr.gap._headline import ACTS_ON, headline
+from mlscorr.gap.evidence import Split, Where
+from mlscorr.gap.evidence._extent import Extent
+from mlscorr.gap.evidence.where import SPLITS
 
 START = 413200.0  # s
 

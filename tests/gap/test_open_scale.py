@@ -8,10 +8,11 @@ import pytest
 from gap_training import features
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence.labels import weigh_labels
-from mlscorr.gap.open_scale import SIGMAS, STEP, likely_scale, open_sigmas, with_scale
-from mlscorr.gap.residuals.rows import background
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap import likely_scale, open_sigmas, with_scale
+from mlscorr.gap.evidence import weigh_labels
+from mlscorr.gap.open_scale import SIGMAS, STEP
+from mlscorr.gap.residuals import background
+from mlscorr.gap.signatures import signatures
 from mlscorr.survey import Pos
 from tests.beds.gap_inference import surveyed
 

@@ -8,7 +8,7 @@ from feature_errors import errors
 from gap_training.errors import odd_patches, process, scatter
 from gap_training.features import geometry
 
-from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.evidence import SETTINGS
 
 
 @pytest.fixture(scope="module")

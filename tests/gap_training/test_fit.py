@@ -9,8 +9,8 @@ from gap_training.cases import known_mechanisms
 from gap_training.fit import document, figures, fit, hash_of, out_of_fold
 from gap_training.records import first_evidence
 
-from mlscorr.gap.evidence.calibration import calibration_error
-from mlscorr.gap.evidence.decision import Costs, LearnedDecision
+from mlscorr.gap.evidence import Costs, calibration_error
+from mlscorr.gap.evidence.decision import LearnedDecision
 from tests.beds.joint_scores import joint, records
 
 

@@ -6,7 +6,7 @@ import pytest
 from gap_training.fit import figures, out_of_fold
 from gap_training.report import print_figures, study_arguments
 
-from mlscorr.gap.evidence.decision import OPERATING_POINTS
+from mlscorr.gap.evidence import OPERATING_POINTS
 from tests.beds.joint_scores import records
 
 

@@ -5,7 +5,7 @@ import pytest
 from gap_training.worlds import World
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.signatures import Bench
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.collocation.covariance import Covariance
+from mlscorr.collocation import Covariance
 from mlscorr.matching import SETTINGS
-from mlscorr.matching.beliefs import build_chain, transition
-from mlscorr.matching.pairs import find_pairs
+from mlscorr.matching._beliefs import build_chain, transition
+from mlscorr.matching._pairs import find_pairs
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Pos
 from tests.matching.test_association import PLACES, control_points, observations, trajectory

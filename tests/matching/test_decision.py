@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from mlscorr.matching import SETTINGS
-from mlscorr.matching.decision import decide, log_share, moved_share_by_others
-from mlscorr.matching.marginals import Marginals
-from mlscorr.matching.pairs import CandidatePairs
+from mlscorr.matching import SETTINGS, log_share
+from mlscorr.matching._marginals import Marginals
+from mlscorr.matching._pairs import CandidatePairs
+from mlscorr.matching.decision import decide, moved_share_by_others
 
 
 def decided(sound, moved, control, first=None, count=2):

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from mlscorr.matching import SETTINGS
-from mlscorr.matching.branching import use
-from mlscorr.matching.hypotheses import (
+from mlscorr.matching._branching import use
+from mlscorr.matching._hypotheses import (
     displacement,
     log_likelihoods,
     predict,

@@ -9,13 +9,13 @@ import matching_study
 import numpy as np
 import pytest
 
-from mlscorr.collocation.covariance import Covariance
+from mlscorr.collocation import Covariance
 from mlscorr.matching import SETTINGS, match
-from mlscorr.matching.beliefs import Chain, build_chain
-from mlscorr.matching.branching import use
-from mlscorr.matching.hypotheses import predict, start
-from mlscorr.matching.marginals import join, marginals
-from mlscorr.matching.pairs import CandidatePairs, find_pairs
+from mlscorr.matching._beliefs import Chain, build_chain
+from mlscorr.matching._branching import use
+from mlscorr.matching._hypotheses import predict, start
+from mlscorr.matching._marginals import join, marginals
+from mlscorr.matching._pairs import CandidatePairs, find_pairs
 from mlscorr.matching.settings import settings_tuple
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import SEARCH_RADIUS, Pos

@@ -1,7 +1,7 @@
 import numpy as np
 
 from mlscorr.matching import SETTINGS
-from mlscorr.matching.pairs import find_pairs, same_appearance
+from mlscorr.matching._pairs import find_pairs, same_appearance
 from tests.matching.test_association import PLACES, control_points, observations
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.matching.settings import SETTINGS
+from mlscorr.matching import SETTINGS
 
 
 def test_shares_leave_most_targets_sound():

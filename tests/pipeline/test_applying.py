@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
-from mlscorr.io.surveys.survey_copy import write_survey_copy
-from mlscorr.pipeline.found_effects import cloud_rows, read_effects
+from mlscorr.io.surveys import write_survey_copy
+from mlscorr.pipeline import read_effects
+from mlscorr.pipeline.found_effects import cloud_rows
 from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.documents import undocumented

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mlscorr
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.beam_origin import beam_origin, with_beam_origin
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import PointCloud

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlscorr.blind.mix import causes
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.pipeline.blind import make_blind, run_blind, score_blind
+from mlscorr.blind._mix import causes
+from mlscorr.io.surveys import read_survey
+from mlscorr.pipeline import make_blind, run_blind, score_blind
 from mlscorr.simulate import Scenario, simulate
 from tests.beds import own_effects
 
@@ -132,7 +132,7 @@ def test_effects_of_a_file_are_drawn_diagnosed_and_scored(tmp_path):
     own += "\n\nfrom mlscorr.effects import register\n\nregister(Squat)\n"
     (tmp_path / "squat.py").write_text(own)
     code = (
-        "import sys, numpy as np; from mlscorr.blind.mix import mix\n"
+        "import sys, numpy as np; from mlscorr.blind._mix import mix\n"
         "from mlscorr.effects import register_file; register_file(sys.argv[1])\n"
         "def drawn(seed): return mix(1, np.random.default_rng([seed]))[0]\n"
         "print(next(s for s in range(10**4) if drawn(s).names == ('squat',) and drawn(s).mdb >= 4 "

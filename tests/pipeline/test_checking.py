@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.cli.terminal import is_quiet
-from mlscorr.io.tables.control import read_control
+from mlscorr.io.tables import read_control
 from mlscorr.pipeline.faults import Faults, find_faults
 
 NEAR = 1.5  # m from a surveyed point: what is left of the cloud

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.surveys.simulated_clouds import simulated_survey
+from mlscorr.io.surveys import simulated_survey
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.documents import undocumented
 

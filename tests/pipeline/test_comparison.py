@@ -13,8 +13,8 @@ import pytest
 
 import mlscorr
 from mlscorr.baselines import RAW, Transformation
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.clouds import read_chunks
+from mlscorr.io.surveys import read_survey
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.copies import write_corrected
 from tests.beds.documents import undocumented

@@ -13,15 +13,13 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence.causes import Cause
-from mlscorr.gap.evidence.decision import Costs, kind_of
-from mlscorr.gap.evidence.error_models import STATED
-from mlscorr.gap.signatures.signatures import Signature
-from mlscorr.gap.signatures.simulators import as_believed, with_cause
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.pipeline.found_effects import read_effects
-from mlscorr.simulate import Scenario, simulate
-from mlscorr.simulate.simulator_file import beliefs_of, read_simulator, write_simulator
+from mlscorr.gap.evidence import Cause, Costs
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence.decision import kind_of
+from mlscorr.gap.signatures import Signature, as_believed, with_cause
+from mlscorr.io.clouds import read_chunks
+from mlscorr.pipeline import read_effects
+from mlscorr.simulate import Scenario, beliefs_of, read_simulator, simulate, write_simulator
 from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
 from tests.beds.shared import shared

@@ -11,7 +11,7 @@ import pytest
 
 import mlscorr
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.pipeline.finding import fit_while_reading
 from mlscorr.survey import PointCloud, Survey, Trajectory

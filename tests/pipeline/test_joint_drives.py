@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.io.store.task_store import TaskStore
-from mlscorr.io.surveys.project_file import read_project
-from mlscorr.io.trajectories.time_systems import WEEK
+from mlscorr.io.store import TaskStore
+from mlscorr.io.surveys import read_project
+from mlscorr.io.trajectories import WEEK
 from mlscorr.pipeline.file_finding import find_in_file
 from mlscorr.pipeline.project.areas import areas_of, margin_of, pieces_of, places_each_second
 from mlscorr.pipeline.project.city import drives_by_areas, project_drives

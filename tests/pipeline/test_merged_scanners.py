@@ -12,10 +12,9 @@ import pytest
 
 import mlscorr
 from mlscorr.correction import Correction
-from mlscorr.estimate.mounting_estimate import corrected_mounting
-from mlscorr.io.clouds.las import count_sources, read_chunks
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.surveys.survey_copy import write_survey_copy
+from mlscorr.estimate import corrected_mounting
+from mlscorr.io.clouds import count_sources, read_chunks, read_layout
+from mlscorr.io.surveys import write_survey_copy
 from mlscorr.pipeline.clouds import write_clouds
 from tests.beds import scanner_pair
 

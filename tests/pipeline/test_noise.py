@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mlscorr
-from mlscorr.io.surveys.project_file import read_project, stated_project
+from mlscorr.io.surveys import read_project, stated_project
 from mlscorr.pipeline.project import Options, correct_project
 from tests.beds import project_street
 from tests.beds.noise import EACH, add_noise

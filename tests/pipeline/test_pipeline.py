@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import mlscorr
-from mlscorr.io.store.output import output_folder
-from mlscorr.io.trajectories.trajectory import read_trajectory
+from mlscorr.io.store import output_folder
+from mlscorr.io.trajectories import read_trajectory
 from mlscorr.survey import PointCloud
 from tests.beds.shared import shared
 

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.surveys.project_file import read_project
+from mlscorr.io.surveys import read_project
 from mlscorr.pipeline.project import Options, check_project, correct_project, project_status
 from mlscorr.pipeline.project.stages import tile_tasks
 from mlscorr.pipeline.project.tasks import carry_out

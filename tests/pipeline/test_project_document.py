@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import Support
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.store.identity import FileIdentity
-from mlscorr.io.store.task_store import TaskStore, digest
+from mlscorr.evaluate import TargetRow
+from mlscorr.io.store import FileIdentity, TaskStore, digest
 from mlscorr.pipeline.project.document import _reason, older_results
 from mlscorr.pipeline.project.tasks import Written
-from mlscorr.report.headline import first_screen
+from mlscorr.report import first_screen
 from tests.beds.reports import drive, fabricate
 
 CHANGES = {  # what a drive lacks, and what of its first screen says so

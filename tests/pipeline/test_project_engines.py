@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlscorr.io.store.preparation import temporary_folder
-from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.store import TaskStore, temporary_folder
 from mlscorr.pipeline.project import check_engine
 from mlscorr.pipeline.project.engine import engine
 from mlscorr.pipeline.project.running import Run

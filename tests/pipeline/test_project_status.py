@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
-from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.store import TaskStore
 from mlscorr.pipeline.project import project_status
 from mlscorr.pipeline.project.progress import logged
 from mlscorr.pipeline.project.tasks import Outcome, Task, carry_out

@@ -10,7 +10,8 @@ from PIL import Image
 
 import mlscorr
 from mlscorr.correction import Correction
-from mlscorr.pipeline.rendering import read_correction, render
+from mlscorr.pipeline import render
+from mlscorr.pipeline.rendering import read_correction
 from tests.beds.places import EXAMPLES
 
 pytestmark = pytest.mark.long

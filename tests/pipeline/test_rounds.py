@@ -8,10 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.pipeline.diagnosis import diagnose
+from mlscorr.io.surveys import read_survey
+from mlscorr.pipeline import diagnose
 from mlscorr.pipeline.rounds import DiagnosedRounds
-from mlscorr.simulate.simulator_file import read_simulator
+from mlscorr.simulate import read_simulator
 from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
 

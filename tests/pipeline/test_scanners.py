@@ -15,12 +15,11 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.correction import PointSigma
-from mlscorr.estimate import believed_correction
-from mlscorr.estimate.mounting_estimate import corrected_mounting
-from mlscorr.evaluate.beams import BeamCheck
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.estimate import believed_correction, corrected_mounting
+from mlscorr.evaluate import BeamCheck
+from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.tying import tie_passes
-from mlscorr.report.provenance import systems
+from mlscorr.report._provenance import systems
 from mlscorr.ties import TieCollector
 from tests.beds import scanner_pair
 from tests.beds.documents import undocumented

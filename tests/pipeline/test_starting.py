@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.trajectories.trajectory import read_trajectory
+from mlscorr.io.trajectories import read_trajectory
 from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.survey_text import SurveyText
 from mlscorr.survey import PointCloud

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mlscorr
-from mlscorr.io.trajectories.trajectory import write_trajectory_csv
+from mlscorr.io.trajectories import write_trajectory_csv
 from mlscorr.survey import Trajectory
 from tests.beds.folders_of_others import bed, control_csv
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.pos import find_steps
-from mlscorr.pos.changes import quick_changes, runs, timely_sigma
+from mlscorr.pos import find_steps, runs
+from mlscorr.pos.changes import quick_changes, timely_sigma
 from mlscorr.survey import Trajectory
 
 START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.pos.settings import SETTINGS
+from mlscorr.pos import SETTINGS
 from mlscorr.survey import SEARCH_RADIUS
 
 

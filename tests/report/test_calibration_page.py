@@ -4,13 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from mlscorr.evaluate.rows import SEEN_BY_OTHERS, TargetRow
-from mlscorr.report.calibration_page import (
-    calibration_page,
-    calibration_screen,
-    component_rows,
-    scanners_screen,
-)
+from mlscorr.evaluate import SEEN_BY_OTHERS, TargetRow
+from mlscorr.report import calibration_page, calibration_screen, scanners_screen
+from mlscorr.report._calibration_page import component_rows
 from tests.beds.reports import drive, fabricate, score_of, words
 
 MOUNTING = {"lever_arm": [0.1, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0]}

@@ -3,15 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.report.comparison_page import comparison_figure, write_comparison
-from mlscorr.report.comparison_screen import (
-    basis,
-    comparison_screen,
-    method_warnings,
-    ranking,
-    verdict,
-)
+from mlscorr.evaluate import TargetRow
+from mlscorr.report import comparison_figure, comparison_screen, method_warnings, write_comparison
+from mlscorr.report._comparison_screen import basis, ranking, verdict
 
 PLACE = np.array([532_000.0, 3_374_000.0, 42.0])
 UNSEEN = [TargetRow.unobserved("T9", 1, "check", PLACE, "No disc there.", True)]

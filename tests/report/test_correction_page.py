@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mlscorr.correction import Correction
-from mlscorr.evaluate.rows import TargetRow
+from mlscorr.evaluate import TargetRow
 from mlscorr.report import tables
 from mlscorr.report.correction_page import write_report
 from tests.beds.reports import Links, drive, fabricate, page, report_of, words

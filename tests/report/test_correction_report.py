@@ -6,9 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.store.output import document
-from mlscorr.report.correction_report import FileRow, ordered, recomputed
+from mlscorr.evaluate import TargetRow
+from mlscorr.io.store import document
+from mlscorr.report import FileRow
+from mlscorr.report.correction_report import ordered, recomputed
 from tests.beds.reports import drive, fabricate
 from tests.beds.street_of_points import ORIGIN, shifted, target
 

@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from mlscorr.report.calibration_page import calibration_page
-from mlscorr.report.comparison_page import write_comparison
+from mlscorr.report import calibration_page, write_comparison
 from mlscorr.report.gap import diagnosis_page, plan_page
 from tests.beds.browser import browse, need_browser, print_glyphs
 from tests.beds.gap_documents import KINDS, plan_document

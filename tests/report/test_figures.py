@@ -2,8 +2,9 @@
 
 import pytest
 
-from mlscorr.report.figures import correction_figures, write_pictures
-from mlscorr.report.style import draw, svg
+from mlscorr.report import correction_figures, draw
+from mlscorr.report.figures import write_pictures
+from mlscorr.report.style import svg
 from tests.beds.reports import drive, fabricate, page, words
 from tests.beds.tied_reports import tied_report
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from mlscorr.cli.correct import tell
-from mlscorr.estimate import Support, WeakStretch
-from mlscorr.estimate.support import DRIFT, NO_CONTROL, REASONS
-from mlscorr.evaluate.datum import DatumDifference
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.report.headline import first_screen, headline, statements
+from mlscorr.estimate import DRIFT, REASONS, Support, WeakStretch
+from mlscorr.estimate.support import NO_CONTROL
+from mlscorr.evaluate import DatumDifference, TargetRow
+from mlscorr.report import first_screen
+from mlscorr.report.headline import headline, statements
 from mlscorr.survey import Assumption
 from tests.beds.reports import START, drive, fabricate, page, report_of, words
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from mlscorr.report.project_page import project_map, write_project
+from mlscorr.report import write_project
+from mlscorr.report.project_page import project_map
 
 
 def test_names_of_drives_from_one_yard_do_not_cover_one_another():

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from mlscorr.report.correction_report import FileRow
-from mlscorr.report.provenance import coverage, files, systems
+from mlscorr.report import FileRow
+from mlscorr.report._provenance import coverage, files, systems
 from tests.beds.reports import START, drive, fabricate
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import Support
-from mlscorr.evaluate.rows import TargetRow
+from mlscorr.evaluate import TargetRow
 from mlscorr.report import tables
 from tests.beds.reports import drive, fabricate
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.estimate.placement import NextControl
-from mlscorr.evaluate.rows import TargetRow
+from mlscorr.estimate import NextControl
+from mlscorr.evaluate import TargetRow
 from mlscorr.report.target_map import map_figure
 from tests.beds.reports import drive, fabricate
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mlscorr.report._tie_map import tie_figure
 from mlscorr.report.style import svg
-from mlscorr.report.tie_map import tie_figure
 from tests.beds.tied_reports import tied_report
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mlscorr.report.tie_words import tie_sentences
+from mlscorr.report import tie_sentences
 
 SECTION = {
     "n": 1200,

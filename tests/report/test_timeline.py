@@ -8,7 +8,7 @@ import pytest
 from mlscorr.correction import Correction
 from mlscorr.estimate import Support
 from mlscorr.frames import attitude_from_angles
-from mlscorr.report.timeline import attitude_change, correction_figure
+from mlscorr.report._timeline import attitude_change, correction_figure
 from tests.beds.reports import START, drive, fabricate, page, words
 
 

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.report.viewer import thin_evenly, viewer_data
+from mlscorr.evaluate import TargetRow
+from mlscorr.report._viewer import thin_evenly, viewer_data
 from tests.beds.street_of_points import ORIGIN, shifted, street, target, unpacked
 
 

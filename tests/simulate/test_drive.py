@@ -5,13 +5,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.trajectories.poses import read_poses
-from mlscorr.io.trajectories.trajectory import write_trajectory_csv
-from mlscorr.simulate.drive.pace import Pace
-from mlscorr.simulate.drive.passes import drive
-from mlscorr.simulate.drive.path import u_turn_path
-from mlscorr.simulate.scenario import DriveScenario, PassScenario, Scenario, SceneScenario
-from mlscorr.simulate.settings import SETTINGS
+from mlscorr.io.trajectories import read_poses, write_trajectory_csv
+from mlscorr.simulate import SETTINGS, Scenario, SceneScenario
+from mlscorr.simulate.drive import drive
+from mlscorr.simulate.drive._pace import Pace
+from mlscorr.simulate.drive._path import u_turn_path
+from mlscorr.simulate.scenario import DriveScenario, PassScenario
 from mlscorr.survey import Trajectory
 from tests.beds.shared import shared
 

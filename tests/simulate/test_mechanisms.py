@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.simulate.displacement import RecordedPoints
-from mlscorr.simulate.mechanisms import DIRECTIONS, Mechanism, mechanisms
+from mlscorr.simulate import Mechanism, RecordedPoints, mechanisms
+from mlscorr.simulate._mechanisms import DIRECTIONS
 from mlscorr.survey import Mounting, Trajectory
 
 START, PLACE = 413200.0, np.array([523000.0, 3378000.0, 20.0])

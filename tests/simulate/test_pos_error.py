@@ -6,11 +6,14 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.trajectories.pos_error_series import PosErrorSeries, read_pos_error_series
-from mlscorr.simulate.pos import alignment, gnss, inertial, kalman, navigation
-from mlscorr.simulate.pos.errors import given_error, pos_error, record
-from mlscorr.simulate.pos.inertial import GRADES, GRAVITY, MEMS, TACTICAL
-from mlscorr.simulate.pos.kalman import Measurement
+from mlscorr.io.trajectories import PosErrorSeries, read_pos_error_series
+from mlscorr.simulate.pos import _alignment as alignment
+from mlscorr.simulate.pos import _gnss as gnss
+from mlscorr.simulate.pos import _inertial as inertial
+from mlscorr.simulate.pos import _kalman as kalman
+from mlscorr.simulate.pos import given_error, navigation, pos_error, record
+from mlscorr.simulate.pos._inertial import GRADES, GRAVITY, MEMS, TACTICAL
+from mlscorr.simulate.pos._kalman import Measurement
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Trajectory
 from tests.beds.shared import shared

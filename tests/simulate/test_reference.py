@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.simulate import Scenario, simulate
-from mlscorr.simulate.displacement import DisplacedSurvey
-from mlscorr.simulate.random_survey import random_scenario, random_survey
-from mlscorr.simulate.scenario import SceneScenario
-from mlscorr.simulate.scene.mesh import read_mesh
+from mlscorr.io.surveys import read_survey
+from mlscorr.simulate import DisplacedSurvey, Scenario, SceneScenario, random_survey, simulate
+from mlscorr.simulate._random_survey import random_scenario
+from mlscorr.simulate.scene import read_mesh
 from mlscorr.simulate.scene.shapes import ray_caster
 
 SHORT = Scenario(

@@ -8,10 +8,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.effects import Reference, Returns, apply_effects, effect_streams, make_effect
-from mlscorr.simulate.scan.rays import Platform
-from mlscorr.simulate.scan.recorded import RecordedPulses
-from mlscorr.simulate.scan.replay import Draws, Replay
-from mlscorr.simulate.scan.worlds import FORMS, Boards, Planes, TargetWorld
+from mlscorr.simulate.scan import (
+    FORMS,
+    Boards,
+    Draws,
+    Planes,
+    Platform,
+    RecordedPulses,
+    Replay,
+    TargetWorld,
+)
 from mlscorr.survey import Mounting, Scanner, Survey, Trajectory
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM

@@ -7,13 +7,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles, georeference
-from mlscorr.simulate.scan.echoes import POWER, SUB_RAYS, Surfaces
-from mlscorr.simulate.scan.noise import noise_streams
-from mlscorr.simulate.scan.rays import Platform
-from mlscorr.simulate.scan.scanner import MeasuredPulses, pulses_of_a_pass, shoot
+from mlscorr.simulate import SETTINGS
+from mlscorr.simulate.scan import (
+    MeasuredPulses,
+    Platform,
+    Surfaces,
+    noise_streams,
+    pulses_of_a_pass,
+    shoot,
+)
+from mlscorr.simulate.scan.echoes import POWER, SUB_RAYS
 from mlscorr.simulate.scenario import ScannerScenario
-from mlscorr.simulate.scene.shapes import Mesh, box, quads
-from mlscorr.simulate.settings import SETTINGS
+from mlscorr.simulate.scene import Mesh
+from mlscorr.simulate.scene.shapes import box, quads
 from mlscorr.survey import Mounting, Trajectory
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m
@@ -315,7 +321,7 @@ def test_returns_are_numbered_within_their_pulse():
 
 def test_a_tree_gives_first_and_last_returns():
     "Part of a beam is caught by leaves, the rest goes on to what stands behind them"
-    from mlscorr.simulate.scene.things import leaves
+    from mlscorr.simulate.scene._things import leaves
 
     rng = np.random.default_rng(3)
     crown = leaves(np.array([7.0, 9.0, 1.0]), np.full(3, 2.0), np.array([0.0, 1.0, 0.0]), 400, rng)

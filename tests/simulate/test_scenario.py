@@ -11,10 +11,8 @@ from typer.testing import CliRunner
 
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.simulate import simulate
-from mlscorr.simulate.scenario import Scenario
-from mlscorr.simulate.scenario_file import read_scenario, scenario_files
+from mlscorr.io.surveys import read_survey
+from mlscorr.simulate import Scenario, read_scenario, scenario_files, simulate
 from tests.beds.places import EXAMPLES
 
 SCENARIOS = sorted((EXAMPLES / "scenarios").glob("*.toml"))

@@ -4,24 +4,25 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.simulate.drive.passes import drive
+from mlscorr.simulate import SETTINGS, Scenario, SceneScenario
+from mlscorr.simulate.drive import drive
 from mlscorr.simulate.recording import spread_checks
-from mlscorr.simulate.scenario import (
-    DriveScenario,
-    PassScenario,
-    Scenario,
-    SceneScenario,
-    TargetScenario,
+from mlscorr.simulate.scenario import DriveScenario, PassScenario, TargetScenario
+from mlscorr.simulate.scene import (
+    UP,
+    CentreLine,
+    Mesh,
+    build_scene,
+    line_along,
+    read_mesh,
+    section,
+    sky_elevation,
 )
-from mlscorr.simulate.scene.bank import Bank
-from mlscorr.simulate.scene.build import build_scene, sky_elevation
-from mlscorr.simulate.scene.centre_line import CentreLine, line_along
-from mlscorr.simulate.scene.mesh import read_mesh
-from mlscorr.simulate.scene.section import StreetSection, section
-from mlscorr.simulate.scene.shapes import UP, Mesh, ray_caster
-from mlscorr.simulate.scene.street import Street
-from mlscorr.simulate.scene.things import leaves
-from mlscorr.simulate.settings import SETTINGS
+from mlscorr.simulate.scene._bank import Bank
+from mlscorr.simulate.scene._section import StreetSection
+from mlscorr.simulate.scene._street import Street
+from mlscorr.simulate.scene._things import leaves
+from mlscorr.simulate.scene.shapes import ray_caster
 from mlscorr.survey import Trajectory
 
 ORIGIN = np.array(Scenario().origin)

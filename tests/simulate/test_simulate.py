@@ -12,8 +12,7 @@ import pytest
 
 import mlscorr
 from mlscorr.frames import georeference, to_scanner
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.clouds.las_writer import cloud_writer
+from mlscorr.io.clouds import cloud_writer, read_chunks
 from mlscorr.simulate import DEMO, simulate
 from mlscorr.simulate.scenario import (
     DriveScenario,

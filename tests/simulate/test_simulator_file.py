@@ -7,9 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.effects import EFFECTS, in_order, make_effect
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.io.surveys.survey_sections import PosSection, ScannerSection
-from mlscorr.simulate.simulator_file import Simulator, beliefs_of, read_simulator, write_simulator
+from mlscorr.io.surveys import PosSection, ScannerSection, read_survey
+from mlscorr.simulate import Simulator, beliefs_of, read_simulator, write_simulator
 from mlscorr.survey import Mounting, Pos, Scanner
 
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mlscorr.survey import PointCloud
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns, PointCloud
 
 
 @dataclass(frozen=True, eq=False)

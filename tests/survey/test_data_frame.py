@@ -5,7 +5,8 @@ import sys
 import numpy as np
 import pytest
 
-from mlscorr.survey.data_frame import columns_frame, rows_frame
+from mlscorr.survey import rows_frame
+from mlscorr.survey.data_frame import columns_frame
 from tests.beds.tied_passes import tied_passes
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlscorr.survey import Matched, Survey
-from mlscorr.survey.summary import Summary, counted, html_table
+from mlscorr.survey import Matched, Summary, Survey, counted
+from mlscorr.survey.summary import html_table
 from tests.beds.tied_passes import tied_passes
 
 

@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.targets.assessment import assess
-from mlscorr.targets.echoes import Echoes
-from mlscorr.targets.outline import Outline
-from mlscorr.targets.scanner_path import ScannerPath
-from mlscorr.targets.seeds import Seed
+from mlscorr.targets import ScannerPath
+from mlscorr.targets._assessment import assess
+from mlscorr.targets._echoes import Echoes
+from mlscorr.targets._outline import Outline
+from mlscorr.targets._seeds import Seed
 from mlscorr.targets.shapes import BRIGHT, DARK
 from tests.beds.planes import plane_through
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.targets.balls import Neighbourhoods
+from mlscorr.targets import Neighbourhoods
 from tests.targets.test_extract import ORIGIN
 
 

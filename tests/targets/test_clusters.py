@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.targets.clusters import bright_components, components, connected
-from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets import SETTINGS
+from mlscorr.targets._clusters import bright_components, components, connected
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 

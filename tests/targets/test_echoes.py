@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.targets.echoes import Echoes, beams_at_plane, missed_points
-from mlscorr.targets.scanner_path import ScannerPath
+from mlscorr.targets import ScannerPath
+from mlscorr.targets._echoes import Echoes, beams_at_plane, missed_points
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
 from tests.beds.planes import plane_through
 

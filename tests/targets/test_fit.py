@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 from target_rays import SCANNER, TARGETS, view
 
 from mlscorr.survey import PointCloud
-from mlscorr.targets.echoes import Echoes
-from mlscorr.targets.fit import fit_seeds, fit_targets
-from mlscorr.targets.scanner_path import ScannerPath
-from mlscorr.targets.seeds import bright_seeds
+from mlscorr.targets import ScannerPath, fit_targets
+from mlscorr.targets._echoes import Echoes
+from mlscorr.targets._seeds import bright_seeds
+from mlscorr.targets.fit import fit_seeds
 from mlscorr.targets.shapes import BRIGHT
 
 UTM = np.array([532_000.0, 3_374_000.0, 40.0])  # m

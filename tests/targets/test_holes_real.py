@@ -6,8 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.survey import PointCloud, Scanner
-from mlscorr.targets.fit import fit_targets
-from mlscorr.targets.scanner_path import ScannerPath
+from mlscorr.targets import ScannerPath, fit_targets
 from tests.beds.shared import shared
 
 SCANNER = Scanner(range_noise=0.015, angle_noise=np.radians(0.02))  # data sheet of its 64 beams

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlscorr.targets.intensity import why_useless
-from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets import SETTINGS, why_useless
 
 
 def test_why_useless_names_the_reason():

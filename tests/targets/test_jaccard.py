@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.targets.jaccard import jaccard_index
+from mlscorr.targets._jaccard import jaccard_index
 
 LONGEST, RATIO, DIRECTIONS = 1.0, 1.6, 12  # m, of length to width, of the search
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.targets.outline import Size, fit_outline
+from mlscorr.targets._outline import Size, fit_outline
 from mlscorr.targets.shapes import FORMS, WHITE, distance_inside
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 42.0])  # m, UTM

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.targets.plane import fit_plane, most_common
+from mlscorr.targets._plane import fit_plane, most_common
 from tests.beds.planes import plane_through
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 42.0])  # m, UTM

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.survey import Mounting, Scanner, Survey, Trajectory
-from mlscorr.targets.scanner_path import ScannerPath
+from mlscorr.targets import ScannerPath
 from tests.targets.test_extract import ORIGIN, START, control_point
 
 ARM = np.array([0.4, -0.7, 1.2])  # m

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.targets.regions import BrightRegion
-from mlscorr.targets.seeds import (
+from mlscorr.targets import SETTINGS, BrightRegion
+from mlscorr.targets._seeds import (
     _circumcircles,
     _extent,
     _surrounded,
@@ -17,7 +17,6 @@ from mlscorr.targets.seeds import (
     plate_seeds,
     region_seeds,
 )
-from mlscorr.targets.settings import SETTINGS
 from tests.beds.target_views import KINDS, SIZE, TOLERANCE, centre_of, echoes_of, views, wall
 
 RNG = np.random.default_rng

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from mlscorr.targets.sequence import quasi_random
+from mlscorr.targets._sequence import quasi_random
 
 
 @pytest.mark.parametrize("dimensions", [2, 3, 5])

@@ -2,7 +2,7 @@
 
 from math import comb, sqrt
 
-from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets import SETTINGS
 
 
 def test_triples_find_the_plane_of_a_third_of_the_points():

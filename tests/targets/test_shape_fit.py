@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from target_rays import SCANNER
 
-from mlscorr.targets.seeds import bright_seeds, hole_seeds, plate_seeds
-from mlscorr.targets.settings import SETTINGS
-from mlscorr.targets.shape_fit import exact_fit, rough_fit
+from mlscorr.targets import SETTINGS
+from mlscorr.targets._seeds import bright_seeds, hole_seeds, plate_seeds
+from mlscorr.targets._shape_fit import exact_fit, rough_fit
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
 from tests.beds.target_views import KINDS, SIZE, centre_of, echoes_of, views, wall
 

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from mlscorr.targets import diameter
 from mlscorr.targets.shapes import (
     BRIGHT,
     DARK,
     FORMS,
     MISS,
     WHITE,
-    diameter,
     distance_inside,
     log_likelihood,
     sides,

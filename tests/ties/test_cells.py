@@ -3,7 +3,7 @@
 import numpy as np
 
 from mlscorr.survey import PointCloud
-from mlscorr.ties.cells import CellTable
+from mlscorr.ties._cells import CellTable
 
 ORIGIN = np.array([447_000.0, 5_410_000.0, 120.0])  # m
 START = 413_200.0  # s

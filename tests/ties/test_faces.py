@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mlscorr.survey import PointCloud
-from mlscorr.ties.cells import CellTable
-from mlscorr.ties.faces import join_across_faces
+from mlscorr.ties._cells import CellTable
+from mlscorr.ties._faces import join_across_faces
 
 ORIGIN, START = np.array([447_000.0, 5_410_000.0, 120.0]), 413_200.0  # m, s
 PASSES = np.array([[START, START + 10.0]])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mlscorr.ties import TieCollector
-from mlscorr.ties.markings import find_markings
-from mlscorr.ties.paint import Crossings, find_crossings
+from mlscorr.ties._markings import find_markings
+from mlscorr.ties._paint import Crossings, find_crossings
 from tests.beds import painted_roads as road
 from tests.ties.test_collector import assert_same
 

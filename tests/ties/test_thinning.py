@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.survey import Ties, Trajectory
-from mlscorr.ties import SETTINGS, join_features
-from mlscorr.ties.thinning import direction_class, thin, thinned_ties
+from mlscorr.ties import SETTINGS, join_features, thinned_ties
+from mlscorr.ties.thinning import direction_class, thin
 from tests.beds import tie_streets as street
 
 MANY = 5_000

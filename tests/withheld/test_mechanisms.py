@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 import mlscorr
 from mlscorr.effects.catalogue import SYSTEMATIC
 from mlscorr.frames import attitude_from_angles
-from mlscorr.simulate.displacement import RecordedPoints
-from mlscorr.simulate.mechanisms import load_mechanisms
+from mlscorr.simulate import RecordedPoints, load_mechanisms
 from mlscorr.survey import Mounting, Trajectory
 
 FILE = Path(__file__).with_name("mechanisms.py")

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.closure.systematic import unit_square
-from mlscorr.gap.evidence.causes import Inference, cause_of
-from mlscorr.gap.evidence.measure import Explanations, signed_root
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.closure._systematic import unit_square
+from mlscorr.gap.evidence import SETTINGS, Explanations, Inference, cause_of, signed_root
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures import Signature
 
 
 @dataclass(frozen=True)

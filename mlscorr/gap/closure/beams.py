@@ -5,13 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.gap.closure.sightings import SightedTarget, sightings_of
+from mlscorr.gap.closure._sightings import SightedTarget, sightings_of
 from mlscorr.gap.closure.surroundings import Surroundings
-from mlscorr.gap.residuals.patches import Patches
-from mlscorr.gap.residuals.plane_fit import place_key
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.simulate import scan
-from mlscorr.simulate.scenario import SceneScenario
+from mlscorr.gap.residuals import Patches, Rows, place_key
+from mlscorr.simulate import SceneScenario, scan
 from mlscorr.simulate.scene import read_mesh
 from mlscorr.survey import PointCloud, Survey
 

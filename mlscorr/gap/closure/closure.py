@@ -11,27 +11,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from mlscorr.gap.closure._over_sigma import OverSigma, errors_over_sigma
+from mlscorr.gap.closure._settings import SETTINGS
+from mlscorr.gap.closure._systematic import Squares, SystematicGap, share_gone
 from mlscorr.gap.closure.folds import Simulated, make_folds, predict_whole
 from mlscorr.gap.closure.found_cause import FoundCause
-from mlscorr.gap.closure.over_sigma import OverSigma, errors_over_sigma
-from mlscorr.gap.closure.settings import SETTINGS
-from mlscorr.gap.closure.systematic import Squares, SystematicGap, share_gone
-from mlscorr.gap.evidence.columns import ColumnTable, column_table
-from mlscorr.gap.evidence.error_models import ErrorModel
-from mlscorr.gap.evidence.evidence import steady_columns
-from mlscorr.gap.evidence.measure import (
+from mlscorr.gap.evidence import SETTINGS as INFERENCE
+from mlscorr.gap.evidence import (
     UNITS,
+    ColumnTable,
+    ErrorModel,
+    Observations,
     Predicted,
+    column_table,
     gap_kind,
     position_terms,
     scatter_terms,
     signed_root,
+    steady_columns,
+    unknown_blocks,
+    without_tails,
 )
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
-from mlscorr.gap.evidence.tails import without_tails
-from mlscorr.gap.evidence.unknown import unknown_blocks
-from mlscorr.gap.residuals.rows import Rows, background
+from mlscorr.gap.residuals import Rows, background
 
 
 @dataclass(frozen=True)

@@ -12,18 +12,21 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from mlscorr.effects import Effect
-from mlscorr.gap.closure.cross_fit import cross_fitted
+from mlscorr.gap.closure._cross_fit import cross_fitted
+from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.gap.closure.found_cause import FoundCause
-from mlscorr.gap.closure.settings import SETTINGS
-from mlscorr.gap.evidence.causes import Cause, Inference, cause_of
-from mlscorr.gap.evidence.error_models import ErrorModel
-from mlscorr.gap.evidence.labels import weigh_labels
-from mlscorr.gap.evidence.measure import Predicted
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
-from mlscorr.gap.residuals.rows import Rows, background
-from mlscorr.gap.signatures.expectation import expected
-from mlscorr.gap.signatures.signatures import Signature, select
+from mlscorr.gap.evidence import SETTINGS as INFERENCE
+from mlscorr.gap.evidence import (
+    Cause,
+    ErrorModel,
+    Inference,
+    Observations,
+    Predicted,
+    cause_of,
+    weigh_labels,
+)
+from mlscorr.gap.residuals import Rows, background
+from mlscorr.gap.signatures import Signature, expected, select
 
 Simulated = Callable[[tuple[Effect, ...]], np.ndarray] | np.ndarray
 

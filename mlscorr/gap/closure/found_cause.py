@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.gap.evidence.causes import Cause
-from mlscorr.gap.evidence.labels import LabelEvidence
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import Signature, signature
+from mlscorr.gap.evidence import Cause, LabelEvidence
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures import Bench, Signature, signature
 from mlscorr.survey import Survey
 
 

@@ -12,16 +12,18 @@ from functools import cached_property, reduce
 import numpy as np
 
 from mlscorr.effects import Effect
+from mlscorr.gap.closure._refit import refit_targets
 from mlscorr.gap.closure.beams import Beams
-from mlscorr.gap.closure.refit import refit_targets
-from mlscorr.gap.residuals.channels import log_roughness, rounding_sigma
-from mlscorr.gap.residuals.plane_fit import freedom, moments
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.residuals.selection import gate
-from mlscorr.gap.residuals.settings import SETTINGS
-from mlscorr.gap.signatures.changes import check_mounting
-from mlscorr.gap.signatures.expectation import expected
-from mlscorr.gap.signatures.simulators import joined
+from mlscorr.gap.residuals import (
+    SETTINGS,
+    Rows,
+    freedom,
+    gate,
+    log_roughness,
+    moments,
+    rounding_sigma,
+)
+from mlscorr.gap.signatures import check_mounting, expected, joined
 from mlscorr.simulate.scan import Draws, Met, Planes, Replay, TargetWorld, true_targets
 from mlscorr.survey import Survey
 

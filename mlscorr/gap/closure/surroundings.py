@@ -5,14 +5,13 @@ from collections.abc import Iterable
 import numpy as np
 from numba import njit
 
-from mlscorr.gap.closure.settings import SETTINGS
-from mlscorr.gap.closure.sightings import Sighting, board_of
-from mlscorr.gap.closure.unreturned import unreturned
-from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
+from mlscorr.gap.closure._settings import SETTINGS
+from mlscorr.gap.closure._sightings import Sighting, board_of
+from mlscorr.gap.closure._unreturned import unreturned
+from mlscorr.gap.residuals import SETTINGS as OBSERVE
 from mlscorr.simulate.scan import Platform, RecordedPulses, aim, recorded_platform, recorded_pulses
 from mlscorr.survey import PointCloud, Survey
-from mlscorr.targets.candidates import NO_POINTS, search_radius
-from mlscorr.targets.fit import FittedTarget
+from mlscorr.targets import NO_POINTS, FittedTarget, search_radius
 
 
 class Surroundings:

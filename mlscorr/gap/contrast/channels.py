@@ -4,15 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mlscorr.gap.contrast.blocks import block_of, weights_of
-from mlscorr.gap.contrast.edges import Edges
-from mlscorr.gap.contrast.pairs import PairedCells, paired_cells
+from mlscorr.gap.contrast._blocks import block_of, weights_of
+from mlscorr.gap.contrast._edges import Edges
+from mlscorr.gap.contrast._pairs import PairedCells, paired_cells
+from mlscorr.gap.contrast._settings import SETTINGS
+from mlscorr.gap.contrast._words import SILENT, sentence
 from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
-from mlscorr.gap.contrast.settings import SETTINGS
 from mlscorr.gap.contrast.tables import Binning, Contrast, Measure
-from mlscorr.gap.contrast.words import SILENT, sentence
-from mlscorr.gap.residuals.covariates import scanner_origin
-from mlscorr.gap.residuals.patches import Patches
+from mlscorr.gap.residuals import Patches, scanner_origin
 from mlscorr.survey import Survey
 
 CLASSES = ("dark", "medium", "bright")

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist, pdist
 
-from mlscorr.gap.contrast.cells import sampled
+from mlscorr.gap.contrast._cells import sampled
+from mlscorr.gap.contrast._settings import SETTINGS
 from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
-from mlscorr.gap.contrast.settings import SETTINGS
-from mlscorr.gap.residuals.plane_fit import chance
+from mlscorr.gap.residuals import chance
 
 UNITS = {"points": "m", "intensity": "decades", "density": "decades"}  # of clouds; else sigmas
 

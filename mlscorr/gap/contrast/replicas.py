@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from mlscorr.gap.contrast.settings import SETTINGS
-from mlscorr.gap.evidence.causes import Inference
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.residuals.rows import Background, Rows
+from mlscorr.gap.contrast._settings import SETTINGS
+from mlscorr.gap.evidence import Inference, Observations
+from mlscorr.gap.residuals import Background, Rows
 
 
 def replica_innovations(

@@ -6,10 +6,10 @@ from functools import reduce
 
 import numpy as np
 
-from mlscorr.gap.contrast.cells import CellCollector, Cells
-from mlscorr.gap.contrast.edges import EdgeCollector, Edges
-from mlscorr.gap.residuals.patches import Patches
-from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
+from mlscorr.gap.contrast._cells import CellCollector, Cells
+from mlscorr.gap.contrast._edges import EdgeCollector, Edges
+from mlscorr.gap.residuals import SETTINGS as OBSERVE
+from mlscorr.gap.residuals import Patches
 from mlscorr.survey import PointCloud, Survey
 
 

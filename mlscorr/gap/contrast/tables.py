@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from mlscorr.gap.contrast.blocks import joined_bins, limit, sums_by_block, with_sigma
-from mlscorr.gap.contrast.settings import SETTINGS
+from mlscorr.gap.contrast._blocks import joined_bins, limit, sums_by_block, with_sigma
+from mlscorr.gap.contrast._settings import SETTINGS
 
 RATIOS = ("intensity", "density")  # channels whose figure is a ratio; else it is a difference
 UNITS = {"intensity": "counts", "density": "points", "edge_width": "mrad", "dropout": "share"}

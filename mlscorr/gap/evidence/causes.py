@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.effects import Effect
-from mlscorr.effects.vehicle import PositionNoise
+from mlscorr.effects import Effect, PositionNoise
+from mlscorr.gap.evidence._error_models import STATED, ErrorModel, error_models, shares
+from mlscorr.gap.evidence._verdict import GapVerdict, best_member, decide, joint_score, with_absence
+from mlscorr.gap.evidence._windows import WindowEvidence
 from mlscorr.gap.evidence.decision import Costs, JointScore, learned
 from mlscorr.gap.evidence.detectable import detectable_size
-from mlscorr.gap.evidence.error_models import STATED, ErrorModel, error_models, shares
 from mlscorr.gap.evidence.labels import LabelEvidence, weigh_labels
 from mlscorr.gap.evidence.observations import model_likelihood
 from mlscorr.gap.evidence.parameters import (
@@ -22,12 +23,9 @@ from mlscorr.gap.evidence.parameters import (
 )
 from mlscorr.gap.evidence.separability import Separability, compare_signatures
 from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.evidence.verdict import GapVerdict, best_member, decide, joint_score, with_absence
 from mlscorr.gap.evidence.where import Where, locate
-from mlscorr.gap.evidence.windows import WindowEvidence
-from mlscorr.gap.residuals.absence import Absence
-from mlscorr.gap.residuals.rows import Background, Rows
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.residuals import Absence, Background, Rows
+from mlscorr.gap.signatures import Signature
 from mlscorr.survey import Survey, Trajectory
 
 

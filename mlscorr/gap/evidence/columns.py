@@ -9,8 +9,8 @@ import numpy as np
 
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.evidence.unknown import UnknownBlock
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures import Signature
 
 
 @dataclass(frozen=True)

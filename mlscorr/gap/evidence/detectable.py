@@ -12,13 +12,12 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.evidence.error_models import error_models
-from mlscorr.gap.evidence.noise import CHANNELS, channel_evidence, channel_means, draw_channels
+from mlscorr.gap.evidence._error_models import error_models
+from mlscorr.gap.evidence._noise import CHANNELS, channel_evidence, channel_means, draw_channels
 from mlscorr.gap.evidence.observations import Observations, model_likelihood
 from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.channels import with_loss_variance
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.residuals import Rows, with_loss_variance
+from mlscorr.gap.signatures import Signature
 
 DRAWS = 8  # of noisy residuals: the evidence of 4 sigmas scatters by 4, the mean of 8 by a sixth
 DOUBLINGS = 12  # of the usual size, up and down: 1 um of range noise to 20 m

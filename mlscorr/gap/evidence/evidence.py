@@ -18,8 +18,8 @@ from itertools import compress
 
 import numpy as np
 
+from mlscorr.gap.evidence._error_models import ErrorModel
 from mlscorr.gap.evidence.columns import ColumnTable, block_groups
-from mlscorr.gap.evidence.error_models import ErrorModel
 from mlscorr.gap.evidence.observations import Observations, relevant_models
 from mlscorr.gap.evidence.settings import SETTINGS
 

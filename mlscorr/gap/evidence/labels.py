@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from mlscorr.gap.evidence._error_models import ErrorModel, error_models, shares
+from mlscorr.gap.evidence._events import RefinedEvent, refine_events
+from mlscorr.gap.evidence._noise import NoiseEvidence, draw_channels, weigh_noise
+from mlscorr.gap.evidence._windows import weigh_windows
 from mlscorr.gap.evidence.columns import ColumnTable, column_table
-from mlscorr.gap.evidence.error_models import ErrorModel, error_models, shares
-from mlscorr.gap.evidence.events import RefinedEvent, refine_events
 from mlscorr.gap.evidence.evidence import (
     BlockEvidence,
     steady_columns,
@@ -16,14 +18,12 @@ from mlscorr.gap.evidence.evidence import (
     weigh_blocks,
     without_known,
 )
-from mlscorr.gap.evidence.noise import NoiseEvidence, draw_channels, weigh_noise
 from mlscorr.gap.evidence.observations import Observations, model_likelihood
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.evidence.tails import without_tails
 from mlscorr.gap.evidence.unknown import unknown_blocks
-from mlscorr.gap.evidence.windows import weigh_windows
-from mlscorr.gap.residuals.rows import Background, Rows
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.residuals import Background, Rows
+from mlscorr.gap.signatures import Signature
 from mlscorr.survey import Survey
 
 

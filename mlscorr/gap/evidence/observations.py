@@ -8,12 +8,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from mlscorr.collocation import Signal, Whitener, factor
-from mlscorr.collocation.covariance import Covariance
-from mlscorr.gap.evidence.error_models import STATED, ErrorModel, varied_models, window_growth
+from mlscorr.collocation import Covariance, Signal, Whitener, factor
+from mlscorr.gap.evidence._error_models import STATED, ErrorModel, varied_models, window_growth
 from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.rows import Background, Rows
-from mlscorr.survey.columns import Columns
+from mlscorr.gap.residuals import Background, Rows
+from mlscorr.survey import Columns
 
 FACTORS = 128  # kept of V0: those that the evidence comes back to, less than 100 MB
 

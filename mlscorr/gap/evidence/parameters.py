@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.effects.vehicle import PositionNoise
-from mlscorr.gap.evidence.error_models import ErrorModel
+from mlscorr.effects import PositionNoise
+from mlscorr.gap.evidence._error_models import ErrorModel
+from mlscorr.gap.evidence._windows import Window
 from mlscorr.gap.evidence.labels import LabelEvidence
 from mlscorr.gap.evidence.observations import Observations
 from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.evidence.windows import Window
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures import Signature
 
 UNITS = ("s", "s", "ratio")  # of a window's start, length and factor
 

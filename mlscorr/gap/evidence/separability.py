@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.gap.evidence.error_models import STATED, ErrorModel
+from mlscorr.gap.evidence._error_models import STATED, ErrorModel
 from mlscorr.gap.evidence.observations import Observations
 from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.signatures.signatures import Signature
+from mlscorr.gap.signatures import Signature
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mlscorr.gap.evidence.error_models import ErrorModel
+from mlscorr.gap.evidence._error_models import ErrorModel
 from mlscorr.gap.evidence.observations import Observations
 from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals import Rows
 
 
 def without_tails(

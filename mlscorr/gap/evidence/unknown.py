@@ -8,8 +8,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.signatures.displacements import displacements
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures import displacements
 from mlscorr.survey import Survey
 
 DIRECTIONS = {

@@ -15,12 +15,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from mlscorr.gap.evidence.error_models import STATED, ErrorModel
-from mlscorr.gap.evidence.extent import Extent, extent_of
+from mlscorr.gap.evidence._error_models import STATED, ErrorModel
+from mlscorr.gap.evidence._extent import Extent, extent_of
 from mlscorr.gap.evidence.measure import signed_root, simulated_variance
 from mlscorr.gap.evidence.observations import Observations
 from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.rows import Background, Rows
+from mlscorr.gap.residuals import Background, Rows
 
 SPLITS = (
     *("time", "location", "range", "incidence", "scan_angle", "intensity"),

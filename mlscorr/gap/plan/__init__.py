@@ -1,4 +1,6 @@
 """What a survey will be able to show, and what more would tell its causes apart."""
 
+from mlscorr.gap.plan._planned_rows import event_sizes, planned_rows
 from mlscorr.gap.plan.additions import NextData, next_data
-from mlscorr.gap.plan.planned_rows import event_sizes, planned_rows
+from mlscorr.gap.plan.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
+from mlscorr.gap.plan.sizing import Ruler

@@ -10,15 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.effects import Effect
-from mlscorr.effects.labels import lowered, titles
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.separability import Separability, compare_signatures
-from mlscorr.gap.evidence.settings import SETTINGS as INFERENCE
-from mlscorr.gap.plan.settings import SETTINGS
-from mlscorr.gap.residuals.assemble import assemble, sample_pulses
-from mlscorr.gap.residuals.rows import Rows, background
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.effects import Effect, lowered, titles
+from mlscorr.gap.evidence import SETTINGS as INFERENCE
+from mlscorr.gap.evidence import Observations, Separability, compare_signatures
+from mlscorr.gap.plan._settings import SETTINGS
+from mlscorr.gap.residuals import Rows, assemble, background, sample_pulses
+from mlscorr.gap.signatures import signatures
 from mlscorr.survey import ControlPoints, Survey, Trajectory
 
 

@@ -6,12 +6,11 @@ from itertools import chain
 
 import numpy as np
 
-from mlscorr.effects.catalogue import effect_class
-from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.effects import effect_class
+from mlscorr.gap.evidence import SETTINGS
 from mlscorr.gap.plan.sizing import Ruler, SizedEffect, draw_effect, likeness, shift_by
-from mlscorr.gap.signatures.signatures import Signature
-from mlscorr.simulate.displacement import RecordedPoints
-from mlscorr.simulate.mechanisms import Described
+from mlscorr.gap.signatures import Signature
+from mlscorr.simulate import Described, RecordedPoints
 
 ATTEMPTS = 12  # names or surveys, estimated: where half show nothing, one case in 4000 fails
 LIKENESS = 0.8  # squared correlation with an effect, estimated: more is that effect by another name

@@ -9,15 +9,17 @@ import numpy as np
 
 from mlscorr.collocation import Whitener
 from mlscorr.effects import Effect
-from mlscorr.gap.evidence.detectable import detectable_size
-from mlscorr.gap.evidence.error_models import error_models
-from mlscorr.gap.evidence.observations import Observations, model_likelihood
-from mlscorr.gap.evidence.separability import explained_square
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.rows import Rows, background
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import Signature, signature
-from mlscorr.simulate.displacement import RecordedPoints
+from mlscorr.gap.evidence import (
+    SETTINGS,
+    Observations,
+    detectable_size,
+    error_models,
+    explained_square,
+    model_likelihood,
+)
+from mlscorr.gap.residuals import Rows, background
+from mlscorr.gap.signatures import Bench, Signature, signature
+from mlscorr.simulate import RecordedPoints
 from mlscorr.survey import Survey
 
 EVENT_WIDTHS = (2.0, 30.0)  # s, drawn evenly by their logs: a lost fix to a tunnel

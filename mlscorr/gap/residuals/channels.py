@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.residuals.covariates import scanner_origin
+from mlscorr.gap.residuals._covariates import scanner_origin
 from mlscorr.gap.residuals.patches import Patches
 from mlscorr.gap.residuals.plane_fit import freedom
 from mlscorr.gap.residuals.rows import Rows

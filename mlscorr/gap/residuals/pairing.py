@@ -7,16 +7,16 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from mlscorr.correction import Correction
-from mlscorr.gap.residuals.assemble import assemble, patch_pulses, sample_pulses
+from mlscorr.gap.residuals._assemble import assemble, patch_pulses, sample_pulses
+from mlscorr.gap.residuals._covariates import scanner_origin
+from mlscorr.gap.residuals._shared_planes import shared_rows
+from mlscorr.gap.residuals._surfaces import OnReference, on_reference
 from mlscorr.gap.residuals.channels import return_rate, roughness
-from mlscorr.gap.residuals.covariates import scanner_origin
 from mlscorr.gap.residuals.patches import Patches
 from mlscorr.gap.residuals.rows import Rows, SamplePulses
 from mlscorr.gap.residuals.selection import spread
 from mlscorr.gap.residuals.settings import SETTINGS
-from mlscorr.gap.residuals.shared_planes import shared_rows
-from mlscorr.gap.residuals.surfaces import OnReference, on_reference
-from mlscorr.matching.settings import SETTINGS as MATCHING
+from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import Matched, Survey, TargetObservations
 from mlscorr.targets import SETTINGS as TARGETS
 from mlscorr.targets import Candidates

@@ -11,7 +11,7 @@ import numpy as np
 from mlscorr.gap.residuals.patches import Patches
 from mlscorr.gap.residuals.plane_fit import block_chance, fit_patches, place_key
 from mlscorr.gap.residuals.settings import SETTINGS
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.io.clouds import read_chunks
 from mlscorr.survey import CloudFile, PointCloud, Survey
 from mlscorr.targets import NO_POINTS, number_passes
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns
 
 
 @dataclass(frozen=True, repr=False)

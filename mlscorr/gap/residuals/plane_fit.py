@@ -3,12 +3,12 @@
 import numpy as np
 from numba import njit
 
-from mlscorr.gap.residuals.covariates import scanner_origin
+from mlscorr.gap.residuals._covariates import scanner_origin
 from mlscorr.gap.residuals.patches import Patches
 from mlscorr.gap.residuals.settings import SETTINGS
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.targets import SETTINGS as TARGETS
-from mlscorr.ties.thinning import integer_hash
+from mlscorr.ties import integer_hash
 
 
 def fit_patches(

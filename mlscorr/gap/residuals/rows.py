@@ -9,8 +9,7 @@ from scipy.sparse import csr_array
 
 from mlscorr.effects import Reference
 from mlscorr.pos import stated_sigma
-from mlscorr.survey import ControlPoints, Survey
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns, ControlPoints, Survey
 
 METRIC = ("target", "surface", "shared")  # in m along a direction; the others have no unit
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.ties.settings import SETTINGS as TIES
+from mlscorr.ties import SETTINGS as TIES
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,15 @@
 """What each effect does to the rows."""
 
+from mlscorr.gap.signatures._displacements import displacements
+from mlscorr.gap.signatures._signatures import (
+    NO_MOUNTING,
+    UNSTATED,
+    Signature,
+    select,
+    signature,
+    signatures,
+)
+from mlscorr.gap.signatures.changes import Bench, check_mounting
 from mlscorr.gap.signatures.expectation import curvature, expected, without_effects
-from mlscorr.gap.signatures.signatures import Signature, select, signatures
-from mlscorr.gap.signatures.simulators import as_believed, with_cause
+from mlscorr.gap.signatures.settings import SETTINGS
+from mlscorr.gap.signatures.simulators import as_believed, joined, with_cause

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from mlscorr.effects import Effect, Returns
-from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals import Rows
 from mlscorr.gap.signatures.settings import SETTINGS
 from mlscorr.survey import Survey, Trajectory
 

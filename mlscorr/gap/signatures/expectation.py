@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.effects import EFFECTS, Effect
-from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures._signatures import Signature, too_far
 from mlscorr.gap.signatures.changes import Bench, Change
-from mlscorr.gap.signatures.signatures import Signature, too_far
 from mlscorr.survey import Survey
 
 

@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.effects import Effect, in_order
-from mlscorr.effects.mounting import Boresight, LeverArm
-from mlscorr.effects.ranging import Dropout
-from mlscorr.simulate.simulator_file import Simulator, beliefs_of
+from mlscorr.effects import Boresight, Dropout, Effect, LeverArm, in_order
+from mlscorr.simulate import Simulator, beliefs_of
 from mlscorr.survey import Survey, SurveyFileError
 
 

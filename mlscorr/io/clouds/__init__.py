@@ -5,3 +5,29 @@
 - las_copy, las_output, las_writer, copc_writer, extra_bytes: corrected copies and new files
 - conversion, cloud_sources, e57, ply_clouds, ply: other formats, and meshes
 """
+
+from mlscorr.io.clouds.conversion import (
+    converted,
+    is_foreign,
+    read_in_part,
+    recorded_points,
+    written_name,
+)
+from mlscorr.io.clouds.copies import find_copies
+from mlscorr.io.clouds.extra_bytes import add_sigma_fields
+from mlscorr.io.clouds.las import (
+    count_sources,
+    read_chunks,
+    sample_gps_times,
+    sha256,
+    spread_records,
+    timed_records,
+)
+from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds.las_copy import CorrectedPart, write_parts
+from mlscorr.io.clouds.las_crs import cloud_box, crs_conflict, stated_crs
+from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.clouds.las_windows import read_windows
+from mlscorr.io.clouds.las_writer import cloud_writer
+from mlscorr.io.clouds.noise import counted_noise
+from mlscorr.io.clouds.ply import announced_faces, write_ply

@@ -16,17 +16,21 @@ import numpy as np
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from mlscorr.io.clouds.cloud_sources import CloudSource
-from mlscorr.io.clouds.e57 import open_e57
+from mlscorr.io.clouds._cloud_sources import CloudSource
+from mlscorr.io.clouds._e57 import open_e57
+from mlscorr.io.clouds._ply_clouds import open_ply
 from mlscorr.io.clouds.las_writer import INTEGER_LIMIT, cloud_writer
-from mlscorr.io.clouds.ply_clouds import open_ply
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.preparation import looked_points, progress_of, temporary_folder
-from mlscorr.io.store.storage import file_state, is_remote
-from mlscorr.io.trajectories.time_systems import ADJUSTMENT, NO_TIMES, lacks_time
-from mlscorr.survey import CloudFile, PointCloud
-from mlscorr.survey.clouds import WEEK
+from mlscorr.io.store import (
+    file_state,
+    is_remote,
+    looked_points,
+    open_file,
+    progress_of,
+    temporary_folder,
+)
+from mlscorr.io.trajectories import ADJUSTMENT, NO_TIMES, lacks_time
+from mlscorr.survey import WEEK, CloudFile, PointCloud
 
 OPENERS: dict[str, Callable[[Path], CloudSource]] = {".e57": open_e57, ".ply": open_ply}
 RESOLUTION = 1e-4  # m, of coordinates: a tenth of what scanners resolve, and 214 km in 32 bits

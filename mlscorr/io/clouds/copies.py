@@ -14,16 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.io.clouds._las_points import read_records
 from mlscorr.io.clouds.conversion import OPENERS, is_foreign, read_in_part
 from mlscorr.io.clouds.las import records_at
 from mlscorr.io.clouds.las_checks import HEADER_SIZES, read_layout
 from mlscorr.io.clouds.las_crs import cloud_box
 from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.clouds.las_points import read_records
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.storage import is_remote
-from mlscorr.io.trajectories.time_systems import ADJUSTMENT, WEEK
+from mlscorr.io.store import is_remote, open_file
+from mlscorr.io.trajectories import ADJUSTMENT, WEEK
 
 
 def find_copies(paths: Iterable[Path]) -> dict[Path, Path]:

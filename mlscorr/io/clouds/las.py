@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mlscorr.io.clouds._las_points import decoding_points, read_records
+from mlscorr.io.clouds._time_order import in_time_order
 from mlscorr.io.clouds.las_checks import read_layout
 from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.clouds.las_points import decoding_points, read_records
 from mlscorr.io.clouds.noise import count_noise
-from mlscorr.io.clouds.time_order import in_time_order
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.trajectories.time_systems import lacks_time
+from mlscorr.io.store import open_file
+from mlscorr.io.trajectories import lacks_time
 from mlscorr.survey import CloudFile, PointCloud
 
 

@@ -9,13 +9,12 @@ import lazrs
 import numpy as np
 from laspy import PointFormat, supported_point_formats
 
+from mlscorr.io.clouds._copc import check_hierarchy
+from mlscorr.io.clouds._las_points import decoding
 from mlscorr.io.clouds.conversion import converted, is_foreign
-from mlscorr.io.clouds.copc import check_hierarchy
 from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.clouds.las_points import decoding
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.storage import as_path, file_state, is_there
+from mlscorr.io.store import as_path, file_state, is_there, open_file
 
 HEADER_SIZES = (227, 227, 227, 235, 375, 393)  # bytes, of LAS 1.0 to 1.5
 COPC_FORMATS = (6, 7, 8)  # COPC 1.0

@@ -8,20 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.correction.pair import require_fit
-from mlscorr.correction.point_sigma import PointSigma
-from mlscorr.io.clouds.copc_writer import CopcWriter
+from mlscorr.correction import PointSigma, require_fit
+from mlscorr.io.clouds._copc_writer import CopcWriter
+from mlscorr.io.clouds._las_output import LasOutput, PlainWriter
 from mlscorr.io.clouds.extra_bytes import add_sigma_fields, with_sigmas
 from mlscorr.io.clouds.las import read_records, records_at
 from mlscorr.io.clouds.las_checks import read_layout
 from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.clouds.las_output import LasOutput, PlainWriter
 from mlscorr.io.clouds.las_writer import INTEGER_LIMIT
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.output import PART, output_file
-from mlscorr.io.store.storage import is_remote
-from mlscorr.io.trajectories.time_systems import PLACEHOLDERS
+from mlscorr.io.store import PART, is_remote, open_file, output_file
+from mlscorr.io.trajectories import PLACEHOLDERS
 from mlscorr.survey import CloudFile, Correcting, PointCloud
 
 

@@ -12,7 +12,7 @@ from pyproj.exceptions import CRSError, ProjError
 from mlscorr.io.clouds.las_checks import variable_records
 from mlscorr.io.clouds.las_layout import LasLayout
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.trajectories.projection import crs_name
+from mlscorr.io.trajectories import crs_name
 
 OWNER, WKT, GEO_KEYS = b"LASF_Projection", 2112, 34735  # LAS 1.4 R15, section 3
 PROJECTED, GEOGRAPHIC, VERTICAL = 3072, 2048, 4096  # keys of GeoTIFF 1.1

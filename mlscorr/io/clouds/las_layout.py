@@ -21,8 +21,8 @@ import lazrs
 import numpy as np
 from laspy import PointFormat
 
-from mlscorr.io.clouds.las_points import ChunkedPoints, PlainPoints
-from mlscorr.io.trajectories.time_systems import ADJUSTMENT
+from mlscorr.io.clouds._las_points import ChunkedPoints, PlainPoints
+from mlscorr.io.trajectories import ADJUSTMENT
 
 VLR_HEADER = struct.Struct("<2x16sHH32s")  # owner, record, length of data, description
 LASZIP, LASZIP_RECORD = b"laszip encoded", 22204  # of the VLR that says how points are compressed

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mlscorr.io.clouds._time_order import in_time_order
 from mlscorr.io.clouds.las import read_chunks, records_at, spread_records
 from mlscorr.io.clouds.las_checks import read_layout
 from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.clouds.time_order import in_time_order
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.trajectories.time_systems import lacks_time
+from mlscorr.io.trajectories import lacks_time
 from mlscorr.survey import CloudFile, PointCloud
 
 

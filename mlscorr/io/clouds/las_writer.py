@@ -13,7 +13,7 @@ import lazrs
 import numpy as np
 from pyproj import CRS
 
-from mlscorr.io.store.output import output_file
+from mlscorr.io.store import output_file
 from mlscorr.survey import PointCloud
 
 SCAN_ANGLE_UNIT = 0.006  # deg, LAS 1.4 specification, formats 6 to 10

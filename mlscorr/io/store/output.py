@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from mlscorr.io.store.folders import exchange, move_into, remove, take_along
+from mlscorr.io.store._folders import exchange, move_into, remove, take_along
 from mlscorr.io.store.inputs import check_unchanged
 from mlscorr.io.store.publishing import check_contents, publish, scratch_folder
 from mlscorr.io.store.storage import as_path, is_remote

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.store import publishing
-from mlscorr.io.store.folders import remove
+from mlscorr.io.store._folders import remove
 from mlscorr.io.store.opening import read_bytes
 from mlscorr.io.store.output import PART, fcntl
 from mlscorr.io.store.storage import is_remote, is_there

@@ -5,3 +5,40 @@
 - survey_paths, survey_scanners, session_points, surveyed_points: which file belongs to what
 - survey_copy, folder_roles, simulated_clouds, crs_checks: survey.toml written anew, found, checked
 """
+
+from mlscorr.io.surveys.crs_checks import check_area, crs_notes
+from mlscorr.io.surveys.folder_roles import SIMULATED, FileRole, sort_files
+from mlscorr.io.surveys.project_file import (
+    DriveParts,
+    ProjectParts,
+    is_project,
+    read_project,
+    stated_project,
+)
+from mlscorr.io.surveys.project_sections import SHARED_TILES
+from mlscorr.io.surveys.session_points import check_belongings
+from mlscorr.io.surveys.simulated_clouds import simulated_survey
+from mlscorr.io.surveys.survey_copy import mounting_values, write_survey_copy
+from mlscorr.io.surveys.survey_file import (
+    FILE_NAME,
+    cloud_file,
+    input_files,
+    read_survey,
+    stated_pos,
+    survey_toml,
+)
+from mlscorr.io.surveys.survey_paths import (
+    check_distinct,
+    check_sessions,
+    given_file,
+    matching,
+    session_file,
+)
+from mlscorr.io.surveys.survey_scanners import mounted_scanners
+from mlscorr.io.surveys.survey_sections import (
+    MountingSection,
+    PlannedSurveyFile,
+    PosSection,
+    ScannerSection,
+    SurveyFile,
+)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pyproj import CRS, Transformer
 
-from mlscorr.io.trajectories.projection import check_crs, crs_name, map_of
+from mlscorr.io.trajectories import check_crs, crs_name, map_of
 from mlscorr.survey import Trajectory
 
 

@@ -7,19 +7,32 @@ from typing import Literal
 
 import numpy as np
 
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.ply import announced_faces
+from mlscorr.io.clouds import announced_faces, read_layout
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.patterns import folders_below
-from mlscorr.io.tables.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, find_meanings, listed
-from mlscorr.io.tables.control_lists import lacking, unnamed_columns
-from mlscorr.io.tables.layout_search import NUMBER, find_layout, likely_header
-from mlscorr.io.trajectories.conventions import QUATERNION
-from mlscorr.io.trajectories.pof import POF_SUFFIX, POQ_SUFFIX
-from mlscorr.io.trajectories.positions import POSITION_SUFFIX, position_file
-from mlscorr.io.trajectories.sbet import SBET_FIELDS, SMRMSG_FIELDS
-from mlscorr.io.trajectories.time_systems import count_on
-from mlscorr.io.trajectories.trajectory_tables import COLUMNS, tum_columns
+from mlscorr.io.store import folders_below
+from mlscorr.io.tables import (
+    CONTROL_NAMES,
+    NUMBER,
+    TRAJECTORY_NAMES,
+    find_layout,
+    find_meanings,
+    lacking,
+    likely_header,
+    listed,
+    unnamed_columns,
+)
+from mlscorr.io.trajectories import (
+    COLUMNS,
+    POF_SUFFIX,
+    POQ_SUFFIX,
+    POSITION_SUFFIX,
+    QUATERNION,
+    SBET_FIELDS,
+    SMRMSG_FIELDS,
+    count_on,
+    position_file,
+    tum_columns,
+)
 
 Role = Literal["cloud", "trajectory", "accuracy", "control", "reference", "table", "none"]
 CLOUDS = (".las", ".laz", ".e57")

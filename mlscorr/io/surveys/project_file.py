@@ -8,11 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.io.clouds.copies import find_copies
-from mlscorr.io.store.inputs import input_file
-from mlscorr.io.store.opening import read_bytes
-from mlscorr.io.store.storage import as_path, beside, is_folder, is_there, resolved
-from mlscorr.io.store.toml_file import read_toml
+from mlscorr.io.clouds import find_copies
+from mlscorr.io.store import (
+    as_path,
+    beside,
+    input_file,
+    is_folder,
+    is_there,
+    read_bytes,
+    read_toml,
+    resolved,
+)
+from mlscorr.io.surveys._surveyed_points import read_surveyed
 from mlscorr.io.surveys.project_sections import ProjectFile
 from mlscorr.io.surveys.survey_file import SurveyParts, read_parts, read_survey_file, survey_toml
 from mlscorr.io.surveys.survey_paths import (
@@ -23,10 +30,8 @@ from mlscorr.io.surveys.survey_paths import (
     matching,
 )
 from mlscorr.io.surveys.survey_sections import CloudSection, SurveyFile
-from mlscorr.io.surveys.surveyed_points import read_surveyed
-from mlscorr.io.tables.control import NOTHING_SURVEYED
-from mlscorr.io.trajectories.projection import check_crs
-from mlscorr.io.trajectories.trajectory_sessions import check_systems
+from mlscorr.io.tables import NOTHING_SURVEYED
+from mlscorr.io.trajectories import check_crs, check_systems
 from mlscorr.survey import ControlPoints, InputFile, Trajectory
 
 FILE_NAME = "project.toml"

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from mlscorr.io.store.toml_file import TomlSection
+from mlscorr.io.store import TomlSection
 from mlscorr.io.surveys import survey_sections
 
 FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system

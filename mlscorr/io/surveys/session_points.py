@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.clouds.las import timed_records
-from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds import read_layout, timed_records
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.surveys.survey_paths import own_clouds
-from mlscorr.io.trajectories.trajectory_sections import SessionSection
-from mlscorr.io.trajectories.trajectory_sessions import SessionFile
+from mlscorr.io.trajectories import SessionFile, SessionSection
 from mlscorr.survey import CloudFile, SurveyFileError, Trajectory
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_crs import crs_conflict
+from mlscorr.io.clouds import crs_conflict, read_layout
 from mlscorr.io.surveys.survey_file import FILE_NAME, cloud_file, read_survey
 from mlscorr.survey import Survey
 

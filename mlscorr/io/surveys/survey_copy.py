@@ -10,10 +10,8 @@ import numpy as np
 import tomlkit
 from tomlkit.items import InlineTable
 
-from mlscorr.io.clouds.conversion import written_name
-from mlscorr.io.store.opening import read_bytes
-from mlscorr.io.store.storage import as_path, is_remote, is_url, resolved
-from mlscorr.io.store.text_files import ENCODING
+from mlscorr.io.clouds import written_name
+from mlscorr.io.store import ENCODING, as_path, is_remote, is_url, read_bytes, resolved
 from mlscorr.io.surveys.survey_paths import matching
 from mlscorr.survey import Mounting
 

@@ -5,22 +5,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mlscorr.io.clouds.conversion import converted, is_foreign
-from mlscorr.io.clouds.las import read_chunks, spread_records
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_crs import crs_conflict
-from mlscorr.io.store.inputs import input_file
-from mlscorr.io.store.storage import as_path, is_folder, is_there
-from mlscorr.io.store.toml_file import read_toml
+from mlscorr.io.clouds import (
+    converted,
+    crs_conflict,
+    is_foreign,
+    read_chunks,
+    read_layout,
+    spread_records,
+)
+from mlscorr.io.store import as_path, input_file, is_folder, is_there, read_toml
+from mlscorr.io.surveys._surveyed_points import read_surveyed
 from mlscorr.io.surveys.crs_checks import crs_notes
 from mlscorr.io.surveys.session_points import check_belongings
 from mlscorr.io.surveys.survey_paths import SurveyPaths, files_of
 from mlscorr.io.surveys.survey_scanners import clouds_of, mounted_scanners, scanner_notes
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile, SurveyFile
-from mlscorr.io.surveys.surveyed_points import read_surveyed
-from mlscorr.io.trajectories.projection import check_crs
-from mlscorr.io.trajectories.time_systems import ADJUSTMENT, match_times
-from mlscorr.io.trajectories.trajectory_sessions import Sessions, read_sessions
+from mlscorr.io.trajectories import ADJUSTMENT, Sessions, check_crs, match_times, read_sessions
 from mlscorr.survey import (
     NOISE_CLASSES,
     CloudFile,

@@ -8,17 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mlscorr.io.clouds.conversion import written_name
-from mlscorr.io.clouds.copies import find_copies
+from mlscorr.io.clouds import find_copies, written_name
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.storage import beside, files_like, is_folder, is_remote, is_there, resolved
-from mlscorr.io.store.text_files import nearest
+from mlscorr.io.store import beside, files_like, is_folder, is_remote, is_there, nearest, resolved
 from mlscorr.io.surveys.folder_roles import RESULTS
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
-from mlscorr.io.trajectories.trajectory_sessions import SessionFile
-from mlscorr.survey import CloudFile, SurveyFileError
-from mlscorr.survey.summary import counted
+from mlscorr.io.trajectories import SessionFile, TrajectorySection
+from mlscorr.survey import CloudFile, SurveyFileError, counted
 
 
 @dataclass(frozen=True)

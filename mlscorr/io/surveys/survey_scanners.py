@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.clouds.las import count_sources
-from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds import count_sources, read_layout
 from mlscorr.io.surveys.survey_paths import own_clouds
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile, ScannerSection
 from mlscorr.survey import CloudFile, MountedScanner, SurveyFileError

@@ -9,18 +9,9 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 from scipy.spatial.transform import Rotation
 
-from mlscorr.io.store.toml_file import (
-    Degrees,
-    Meters,
-    PointSource,
-    Positive,
-    Share,
-    Six,
-    Three,
-    TomlSection,
-)
-from mlscorr.io.tables.table_sections import ControlSection
-from mlscorr.io.trajectories.trajectory_sections import SessionSection, TrajectorySection
+from mlscorr.io.store import Degrees, Meters, PointSource, Positive, Share, Six, Three, TomlSection
+from mlscorr.io.tables import ControlSection
+from mlscorr.io.trajectories import SessionSection, TrajectorySection
 from mlscorr.survey import NOISE_CLASSES, SEARCH_RADIUS, Mounting, Pos, Scanner
 
 NoiseClasses = Annotated[

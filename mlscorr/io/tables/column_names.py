@@ -14,10 +14,9 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from mlscorr.io.store.text_files import shown
-from mlscorr.survey import data_frame
+from mlscorr.io.store import shown
+from mlscorr.survey import AXES
 
-AXES = data_frame.AXES
 ANGLES = ("roll", "pitch", "heading")
 PLACE_NAMES = {
     "easting": "e east ecoord ecoordinate rechtswert rechts ost ostwert este est "

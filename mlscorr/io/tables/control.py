@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.storage import as_path
-from mlscorr.io.store.text_files import ENCODING, shown, warn_of_cut
+from mlscorr.io.store import ENCODING, as_path, open_file, shown, warn_of_cut
+from mlscorr.io.tables._sheets import SUFFIX
 from mlscorr.io.tables.column_names import AXES, CONTROL_NAMES, WORDS, meant, same_word
 from mlscorr.io.tables.control_faults import doubled_names, refuse, row_doubts, row_faults
 from mlscorr.io.tables.control_lists import (
@@ -27,7 +26,6 @@ from mlscorr.io.tables.control_lists import (
     with_check_points,
     word_places,
 )
-from mlscorr.io.tables.sheets import SUFFIX
 from mlscorr.io.tables.table_rows import read_rows
 from mlscorr.io.tables.table_sections import ControlSection
 from mlscorr.io.tables.tables import read_layout

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.open_places import OpenPlace, OpenQuestion
-from mlscorr.io.store.text_files import nearest, shown
+from mlscorr.io.store import OpenPlace, OpenQuestion, nearest, shown
 from mlscorr.io.tables.column_names import AXES, WORDS
 from mlscorr.io.tables.control_lists import NORMAL, SIGMAS
 

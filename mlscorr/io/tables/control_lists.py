@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.open_places import OpenPlace, OpenQuestion
-from mlscorr.io.store.text_files import shown
+from mlscorr.io.store import OpenPlace, OpenQuestion, shown
 from mlscorr.io.tables.column_names import AXES, CONTROL_NAMES, WORDS, OfficeWord, meant, same_word
 from mlscorr.io.tables.layout_search import NUMBER
 from mlscorr.io.tables.layouts import TableLayout

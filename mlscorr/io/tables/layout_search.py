@@ -10,13 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.open_places import OpenPlace, OpenQuestion
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.storage import as_path
-from mlscorr.io.store.text_files import shown
+from mlscorr.io.store import OpenPlace, OpenQuestion, as_path, open_file, shown
 from mlscorr.io.tables import layouts
+from mlscorr.io.tables._sheets import SUFFIX, read_sheets
 from mlscorr.io.tables.column_names import UNITS, find_meanings, is_foreign, section_of, unit_of
-from mlscorr.io.tables.sheets import SUFFIX, read_sheets
 from mlscorr.survey import SurveyFileError
 
 WORDS = ("name", "kind", "role")  # columns that hold no numbers

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.text_files import ENCODING, shown
+from mlscorr.io.store import ENCODING, open_file, shown
 from mlscorr.io.tables.column_names import plain
 
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}  # the surest first

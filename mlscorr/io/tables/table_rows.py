@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.storage import is_remote
-from mlscorr.io.store.text_files import ENCODING, shown
+from mlscorr.io.store import ENCODING, is_remote, open_file, shown
+from mlscorr.io.tables._sheets import read_sheets
 from mlscorr.io.tables.layouts import SEPARATORS, TableLayout, is_comment, not_text
-from mlscorr.io.tables.sheets import read_sheets
 
 DATE = re.compile(r"\d+[-/:.]\d+[-/:.]\d+")  # of a day or a time of day
 

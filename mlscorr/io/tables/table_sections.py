@@ -4,12 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from mlscorr.io.store.toml_file import (
-    Column,
-    Coordinate,
-    Positive,
-    TomlSection,
-)
+from mlscorr.io.store import Column, Coordinate, Positive, TomlSection
 from mlscorr.io.tables.column_names import OfficeWord, same_word
 
 

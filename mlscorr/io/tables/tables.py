@@ -6,14 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.open_places import OpenPlace, OpenQuestion
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.storage import as_path
-from mlscorr.io.store.text_files import ENCODING, nearest, shown
+from mlscorr.io.store import ENCODING, OpenPlace, OpenQuestion, as_path, nearest, open_file, shown
+from mlscorr.io.tables._sheets import SUFFIX
 from mlscorr.io.tables.column_names import find_meanings, listed, plain, section_of
 from mlscorr.io.tables.layout_search import NUMBER, check_chosen, find_layout, likely_header
 from mlscorr.io.tables.layouts import TableLayout, head, not_text
-from mlscorr.io.tables.sheets import SUFFIX
 
 
 def read_header(path: str | Path) -> tuple[list[str], int]:

@@ -5,3 +5,45 @@
 - conventions, course, projection: attitudes and positions brought into the map
 - time_systems, leap_seconds: the constant between the times of cloud and trajectory
 """
+
+from mlscorr.io.trajectories.conventions import QUATERNION
+from mlscorr.io.trajectories.pof import POF_SUFFIX, POQ_SUFFIX
+from mlscorr.io.trajectories.pos_error_series import PosErrorSeries, read_pos_error_series
+from mlscorr.io.trajectories.poses import read_poses, utm_zone
+from mlscorr.io.trajectories.positions import POSITION_SUFFIX, position_file
+from mlscorr.io.trajectories.projection import (
+    MapFactors,
+    check_crs,
+    crs_code,
+    crs_name,
+    map_factors,
+    map_of,
+)
+from mlscorr.io.trajectories.sbet import SBET_FIELDS, SMRMSG_FIELDS
+from mlscorr.io.trajectories.time_systems import (
+    ADJUSTMENT,
+    DAY,
+    NO_TIMES,
+    PLACEHOLDERS,
+    WEEK,
+    TimeMatch,
+    count_on,
+    lacks_time,
+    listed_times,
+    match_times,
+    utc_lag,
+)
+from mlscorr.io.trajectories.trajectory import read_trajectory, write_trajectory_csv
+from mlscorr.io.trajectories.trajectory_exports import check_exports, export_trajectory
+from mlscorr.io.trajectories.trajectory_sections import SessionSection, TrajectorySection
+from mlscorr.io.trajectories.trajectory_sessions import (
+    SessionFile,
+    Sessions,
+    across_week_end,
+    check_systems,
+    join_sessions,
+    read_sessions,
+    with_sigmas,
+)
+from mlscorr.io.trajectories.trajectory_tables import COLUMNS, tum_columns
+from mlscorr.io.trajectories.weak_files import write_weak

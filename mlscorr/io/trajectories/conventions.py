@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.open_places import PLACE_OF_CRS, OpenPlace, OpenQuestion
-from mlscorr.io.tables.column_names import ANGLES, AXES
-from mlscorr.io.trajectories.course import heading_and_course, median_difference
+from mlscorr.io.store import PLACE_OF_CRS, OpenPlace, OpenQuestion
+from mlscorr.io.tables import ANGLES, AXES
+from mlscorr.io.trajectories._course import heading_and_course, median_difference
 from mlscorr.io.trajectories.projection import convergence_at, project
 from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
 

@@ -11,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.store.opening import read_bytes
-from mlscorr.io.store.storage import as_path
-from mlscorr.io.tables.tables import check_finite
-from mlscorr.io.trajectories.leap_seconds import leap_seconds
+from mlscorr.io.store import as_path, read_bytes
+from mlscorr.io.tables import check_finite
+from mlscorr.io.trajectories._leap_seconds import leap_seconds
 from mlscorr.io.trajectories.time_systems import DAY, counting_on
-from mlscorr.survey.clouds import WEEK
+from mlscorr.survey import WEEK
 
 POF_SUFFIX, POQ_SUFFIX = ".pof", ".poq"
 HEADER = np.dtype(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.tables.tables import check_finite, check_increasing
+from mlscorr.io.tables import check_finite, check_increasing
 
 COLUMNS = ("time", "N", "E", "D", "velocity N", "velocity E", "velocity D", "roll", "pitch", "yaw")
 

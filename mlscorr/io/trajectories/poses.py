@@ -14,10 +14,8 @@ from pyproj import Transformer
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.text_files import ENCODING
-from mlscorr.io.tables.layouts import TableLayout
-from mlscorr.io.tables.table_rows import read_numbers
-from mlscorr.io.tables.tables import check_finite, check_increasing, read_header
+from mlscorr.io.store import ENCODING
+from mlscorr.io.tables import TableLayout, check_finite, check_increasing, read_header, read_numbers
 from mlscorr.io.trajectories.sbet import SBET_FIELDS
 from mlscorr.io.trajectories.time_systems import count_on
 from mlscorr.io.trajectories.trajectory import SBET_SUFFIXES, read_trajectory

@@ -9,9 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.tables.column_names import AXES, TRAJECTORY_NAMES, find_meanings, plain
-from mlscorr.io.tables.layout_search import NUMBER, find_layout, likely_header
-from mlscorr.io.tables.table_rows import read_numbers
+from mlscorr.io.tables import (
+    AXES,
+    NUMBER,
+    TRAJECTORY_NAMES,
+    find_layout,
+    find_meanings,
+    likely_header,
+    plain,
+    read_numbers,
+)
 from mlscorr.io.trajectories.conventions import QUATERNION
 
 POSITION_SUFFIX = ".pos"

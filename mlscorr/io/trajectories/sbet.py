@@ -21,15 +21,12 @@ import numpy as np
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.open_places import PLACE_OF_CRS, OpenQuestion
-from mlscorr.io.store.opening import read_doubles
-from mlscorr.io.store.storage import as_path, file_state
-from mlscorr.io.tables.tables import check_finite
+from mlscorr.io.store import PLACE_OF_CRS, OpenQuestion, as_path, file_state, read_doubles
+from mlscorr.io.tables import check_finite
 from mlscorr.io.trajectories.pof import POQ_SUFFIX, read_pof, read_poq
 from mlscorr.io.trajectories.projection import project
 from mlscorr.io.trajectories.time_systems import DAY, count_on, counting_on
-from mlscorr.survey import Trajectory
-from mlscorr.survey.clouds import WEEK
+from mlscorr.survey import WEEK, Trajectory
 
 SBET_FIELDS = (
     "gps_time",

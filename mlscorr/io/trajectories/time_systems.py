@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.trajectories.leap_seconds import EPOCH, leap_seconds
-from mlscorr.survey import Trajectory
-from mlscorr.survey.clouds import WEEK, counted_on
+from mlscorr.io.trajectories._leap_seconds import EPOCH, leap_seconds
+from mlscorr.survey import WEEK, Trajectory, counted_on
 
 DAY = 86400.0  # s
 ADJUSTMENT = 1e9  # s

@@ -7,11 +7,9 @@ import numpy as np
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.output import output_file
-from mlscorr.io.store.storage import as_path
-from mlscorr.io.store.text_files import warn_of_cut
-from mlscorr.io.trajectories.course import check_units, checked_motion
+from mlscorr.io.store import as_path, open_file, output_file, warn_of_cut
+from mlscorr.io.trajectories._course import check_units, checked_motion
+from mlscorr.io.trajectories._trj import MARK
 from mlscorr.io.trajectories.pof import POF_SUFFIX
 from mlscorr.io.trajectories.sbet import is_sbet, read_riegl, read_sbet
 from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
@@ -23,7 +21,6 @@ from mlscorr.io.trajectories.trajectory_tables import (
     read_table,
     read_terrascan,
 )
-from mlscorr.io.trajectories.trj import MARK
 from mlscorr.survey import Trajectory
 
 SBET_SUFFIXES = (".sbet", ".out")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.frames import angles_from_attitude
-from mlscorr.io.store.output import output_file
+from mlscorr.io.store import output_file
 from mlscorr.io.trajectories.projection import check_crs, to_geographic
 from mlscorr.io.trajectories.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.survey import Trajectory

@@ -4,12 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mlscorr.io.store.toml_file import (
-    Column,
-    PointSource,
-    TomlSection,
-)
-from mlscorr.io.tables.table_sections import PlaceColumns
+from mlscorr.io.store import Column, PointSource, TomlSection
+from mlscorr.io.tables import PlaceColumns
 
 
 class TrajectoryColumns(PlaceColumns):

@@ -10,8 +10,7 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.io.trajectories.time_systems import NAMES, usual_systems
 from mlscorr.io.trajectories.trajectory import read_trajectory_file
 from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
-from mlscorr.survey import Pos, Trajectory
-from mlscorr.survey.clouds import WEEK
+from mlscorr.survey import WEEK, Pos, Trajectory
 
 KINDS = ("position", "attitude")
 

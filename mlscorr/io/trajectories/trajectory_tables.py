@@ -11,20 +11,21 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.store.open_places import OpenPlace, OpenQuestion
-from mlscorr.io.store.text_files import shown
-from mlscorr.io.tables.column_names import (
+from mlscorr.io.store import OpenPlace, OpenQuestion, shown
+from mlscorr.io.tables import (
     ANGLES,
     AXES,
+    NUMBER,
     TRAJECTORY_NAMES,
     UNITS,
+    TableLayout,
     find_meanings,
+    likely_header,
     plain,
+    read_layout,
+    read_numbers,
 )
-from mlscorr.io.tables.layout_search import NUMBER, likely_header
-from mlscorr.io.tables.layouts import TableLayout
-from mlscorr.io.tables.table_rows import read_numbers
-from mlscorr.io.tables.tables import read_layout
+from mlscorr.io.trajectories._trj import read_trj
 from mlscorr.io.trajectories.conventions import (
     QUATERNION,
     UNIT_TOLERANCE,
@@ -35,7 +36,6 @@ from mlscorr.io.trajectories.conventions import (
 from mlscorr.io.trajectories.positions import check_projected, position_file
 from mlscorr.io.trajectories.time_systems import counting_on
 from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
-from mlscorr.io.trajectories.trj import read_trj
 from mlscorr.survey import SurveyFileError
 
 COLUMNS = ("gps_time", *AXES, *ANGLES)

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from pyproj import Transformer
 
-from mlscorr.io.tables.column_names import AXES
-from mlscorr.io.tables.result_tables import write_csv
+from mlscorr.io.tables import AXES, write_csv
 from mlscorr.io.trajectories.projection import check_crs
 from mlscorr.survey import Trajectory
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from mlscorr.estimate import few_targets
-from mlscorr.io.store.preparation import glance
-from mlscorr.io.surveys.project_file import ProjectParts, read_project, stated_project
+from mlscorr.io.store import glance
+from mlscorr.io.surveys import ProjectParts, read_project, stated_project
 from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
 from mlscorr.pipeline.faults import Faults
 from mlscorr.pipeline.needs import Amount

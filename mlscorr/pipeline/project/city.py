@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.store import TaskStore
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.areas import Area, Piece, drive_areas, pieces_of
 from mlscorr.pipeline.project.corrected import DriveState, corrected_drives

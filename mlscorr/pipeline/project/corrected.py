@@ -8,7 +8,7 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import Estimate, place_control
-from mlscorr.evaluate.ties import misfit, misfit_section, tie_section
+from mlscorr.evaluate import misfit, misfit_section, tie_section
 from mlscorr.pipeline.clouds import MovedClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.correction import corrected_fields

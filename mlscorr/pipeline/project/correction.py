@@ -7,14 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.store.identity import FileIdentity
-from mlscorr.io.store.output import check_output, output_file, write_json
-from mlscorr.io.store.publishing import check_store_output, remove_files
-from mlscorr.io.store.storage import as_path, is_folder, is_remote
-from mlscorr.io.store.task_store import TaskStore, digest
-from mlscorr.io.surveys.project_file import ProjectParts, read_project
-from mlscorr.io.surveys.project_sections import SHARED_TILES
-from mlscorr.io.trajectories.trajectory_exports import check_exports
+from mlscorr.io.store import (
+    FileIdentity,
+    TaskStore,
+    as_path,
+    check_output,
+    check_store_output,
+    digest,
+    is_folder,
+    is_remote,
+    output_file,
+    remove_files,
+    write_json,
+)
+from mlscorr.io.surveys import SHARED_TILES, ProjectParts, read_project
+from mlscorr.io.trajectories import check_exports
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.project import stages
 from mlscorr.pipeline.project.city import project_drives
@@ -162,7 +169,7 @@ class _Work:
         write_json(self.out / "project.json", result.document)
         remove_files(self.out, "project.html")
         if self.options.page:
-            from mlscorr.report.project_page import write_project
+            from mlscorr.report import write_project
 
             with output_file(self.out / "project.html") as part:
                 write_project(part, result.document, result.tracks)

@@ -8,17 +8,17 @@ from posixpath import normpath
 
 import numpy as np
 
-from mlscorr.evaluate.model import largest_sigma
-from mlscorr.io.store.output import document
-from mlscorr.io.store.task_store import TaskStore
-from mlscorr.io.surveys.project_file import ProjectParts
+from mlscorr.evaluate import largest_sigma
+from mlscorr.io.store import TaskStore, document
+from mlscorr.io.surveys import ProjectParts
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.corrected import STATES, DriveState
 from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.tasks import Written
-from mlscorr.report import headline
-from mlscorr.survey.summary import counted
+from mlscorr.report import RATINGS as ORDER
+from mlscorr.report import Statement, capped, statements_section
+from mlscorr.survey import counted
 
 COUNTS = "n_surveyed", "n_seen", "n_scored"
 RATINGS = {"controlled": "green", "tied": "green", "relative": "red", "uncorrected": "red"}
@@ -148,7 +148,7 @@ def project_document(
         {
             "name": project.name,
             "crs": project.crs,
-            **headline.statements_section(facts),
+            **statements_section(facts),
             "drives": rows,
             "faults": faults,
         },
@@ -169,7 +169,7 @@ def _row(result, report):
     return {
         **asdict(state),
         "meaning": STATES[state.state],
-        "rating": max(report["rating"], RATINGS[state.state], key=headline.RATINGS.index),
+        "rating": max(report["rating"], RATINGS[state.state], key=ORDER.index),
         "files": len(report["files"]),
         "points": sum(file["points"] for file in report["files"]),
         **{role: {key: report[role][key] for key in COUNTS} for role in ("control", "check")},
@@ -191,7 +191,7 @@ def _statements(project, rows, drives, faults):
     count = {state: [row["name"] for row in rows if row["state"] == state] for state in STATES}
     held = len(count["controlled"]) + len(count["tied"])
     others = [(s, names) for s, names in count.items() if names and s != "controlled"]
-    yield headline.Statement(
+    yield Statement(
         "Drives",
         "green" if held == len(project.drives) else "red",
         f"Held by control points: {held} of {counted(len(project.drives), 'drive')}, "
@@ -204,13 +204,13 @@ def _statements(project, rows, drives, faults):
         for target in report["targets"]
         if target["role"] == "control" and target["used"]
     }
-    yield headline.Statement(
+    yield Statement(
         "Control points",
         "green" if len(used) == len(project.control) else "amber",
         f"{len(used)} of {len(project.control)} surveyed control points are used.",
     )
     if noise := sum(report["coverage"]["points_noise"] for _, report in drives):
-        yield headline.Statement(
+        yield Statement(
             "Noise",
             "green",
             f"{noise} of {sum(row['points'] for row in rows)} points are flagged as noise. They "
@@ -218,7 +218,7 @@ def _statements(project, rows, drives, faults):
         )
     yield from _minded(rows, [report for _, report in drives])
     if faults:
-        yield headline.Statement(
+        yield Statement(
             "Failures",
             "red",
             f"{counted(len(faults), 'failure')}: what is named was not corrected, and all else "
@@ -235,10 +235,10 @@ def _minded(rows, reports):
         if row["rating"] != "green"
     ]
     if doubts:
-        doubts.sort(key=lambda doubt: -headline.RATINGS.index(doubt[0]))
+        doubts.sort(key=lambda doubt: -ORDER.index(doubt[0]))
         sentence = f"There is something to mind in {len(doubts)} of {counted(len(rows), 'drive')}."
-        items = headline.capped(doubt[1:] for doubt in doubts)
-        yield headline.Statement("Doubts", doubts[0][0], sentence, items)
+        items = capped(doubt[1:] for doubt in doubts)
+        yield Statement("Doubts", doubts[0][0], sentence, items)
 
 
 def _reason(row, report):
@@ -262,7 +262,7 @@ def _lost(number):
     """A statement on lost workers and schedulers, where there were any."""
     if number:
         sentence = f"Lost workers or schedulers: {number}; what they were at was done again."
-        yield headline.Statement("Workers", "amber", sentence)
+        yield Statement("Workers", "amber", sentence)
 
 
 def _left(older):
@@ -273,5 +273,5 @@ def _left(older):
             "clouds or drives that are no more or failed now, or of reports that were not asked "
             "for again. Delete what is old."
         )
-        items = headline.capped((name, "not of this run") for name in older)
-        yield headline.Statement("Older results", "amber", sentence, items)
+        items = capped((name, "not of this run") for name in older)
+        yield Statement("Older results", "amber", sentence, items)

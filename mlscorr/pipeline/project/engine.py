@@ -12,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from weakref import WeakSet
 
-from mlscorr.io.store.preparation import temporary_folder
+from mlscorr.io.store import temporary_folder
 
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
 LONGER = "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=10min"

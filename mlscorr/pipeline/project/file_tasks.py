@@ -10,13 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.clouds.las import count_sources
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_crs import cloud_box
-from mlscorr.io.store.identity import FileIdentity
-from mlscorr.io.store.publishing import make_folder, publish
-from mlscorr.io.store.task_store import TaskStore
-from mlscorr.io.surveys.survey_file import cloud_file
+from mlscorr.io.clouds import cloud_box, count_sources, read_layout
+from mlscorr.io.store import FileIdentity, TaskStore, make_folder, publish
+from mlscorr.io.surveys import cloud_file
 from mlscorr.pipeline.clouds import WrittenClouds, write_counted
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.file_finding import FileFinding, find_in_file

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlscorr.io.store.task_store import digest
-from mlscorr.io.trajectories.trajectory_sessions import join_sessions, with_sigmas
+from mlscorr.io.store import digest
+from mlscorr.io.trajectories import join_sessions, with_sigmas
 from mlscorr.pipeline.finding import Finding
 from mlscorr.survey import (
+    WEEK,
     ControlPoints,
     Matched,
     MountedScanner,
@@ -17,7 +18,6 @@ from mlscorr.survey import (
     TieFeatures,
     Trajectory,
 )
-from mlscorr.survey.clouds import WEEK
 from mlscorr.ties import SETTINGS as TIES
 from mlscorr.ties import join_features
 

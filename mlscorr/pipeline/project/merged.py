@@ -13,12 +13,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction
-from mlscorr.estimate import Support, TieResiduals, guards_of
-from mlscorr.estimate.assembly import position_equations
-from mlscorr.estimate.inputs import filled_sigmas
-from mlscorr.estimate.prior import position_prior
-from mlscorr.estimate.support import HELD, REASONS, weak_stretches
-from mlscorr.evaluate.ties import misfit_section
+from mlscorr.estimate import (
+    HELD,
+    REASONS,
+    Support,
+    TieResiduals,
+    filled_sigmas,
+    guards_of,
+    position_equations,
+    position_prior,
+    weak_stretches,
+)
+from mlscorr.evaluate import misfit_section
 from mlscorr.pipeline.project.areas import Area, Piece
 from mlscorr.pipeline.project.corrected import STATES, DriveState, drive_fields, tied_sentence
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, DriveEstimate

@@ -9,12 +9,10 @@ from pathlib import Path
 from time import monotonic
 from typing import TextIO
 
-from mlscorr.io.store.output import output_file
-from mlscorr.io.store.publishing import appended
-from mlscorr.io.store.spool import telling_space
+from mlscorr.io.store import appended, output_file, telling_space
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task
-from mlscorr.survey.summary import counted
+from mlscorr.survey import counted
 
 TITLES = {
     "tiles": "Reading headers",

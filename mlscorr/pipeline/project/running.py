@@ -6,7 +6,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, wait
 from dataclasses import dataclass, field
 from typing import Any
 
-from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.store import TaskStore
 from mlscorr.pipeline.project.engine import Engine
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task, Written, carry_out

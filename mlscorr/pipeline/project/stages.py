@@ -8,18 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.store.identity import FileIdentity
-from mlscorr.io.store.storage import resolved
-from mlscorr.io.store.task_store import TaskStore, digest
-from mlscorr.io.surveys.project_file import DriveParts, ProjectParts
-from mlscorr.io.surveys.project_sections import SHARED_TILES
+from mlscorr.io.store import FileIdentity, TaskStore, digest, resolved
+from mlscorr.io.surveys import SHARED_TILES, DriveParts, ProjectParts
 from mlscorr.pipeline.near_points import check_control
 from mlscorr.pipeline.project import file_tasks
 from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey
 from mlscorr.pipeline.project.tasks import VERSION, Task
-from mlscorr.survey import CloudFile, ControlPoints, Survey
-from mlscorr.survey.summary import counted
+from mlscorr.survey import CloudFile, ControlPoints, Survey, counted
 from mlscorr.targets import search_radius
 
 

@@ -3,10 +3,7 @@
 import json
 from pathlib import Path
 
-from mlscorr.io.store.opening import read_bytes
-from mlscorr.io.store.output import document
-from mlscorr.io.store.storage import as_path, is_remote, is_there
-from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.store import TaskStore, as_path, document, is_remote, is_there, read_bytes
 from mlscorr.pipeline.project.correction import STORE
 from mlscorr.pipeline.project.progress import TITLES
 from mlscorr.pipeline.project.running import present

@@ -10,9 +10,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from mlscorr.io.store.identity import FileIdentity
-from mlscorr.io.store.spool import telling_space
-from mlscorr.io.store.task_store import TaskStore
+from mlscorr.io.store import FileIdentity, TaskStore, telling_space
 
 VERSION = version("mlscorr")  # results of another one are made again
 

@@ -2,16 +2,16 @@
 
 from functools import partial
 
-from mlscorr.effects.wording import known
+from mlscorr.effects import known
+from mlscorr.report.gap._channels import channels_figure
+from mlscorr.report.gap._innovations import innovations_figure
+from mlscorr.report.gap._ladder import ladder, ladder_figure
+from mlscorr.report.gap._rows import detectable_rows, worst_rows
+from mlscorr.report.gap._separability import detectable_figure, heat_figure
+from mlscorr.report.gap._shrinking import is_closed
+from mlscorr.report.gap._site_map import site_map
+from mlscorr.report.gap._splits import closure_figure, where_figure
 from mlscorr.report.gap.accuracy import accuracy_figure
-from mlscorr.report.gap.channels import channels_figure
-from mlscorr.report.gap.innovations import innovations_figure
-from mlscorr.report.gap.ladder import ladder, ladder_figure
-from mlscorr.report.gap.rows import detectable_rows, worst_rows
-from mlscorr.report.gap.separability import detectable_figure, heat_figure
-from mlscorr.report.gap.shrinking import is_closed
-from mlscorr.report.gap.site_map import site_map
-from mlscorr.report.gap.splits import closure_figure, where_figure
 from mlscorr.report.style import Figures
 
 

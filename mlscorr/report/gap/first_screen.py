@@ -3,13 +3,12 @@
 from collections.abc import Iterator
 from itertools import groupby
 
-from mlscorr.effects.labels import lowered, title
-from mlscorr.effects.wording import joined
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.signatures.signatures import NO_MOUNTING, UNSTATED
+from mlscorr.effects import joined, lowered, title
+from mlscorr.gap.evidence import SETTINGS
+from mlscorr.gap.signatures import NO_MOUNTING, UNSTATED
 from mlscorr.report.assumed import assumed_statement, has_assumed_sigma
-from mlscorr.report.gap.channels import channel_statements
-from mlscorr.report.gap.verdict import facts, is_named, verdict
+from mlscorr.report.gap._channels import channel_statements
+from mlscorr.report.gap._verdict import facts, is_named, verdict
 from mlscorr.report.headline import Statement, statements_section, warning_statements
 from mlscorr.report.tables import length_in_words
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mlscorr.effects.wording import DASH, figures, known, scale
+from mlscorr.effects import DASH, figures, known, scale
 
 
 def numbers(values: Iterable[float | None]) -> np.ndarray:

@@ -1,17 +1,12 @@
 """The pages of a diagnosis, and of what a survey could diagnose before it is driven."""
 
-from mlscorr.effects.labels import family, lowered, title, titles
-from mlscorr.effects.wording import DASH, joined, percent
-from mlscorr.report.gap import rows
-from mlscorr.report.gap.accuracy import accuracy_sentence
-from mlscorr.report.gap.channels import WORDS, channel_rows, channel_statements, distance_rows
-from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
-from mlscorr.report.gap.first_screen import accuracy, unjudged
-from mlscorr.report.gap.innovations import channel_style
-from mlscorr.report.gap.numbers import signed
-from mlscorr.report.gap.settings import SETTINGS
-from mlscorr.report.gap.shrinking import is_closed, shrunk, span
-from mlscorr.report.gap.verdict import (
+from mlscorr.effects import DASH, family, joined, lowered, percent, title, titles
+from mlscorr.report.gap import _rows as rows
+from mlscorr.report.gap._channels import WORDS, channel_rows, channel_statements, distance_rows
+from mlscorr.report.gap._innovations import channel_style
+from mlscorr.report.gap._settings import SETTINGS
+from mlscorr.report.gap._shrinking import is_closed, shrunk, span
+from mlscorr.report.gap._verdict import (
     VerdictBox,
     advice,
     facts,
@@ -20,6 +15,10 @@ from mlscorr.report.gap.verdict import (
     smallest,
     verdict,
 )
+from mlscorr.report.gap.accuracy import accuracy_sentence
+from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
+from mlscorr.report.gap.first_screen import accuracy, unjudged
+from mlscorr.report.gap.numbers import signed
 from mlscorr.report.pages import Page, drawn
 
 SECTIONS = {  # in their order; one without anything to show is left out

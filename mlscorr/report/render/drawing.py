@@ -8,16 +8,16 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
-from mlscorr.evaluate.rows import TargetRow
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.evaluate import TargetRow
+from mlscorr.io.clouds import read_chunks
 from mlscorr.report.correction_report import recomputed
+from mlscorr.report.render._scout import scout
+from mlscorr.report.render._sheet import Sheet
+from mlscorr.report.render._target_view import target_view
+from mlscorr.report.render._views import VIEWS, overview, section
 from mlscorr.report.render.picture import Picture
 from mlscorr.report.render.quantities import COLOURS, CloudPair, point_sigma
-from mlscorr.report.render.scout import scout
-from mlscorr.report.render.sheet import Sheet
-from mlscorr.report.render.target_view import target_view
 from mlscorr.report.render.view import PictureOptions
-from mlscorr.report.render.views import VIEWS, overview, section
 from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import PointCloud, Survey
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mlscorr.estimate import TieResiduals
-from mlscorr.report.render.scout import Scouted
+from mlscorr.report.render._scout import Scouted
 from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import Ties
-from mlscorr.ties.settings import SETTINGS as TIES
+from mlscorr.ties import SETTINGS as TIES
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from mlscorr.report.render.camera import Camera
+from mlscorr.report.render._camera import Camera
 from mlscorr.report.render.quantities import LABELS, colour_table, swatches
 from mlscorr.report.style import mark_handle, nice
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.report.render.camera import Camera
+from mlscorr.report.render._camera import Camera
 
 
 @dataclass(frozen=True)

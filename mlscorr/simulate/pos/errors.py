@@ -10,8 +10,8 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.trajectories.pos_error_series import PosErrorSeries, read_pos_error_series
-from mlscorr.simulate.pos.inertial import GRADES
+from mlscorr.io.trajectories import PosErrorSeries, read_pos_error_series
+from mlscorr.simulate.pos._inertial import GRADES
 from mlscorr.simulate.pos.navigation import PosError, interpolate, navigate
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.simulate.settings import SETTINGS

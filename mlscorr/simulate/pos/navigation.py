@@ -9,9 +9,9 @@ from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude
-from mlscorr.simulate.pos import alignment
-from mlscorr.simulate.pos.gnss import RECEIVER, Fixes, gnss_fixes
-from mlscorr.simulate.pos.inertial import (
+from mlscorr.simulate.pos import _alignment as alignment
+from mlscorr.simulate.pos._gnss import RECEIVER, Fixes, gnss_fixes
+from mlscorr.simulate.pos._inertial import (
     ATTITUDE,
     POSITION,
     STATES,
@@ -22,8 +22,8 @@ from mlscorr.simulate.pos.inertial import (
     start_sigma,
     transitions,
 )
-from mlscorr.simulate.pos.kalman import Measurement, StateEstimate, kalman_filter, smooth
-from mlscorr.simulate.pos.odometer import odometer
+from mlscorr.simulate.pos._kalman import Measurement, StateEstimate, kalman_filter, smooth
+from mlscorr.simulate.pos._odometer import odometer
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.survey import Trajectory

@@ -13,8 +13,7 @@ import numpy as np
 from numba import njit
 
 from mlscorr.simulate.scan.threads import Workspace, in_slices
-from mlscorr.survey import Mounting, Trajectory
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns, Mounting, Trajectory
 
 
 @dataclass(frozen=True, repr=False)

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.simulate.scan.rays import Platform
-from mlscorr.survey import PointCloud, Survey
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns, PointCloud, Survey
 
 
 @dataclass(frozen=True, repr=False)

@@ -20,8 +20,7 @@ from numpy.random import Generator
 from mlscorr.effects import Reference, Returns, apply_effects, effect_streams
 from mlscorr.simulate.scan.rays import Platform
 from mlscorr.simulate.scan.recorded import RecordedPulses, aim, recorded_platform
-from mlscorr.survey import ControlPoints, Mounting, Survey, Trajectory
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns, ControlPoints, Mounting, Survey, Trajectory
 
 
 @dataclass(frozen=True, repr=False)

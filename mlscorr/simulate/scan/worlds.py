@@ -12,7 +12,7 @@ import numpy as np
 from mlscorr.simulate.scan.replay import Met
 from mlscorr.simulate.scene import Mesh
 from mlscorr.simulate.settings import SETTINGS
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns
 
 FORMS = ("circle", "square", "hole", "checkerboard", "board")
 CIRCLE, SQUARE, HOLE, CHECKERBOARD, PLATE = range(len(FORMS))

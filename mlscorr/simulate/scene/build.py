@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude, from_polar
 from mlscorr.simulate.scenario import Scenario
+from mlscorr.simulate.scene._river import River
+from mlscorr.simulate.scene._street import Street
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.mesh import MeshSite
 from mlscorr.simulate.scene.placing import Targets, place_targets
-from mlscorr.simulate.scene.river import River
 from mlscorr.simulate.scene.shapes import UP, Mesh
-from mlscorr.simulate.scene.street import Street
 from mlscorr.survey import Trajectory
 
 SITES: dict[str, Any] = {"street": Street, "river": River, "mesh": MeshSite}

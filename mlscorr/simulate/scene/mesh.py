@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
-from mlscorr.io.clouds.ply import announced_faces
+from mlscorr.io.clouds import announced_faces
 from mlscorr.simulate.scenario import Scenario, SceneScenario
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, eyes

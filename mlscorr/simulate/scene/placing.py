@@ -9,11 +9,11 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.simulate.scenario import TargetScenario
+from mlscorr.simulate.scene._things import target
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.shapes import UP, Mesh, box, post
-from mlscorr.simulate.scene.things import target
 from mlscorr.simulate.settings import SETTINGS
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.survey.columns import Columns
+from mlscorr.survey import Columns
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.gap.residuals import Rows
+from mlscorr.io.surveys import read_survey
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.gap_closure import Bed
 from tests.beds.gap_surveys import beams_of, read_once, rows_of, write_reference

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.closure.ablation import lone_effects
-from mlscorr.gap.evidence.causes import infer_causes
-from mlscorr.gap.residuals.rows import background
+from mlscorr.gap.closure import lone_effects
+from mlscorr.gap.evidence import infer_causes
+from mlscorr.gap.residuals import background
 
 
 @pytest.mark.long

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.report.gap.shrinking import is_within
+from mlscorr.report.gap._shrinking import is_within
 from tests.beds.gap_closure import Bed
 
 

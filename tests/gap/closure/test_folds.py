@@ -7,13 +7,12 @@ import pytest
 
 from mlscorr.effects import make_effect
 from mlscorr.effects.vehicle import PositionStep
-from mlscorr.gap.closure.folds import Folds, cause_for_simulator
-from mlscorr.gap.closure.settings import SETTINGS
-from mlscorr.gap.evidence.causes import Inference
-from mlscorr.gap.evidence.measure import Predicted
-from mlscorr.gap.evidence.verdict import GapVerdict
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import signature
+from mlscorr.gap.closure import cause_for_simulator
+from mlscorr.gap.closure._settings import SETTINGS
+from mlscorr.gap.closure.folds import Folds
+from mlscorr.gap.evidence import Inference, Predicted
+from mlscorr.gap.evidence._verdict import GapVerdict
+from mlscorr.gap.signatures import Bench, signature
 
 
 def test_blocks_are_short_enough_for_an_event(late):

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.effects.vehicle import PositionStep
-from mlscorr.gap.evidence.causes import Cause
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import signature
+from mlscorr.gap.evidence import Cause
+from mlscorr.gap.signatures import Bench, signature
 
 
 def test_check_points_at_the_moment_of_a_jump_dont_judge(late):

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mlscorr.gap.closure._over_sigma import OverSigma, errors_over_sigma
 from mlscorr.gap.closure.folds import Folds
-from mlscorr.gap.closure.over_sigma import OverSigma, errors_over_sigma
-from mlscorr.gap.evidence.measure import Predicted
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.residuals.rows import background
+from mlscorr.gap.evidence import Observations, Predicted
+from mlscorr.gap.residuals import background
 
 
 def test_errors_that_are_simulated_are_about_one_sigma(late):

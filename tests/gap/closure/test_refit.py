@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.gap.closure.refit import _fitted, refit_targets
+from mlscorr.gap.closure._refit import _fitted, refit_targets
+from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.gap.closure.rerun import _boards, _drawn, _meet, _views_of
-from mlscorr.gap.closure.settings import SETTINGS
 from mlscorr.survey import PointCloud, Trajectory
 
 pytestmark = pytest.mark.long

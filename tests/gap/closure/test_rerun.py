@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.closure.rerun import BeamSimulator, rerun
-from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.closure import BeamSimulator
+from mlscorr.gap.closure.rerun import rerun
+from mlscorr.gap.signatures import Bench
 from tests.beds.gap_surveys import beams_of, read_once, rows_of
 
 pytestmark = pytest.mark.long

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.closure.settings import SETTINGS
-from mlscorr.simulate.settings import SETTINGS as SIMULATION
+from mlscorr.gap.closure._settings import SETTINGS
+from mlscorr.simulate import SETTINGS as SIMULATION
 
 board_edge, hole_board = SIMULATION.board_edge, SIMULATION.hole_board
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.closure.sightings import sightings_of
-from mlscorr.gap.closure.surroundings import Surroundings
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.gap.closure import Surroundings
+from mlscorr.gap.closure._sightings import sightings_of
+from mlscorr.io.clouds import read_chunks
 from mlscorr.simulate.scan.replay import recorded_platform
 
 

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.closure.cross_fit import CrossFit
-from mlscorr.gap.closure.systematic import SystematicGap, share_gone, unit_square
-from mlscorr.gap.evidence.columns import ColumnBlock, ColumnTable
-from mlscorr.gap.evidence.error_models import STATED
-from mlscorr.gap.evidence.measure import Explanations
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.residuals.rows import background
+from mlscorr.gap.closure._cross_fit import CrossFit
+from mlscorr.gap.closure._systematic import SystematicGap, share_gone, unit_square
+from mlscorr.gap.evidence import ColumnTable, Explanations, Observations
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence.columns import ColumnBlock
+from mlscorr.gap.residuals import background
 
 
 @pytest.mark.parametrize(("before", "after", "share"), [

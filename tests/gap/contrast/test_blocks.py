@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.contrast.blocks import (
+from mlscorr.gap.contrast._blocks import (
     block_of,
     effective,
     joined_bins,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.contrast.cells import CellCollector, cells_of, sampled
-from mlscorr.gap.residuals.plane_fit import cell_corner
+from mlscorr.gap.contrast._cells import CellCollector, cells_of, sampled
+from mlscorr.gap.residuals import cell_corner
 from mlscorr.survey import PointCloud
 from mlscorr.targets import NO_POINTS
 
@@ -33,7 +33,7 @@ def test_a_cell_in_two_chunks_is_whole():
 def test_memory_is_bounded_and_the_same_cells_are_kept(pair):
     "A tenth of the cells: whole ones, those of the whole collection, with the same sums"
     survey, real, _ = pair
-    from mlscorr.io.clouds.las import read_chunks
+    from mlscorr.io.clouds import read_chunks
 
     small = CellCollector(survey, limit=len(real.cells) // 10, points=500)
     for chunk in read_chunks(survey.clouds[0]):

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import energy_distance as scipy_distance
 
+from mlscorr.gap.contrast import cloud_distances, innovation_distances
 from mlscorr.gap.contrast.distances import (
     chamfer_distance,
-    cloud_distances,
     energy_distance,
-    innovation_distances,
     maximum_mean_discrepancy,
 )
 from tests.beds.twin_clouds import sampled

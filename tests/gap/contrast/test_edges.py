@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.contrast.edges import EdgeCollector, edges_of
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.gap.contrast._edges import EdgeCollector, edges_of
+from mlscorr.io.clouds import read_chunks
 from mlscorr.survey import PointCloud
 
 ORIGIN = np.array([532000.0, 3374000.0, 0.0])

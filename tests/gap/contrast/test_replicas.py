@@ -7,9 +7,9 @@ import pytest
 from feature_errors import errors
 from gap_training.features import geometry
 
-from mlscorr.gap.contrast.replicas import replica_innovations
-from mlscorr.gap.evidence.causes import infer_causes
-from mlscorr.gap.residuals.rows import background
+from mlscorr.gap.contrast import replica_innovations
+from mlscorr.gap.evidence import infer_causes
+from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import signatures
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.contrast.settings import SETTINGS
+from mlscorr.gap.contrast._settings import SETTINGS
 
 
 def test_a_bootstrap_tells_a_sigma_to_four_percent():

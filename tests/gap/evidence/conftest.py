@@ -3,7 +3,7 @@
 import gap_study
 import pytest
 
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.signatures import signatures
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence.causes import infer_causes
+from mlscorr.gap.evidence import infer_causes
 from tests.beds.gap_inference import surveyed
 
 

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.evidence.columns import column_table, is_of_one_target
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.evidence.unknown import unknown_blocks
+from mlscorr.gap.evidence import SETTINGS, Observations, column_table, unknown_blocks
+from mlscorr.gap.evidence.columns import is_of_one_target
 
 
 @pytest.fixture(scope="module")

@@ -3,15 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.evidence.decision import (
-    KINDS,
-    Costs,
-    JointScore,
-    cheapest,
-    features,
-    kind_of,
-    learned,
-)
+from mlscorr.gap.evidence import Costs
+from mlscorr.gap.evidence.decision import KINDS, JointScore, cheapest, features, kind_of, learned
 from tests.beds.joint_scores import joint
 
 NOISY = ("range_noise",)

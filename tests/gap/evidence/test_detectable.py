@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.evidence.detectable import detectable_size
-from mlscorr.gap.evidence.error_models import error_models
-from mlscorr.gap.evidence.noise import channel_evidence, draw_channels
-from mlscorr.gap.evidence.observations import Observations, model_likelihood
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.residuals.channels import with_loss_variance
-from mlscorr.gap.residuals.rows import background
-from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.evidence import (
+    SETTINGS,
+    Observations,
+    detectable_size,
+    error_models,
+    model_likelihood,
+)
+from mlscorr.gap.evidence._noise import channel_evidence, draw_channels
+from mlscorr.gap.residuals import background, with_loss_variance
+from mlscorr.gap.signatures import Bench
 
 
 def kind_of(signs, name):

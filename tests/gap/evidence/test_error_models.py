@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.evidence.error_models import error_models, shares
+from mlscorr.gap.evidence import error_models
+from mlscorr.gap.evidence._error_models import shares
 
 
 def test_settings_are_a_prior():

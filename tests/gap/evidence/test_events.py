@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence.causes import infer_causes
+from mlscorr.gap.evidence import SETTINGS, infer_causes, weigh_labels
 from mlscorr.gap.evidence.evidence import weigh_blocks
-from mlscorr.gap.evidence.labels import weigh_labels
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.signatures import signatures
 from tests.beds.gap_inference import surveyed
 
 

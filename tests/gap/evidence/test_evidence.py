@@ -4,14 +4,19 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import EFFECTS, make_effect
-from mlscorr.gap.evidence.columns import column_table
-from mlscorr.gap.evidence.error_models import STATED, ErrorModel, error_models
+from mlscorr.gap.evidence import (
+    SETTINGS,
+    ErrorModel,
+    Observations,
+    column_table,
+    error_models,
+    unknown_blocks,
+)
+from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.evidence.evidence import block_gain, suited_models, weigh_blocks, without_known
-from mlscorr.gap.evidence.observations import Observations, relevant_models
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.evidence.unknown import unknown_blocks
-from mlscorr.gap.residuals.rows import background
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.evidence.observations import relevant_models
+from mlscorr.gap.residuals import background
+from mlscorr.gap.signatures import signatures
 from tests.beds.gap_inference import surveyed
 
 

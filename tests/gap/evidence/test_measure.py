@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.evidence.columns import column_table
-from mlscorr.gap.evidence.error_models import STATED
-from mlscorr.gap.evidence.measure import (
+from mlscorr.gap.evidence import (
     Explanations,
+    Observations,
     Predicted,
+    column_table,
     gap_kind,
     position_terms,
     scatter_terms,
     signed_root,
-    unit_square,
 )
-from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence.measure import unit_square
 
 NOISES = ("range_noise", "position_noise", "dropout")
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.evidence.error_models import STATED, ErrorModel
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.residuals.rows import background
+from mlscorr.gap.evidence import ErrorModel, Observations
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.residuals import background
 from tests.beds.gap_inference import dense
 
 

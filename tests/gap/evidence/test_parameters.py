@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.evidence.error_models import STATED
-from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence import SETTINGS, Observations
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence._windows import Window
 from mlscorr.gap.evidence.parameters import (
     fit_amplitudes,
     most_probable_size,
     window_parameters,
 )
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.evidence.windows import Window
 from tests.beds.gap_inference import dense
 
 

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import EFFECTS
-from mlscorr.gap.evidence.error_models import STATED
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.separability import compare_signatures
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.plan.additions import next_data
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.evidence import SETTINGS, Observations, compare_signatures
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.plan import next_data
+from mlscorr.gap.signatures import signatures
 from tests.beds.gap_inference import dense
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from mlscorr.gap.evidence.settings import SETTINGS, Settings
+from mlscorr.gap.evidence import SETTINGS
+from mlscorr.gap.evidence.settings import Settings
 
 
 def test_quantile_and_band_are_those_of_the_confidence():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.tails import fit_mixture, without_tails
+from mlscorr.gap.evidence import Observations, without_tails
+from mlscorr.gap.evidence.tails import fit_mixture
 from tests.beds.gap_inference import named, surveyed
 
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from mlscorr.gap.evidence.unknown import unknown_blocks
+from mlscorr.gap.evidence import unknown_blocks
+from mlscorr.gap.plan import Ruler
 from mlscorr.gap.plan.draws import SizedMechanism
-from mlscorr.gap.plan.sizing import Ruler, shift_by
-from mlscorr.simulate.mechanisms import Mechanism
+from mlscorr.gap.plan.sizing import shift_by
+from mlscorr.simulate import Mechanism
 
 
 def test_the_unknown_leaves_out_what_a_survey_does_not_vary(study):

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence.causes import infer_causes
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.signatures.displacements import displacements
+from mlscorr.gap.evidence import Observations, infer_causes
+from mlscorr.gap.signatures import displacements
 from tests.beds.gap_inference import surveyed
 
 

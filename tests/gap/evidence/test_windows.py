@@ -7,16 +7,20 @@ import pytest
 from feature_errors import errors as clean_residuals
 from gap_training import features
 
-from mlscorr.collocation.covariance import Covariance
-from mlscorr.gap.evidence.causes import infer_causes
-from mlscorr.gap.evidence.columns import column_table
-from mlscorr.gap.evidence.error_models import STATED, error_models, window_growth
+from mlscorr.collocation import Covariance
+from mlscorr.gap.evidence import (
+    SETTINGS,
+    Observations,
+    column_table,
+    error_models,
+    infer_causes,
+    window_growth,
+)
+from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence._windows import models_with_windows, weigh_windows
 from mlscorr.gap.evidence.evidence import weigh_blocks
-from mlscorr.gap.evidence.observations import Observations
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.evidence.windows import models_with_windows, weigh_windows
-from mlscorr.gap.residuals.rows import background
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.residuals import background
+from mlscorr.gap.signatures import signatures
 
 WINDOWS = ((413215.0, 25.0), (413360.0, 30.0))  # s: one in each pass
 

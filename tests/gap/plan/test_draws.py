@@ -6,9 +6,9 @@ from gap_training.cases import known_mechanisms
 from gap_training.worlds import World
 
 from mlscorr.effects.catalogue import SYSTEMATIC
-from mlscorr.gap.evidence.settings import SETTINGS
-from mlscorr.gap.plan.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.plan.sizing import Ruler, likeness, shift_by
+from mlscorr.gap.evidence import SETTINGS
+from mlscorr.gap.plan import ATTEMPTS, Ruler, draw_effects, draw_mechanism, names_to_try
+from mlscorr.gap.plan.sizing import likeness, shift_by
 
 
 @pytest.fixture(scope="module")

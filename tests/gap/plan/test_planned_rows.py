@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.plan.planned_rows import planned_rows
+from mlscorr.gap.plan import planned_rows
 from tests.beds.short_drive import run, survey_of
 
 

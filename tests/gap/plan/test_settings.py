@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mlscorr.gap.plan.settings import SETTINGS
-from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
-from mlscorr.simulate.settings import SETTINGS as SIMULATION
+from mlscorr.gap.plan._settings import SETTINGS
+from mlscorr.gap.residuals import SETTINGS as OBSERVE
+from mlscorr.simulate import SETTINGS as SIMULATION
 
 
 def test_planned_passes_are_as_far_apart_as_compared_ones():

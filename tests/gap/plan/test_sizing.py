@@ -6,9 +6,9 @@ import pytest
 
 from mlscorr.effects import EFFECTS
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
-from mlscorr.gap.plan.sizing import Ruler, draw_effect, likeness, shift_by
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import signatures
+from mlscorr.gap.plan import Ruler
+from mlscorr.gap.plan.sizing import draw_effect, likeness, shift_by
+from mlscorr.gap.signatures import Bench, signatures
 
 KINDS = {kind.name: kind for kind in EFFECTS}
 MDB = 3.0

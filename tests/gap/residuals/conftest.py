@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.pairing import build_rows
-from mlscorr.gap.residuals.patch_search import find_patches
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.gap.residuals import build_rows, find_patches
+from mlscorr.io.surveys import read_survey
 from mlscorr.pipeline.finding import find_targets
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.gap_surveys import write_reference

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import georeference, scanner_position, to_scanner
-from mlscorr.gap.residuals.assemble import assemble, patch_pulses, sample_pulses
+from mlscorr.gap.residuals import assemble, sample_pulses
+from mlscorr.gap.residuals._assemble import patch_pulses
 
 COUNT = 40
 

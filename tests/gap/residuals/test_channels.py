@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.channels import beside_seen_noise, loss_variance, return_rate, roughness
-from mlscorr.gap.residuals.pairing import build_rows
-from mlscorr.gap.residuals.patch_search import find_patches
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.gap.residuals import beside_seen_noise, build_rows, find_patches
+from mlscorr.gap.residuals.channels import loss_variance, return_rate, roughness
+from mlscorr.io.clouds import read_chunks
 
 
 def test_roughness_is_what_the_scanner_is_believed_to_make(survey, targets, patches, pairing):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from mlscorr.gap.residuals.covariates import scanner_origin, to_scanner_or_nan
+from mlscorr.gap.residuals import scanner_origin
+from mlscorr.gap.residuals._covariates import to_scanner_or_nan
 
 
 def test_covariates_are_those_of_the_drive(survey, pairing):

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.pairing import build_rows, target_rows
-from mlscorr.gap.residuals.patch_search import find_patches
+from mlscorr.gap.residuals import build_rows, find_patches
+from mlscorr.gap.residuals.pairing import target_rows
 from mlscorr.survey import PointCloud
 
 ARRAYS = ("channel", "item", "gps_time", "position", "direction", "residual", "noise")

@@ -6,9 +6,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.patch_search import find_patches
-from mlscorr.gap.residuals.settings import SETTINGS
-from mlscorr.io.clouds.las import read_chunks
+from mlscorr.gap.residuals import SETTINGS, find_patches
+from mlscorr.io.clouds import read_chunks
 
 
 def test_little_memory_is_enough_for_any_cloud(survey):

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.patches import Patches
-from mlscorr.gap.residuals.plane_fit import cell_corner
-from mlscorr.gap.residuals.settings import SETTINGS
+from mlscorr.gap.residuals import SETTINGS, Patches, cell_corner
 
 
 def test_patches_are_small_and_short(patches):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.plane_fit import fit_patches, place_key
+from mlscorr.gap.residuals import place_key
+from mlscorr.gap.residuals.plane_fit import fit_patches
 from mlscorr.survey import PointCloud
 
 NOISE = 0.004  # m

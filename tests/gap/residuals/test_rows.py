@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.rows import Rows, background
+from mlscorr.gap.residuals import Rows, background
 
 
 def test_passes_share_the_survey_error_of_a_target(survey, pairing):

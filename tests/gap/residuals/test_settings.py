@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from mlscorr.gap.residuals.settings import SETTINGS, Settings
+from mlscorr.gap.residuals import SETTINGS
+from mlscorr.gap.residuals.settings import Settings
 
 
 def test_a_pool_holds_six_for_each_that_is_chosen():

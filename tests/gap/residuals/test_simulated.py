@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.simulated import SimulatedBeams
+from mlscorr.gap.residuals import SimulatedBeams
 from mlscorr.survey import PointCloud
 from tests.beds.displaced import correction_of
 from tests.beds.drives import START as DRIVE_START

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.pairing import build_rows
-from mlscorr.gap.residuals.surfaces import on_reference
+from mlscorr.gap.residuals import build_rows
+from mlscorr.gap.residuals._surfaces import on_reference
 from tests.beds.displaced import correction_of, displaced
 from tests.beds.gap_surveys import write_reference
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from mlscorr.gap.residuals import find_patches
 from mlscorr.gap.residuals.pairing import patch_rows, target_rows
-from mlscorr.gap.residuals.patch_search import find_patches
 from mlscorr.targets import NO_POINTS, Candidates
 from tests.beds.short_drive import observations, run, survey_of
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.signatures.changes import Bench, check_mounting
+from mlscorr.gap.signatures import Bench, check_mounting
 
 
 def test_a_change_grows_with_its_effect(clean):

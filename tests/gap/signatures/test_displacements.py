@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.displacements import displacements
+from mlscorr.gap.signatures import Bench, displacements
 
 
 def test_a_late_clock_moves_targets_as_its_effect_does(clean):

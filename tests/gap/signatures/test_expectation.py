@@ -3,9 +3,7 @@
 import numpy as np
 
 from mlscorr.effects import effect_class, make_effect
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.expectation import curvature, expected
-from mlscorr.gap.signatures.signatures import signature
+from mlscorr.gap.signatures import Bench, curvature, expected, signature
 from tests.beds.short_drive import EXACT, in_simulation
 
 

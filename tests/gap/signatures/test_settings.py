@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals.settings import SETTINGS as OBSERVE
-from mlscorr.gap.signatures.settings import SETTINGS, Settings
+from mlscorr.gap.residuals import SETTINGS as OBSERVE
+from mlscorr.gap.signatures import SETTINGS
+from mlscorr.gap.signatures.settings import Settings
 
 
 def test_steps_stand_as_close_as_the_narrowest_events():

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import EFFECTS, Effect, effect_class, make_effect, quantity
+from mlscorr.gap.residuals import Rows, find_patches
 from mlscorr.gap.residuals.pairing import patch_rows
-from mlscorr.gap.residuals.patch_search import find_patches
-from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.signatures.changes import Bench
-from mlscorr.gap.signatures.signatures import select, signature, signatures
+from mlscorr.gap.signatures import Bench, select, signature, signatures
 from tests.beds.short_drive import EXACT, NOISE, in_simulation, run
 
 

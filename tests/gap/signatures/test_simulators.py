@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.signatures.simulators import as_believed, joined
-from mlscorr.simulate.simulator_file import beliefs_of
+from mlscorr.gap.signatures import as_believed, joined
+from mlscorr.simulate import beliefs_of
 
 
 def test_what_survey_toml_says_changes_nothing(clean):

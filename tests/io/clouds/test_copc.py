@@ -14,14 +14,12 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.clouds.las import read_chunks, read_records, records_at
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_windows import read_windows
-from mlscorr.io.clouds.time_order import in_time_order
+from mlscorr.io.clouds import read_chunks, read_layout, read_windows
+from mlscorr.io.clouds._time_order import in_time_order
+from mlscorr.io.clouds.las import read_records, records_at
 from mlscorr.io.settings import Settings
-from mlscorr.io.store.preparation import glance
-from mlscorr.io.store.spool import check_space
-from mlscorr.io.surveys.survey_file import FILE_NAME
+from mlscorr.io.store import check_space, glance
+from mlscorr.io.surveys import FILE_NAME
 from mlscorr.survey import CloudFile, PointCloud
 from tests.beds.copc_files import write_copc
 from tests.beds.copies import write_corrected
@@ -182,8 +180,8 @@ def test_a_survey_in_copc_is_corrected_as_in_laz(street, tmp_path):
 @pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (2.51, -1.8, 0.4), (300.0, 0.0, 0.0)])
 def test_a_corrected_copc_is_a_copc(pair, shift, tmp_path, monkeypatch):
     "Each point, with all its fields, in one node and its cube; more than memory holds, moved far"
-    monkeypatch.setattr("mlscorr.io.clouds.octree.SETTINGS", SMALL)
-    monkeypatch.setattr("mlscorr.io.clouds.copc_writer.SETTINGS", SMALL)
+    monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
+    monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     laz = laspy.read(moved(pair[0], tmp_path / "out.laz", shift))
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz", shift))) as reader:
         nodes, info = nodes_of(reader), reader.copc_info
@@ -204,8 +202,8 @@ def test_a_corrected_copc_is_a_copc(pair, shift, tmp_path, monkeypatch):
 
 def test_levels_are_samples_of_the_cloud(pair, tmp_path, monkeypatch):
     "A point for each cell of a node's grid above the leaves, but for the few of small children"
-    monkeypatch.setattr("mlscorr.io.clouds.octree.SETTINGS", SMALL)
-    monkeypatch.setattr("mlscorr.io.clouds.copc_writer.SETTINGS", SMALL)
+    monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
+    monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz"))) as reader:
         nodes, info = nodes_of(reader), reader.copc_info
         corner = info.center - info.halfsize
@@ -220,7 +218,7 @@ def test_levels_are_samples_of_the_cloud(pair, tmp_path, monkeypatch):
 
 def test_a_box_and_a_level_are_read_by_others(pair, tmp_path, monkeypatch):
     "What laspy finds in a box by the hierarchy is all that lies there"
-    monkeypatch.setattr("mlscorr.io.clouds.octree.SETTINGS", SMALL)
+    monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz"))) as reader:
         whole = xyz_of(reader.query())
         box = Bounds(*(CORNER[:2] + np.array([[-20.0, 5.0], [10.0, 31.0]])))
@@ -233,7 +231,7 @@ def test_a_box_and_a_level_are_read_by_others(pair, tmp_path, monkeypatch):
 
 def test_points_at_one_place_end_in_one_node(pair, tmp_path, monkeypatch):
     "No halving parts what has the same coordinates: the smallest node takes it all"
-    monkeypatch.setattr("mlscorr.io.clouds.octree.SETTINGS", SMALL)
+    monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
     las = laspy.read(pair[0])
     las.X[: POINTS // 2], las.Y[: POINTS // 2], las.Z[: POINTS // 2] = 7, 8, 9
     las.write(tmp_path / "in.laz")

@@ -4,8 +4,7 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds import copies
-from mlscorr.io.clouds.copies import find_copies
+from mlscorr.io.clouds import copies, find_copies
 from tests.beds.copc_files import write_copc
 from tests.beds.foreign_clouds import write_e57
 

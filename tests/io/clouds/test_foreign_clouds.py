@@ -13,12 +13,10 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.clouds.conversion import converted, recorded_points
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.clouds.las_checks import read_layout
+from mlscorr.io.clouds import converted, read_chunks, read_layout, recorded_points
 from mlscorr.io.settings import Settings
-from mlscorr.io.store.preparation import glance
-from mlscorr.io.surveys.survey_file import FILE_NAME
+from mlscorr.io.store import glance
+from mlscorr.io.surveys import FILE_NAME
 from mlscorr.survey import CloudFile, PointCloud
 from tests.beds.foreign_clouds import points_of, write_e57, write_ply
 

@@ -15,15 +15,8 @@ from laspy.vlrs.vlrlist import VLRList
 
 from mlscorr.correction import Correction
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.clouds.las import (
-    read_chunks,
-    read_layout,
-    read_records,
-    records_at,
-    sample_gps_times,
-    sha256,
-    spread_records,
-)
+from mlscorr.io.clouds import read_chunks, sample_gps_times, sha256, spread_records
+from mlscorr.io.clouds.las import read_layout, read_records, records_at
 from mlscorr.survey import CloudFile, Trajectory
 from tests.beds.copies import write_corrected
 from tests.beds.places import ROOT

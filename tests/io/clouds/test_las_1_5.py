@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 import mlscorr
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_crs import stated_crs
-from mlscorr.io.surveys.survey_file import FILE_NAME
+from mlscorr.io.clouds import read_chunks, read_layout, stated_crs
+from mlscorr.io.surveys import FILE_NAME
 from mlscorr.survey import CloudFile, PointCloud
 from tests.beds.copies import write_corrected
 from tests.beds.las_1_5 import OFFSET_FLAG, as_las_1_5, from_las_1_5

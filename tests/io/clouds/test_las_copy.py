@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.io.clouds.las import read_chunks, sample_gps_times, sha256
+from mlscorr.io.clouds import read_chunks, sample_gps_times, sha256
 from mlscorr.survey import CloudFile, PointCloud
 from tests.beds.copies import write_corrected
 

@@ -7,9 +7,8 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_crs import cloud_box, crs_conflict, stated_crs
-from mlscorr.io.trajectories.projection import crs_code, crs_name
+from mlscorr.io.clouds import cloud_box, crs_conflict, read_layout, stated_crs
+from mlscorr.io.trajectories import crs_code, crs_name
 from tests.beds.las_crs import add_crs
 from tests.beds.shared import shared
 

@@ -6,10 +6,9 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds.las import read_chunks, records_at, spread_records
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_windows import read_windows
-from mlscorr.io.settings import SETTINGS
+from mlscorr.io import SETTINGS
+from mlscorr.io.clouds import read_chunks, read_layout, read_windows, spread_records
+from mlscorr.io.clouds.las import records_at
 from mlscorr.survey import CloudFile, PointCloud
 
 POINTS, RATE = 400_000, 50_000.0  # and points a second

@@ -4,8 +4,7 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.clouds.noise import counted_noise
+from mlscorr.io.clouds import counted_noise, read_chunks
 from mlscorr.survey import CloudFile
 
 START, CORNER = 357_900.0, [532_000.0, 3_374_000.0, 40.0]  # s of week; UTM

@@ -3,7 +3,7 @@
 import numpy as np
 import open3d
 
-from mlscorr.io.clouds.ply import write_ply
+from mlscorr.io.clouds import write_ply
 
 CORNER = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.io.store.npz import NpzWriter
+from mlscorr.io.store import NpzWriter
 
 
 def test_blocks_become_one_array(tmp_path):

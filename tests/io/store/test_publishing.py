@@ -7,16 +7,17 @@ import time
 
 import pytest
 
-from mlscorr.io.store.output import output_file, write_json
-from mlscorr.io.store.publishing import (
+from mlscorr.io.store import (
+    TaskStore,
     appended,
+    as_path,
     check_store_output,
-    locked_in_store,
-    names_in,
+    digest,
+    output_file,
     publish,
+    write_json,
 )
-from mlscorr.io.store.storage import as_path
-from mlscorr.io.store.task_store import TaskStore, digest
+from mlscorr.io.store.publishing import locked_in_store, names_in
 from tests.beds.object_store import object_store
 
 BEAT = 0.5  # s, three of which a busy machine does not miss

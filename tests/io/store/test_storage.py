@@ -10,17 +10,21 @@ import numpy as np
 import pytest
 import s3fs
 
-from mlscorr.io.clouds.las import read_chunks, sample_gps_times
-from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_windows import read_windows
-from mlscorr.io.clouds.las_writer import cloud_writer
-from mlscorr.io.store.identity import FileIdentity
-from mlscorr.io.store.inputs import check_unchanged, input_file
-from mlscorr.io.store.opening import open_file
-from mlscorr.io.store.storage import as_path, beside, files_like, is_remote, is_there
-from mlscorr.io.store.task_store import TaskStore, digest
-from mlscorr.io.surveys.survey_copy import write_survey_copy
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.clouds import cloud_writer, read_chunks, read_layout, read_windows, sample_gps_times
+from mlscorr.io.store import (
+    FileIdentity,
+    TaskStore,
+    as_path,
+    beside,
+    check_unchanged,
+    digest,
+    files_like,
+    input_file,
+    is_remote,
+    is_there,
+    open_file,
+)
+from mlscorr.io.surveys import read_survey, write_survey_copy
 from mlscorr.survey import CloudFile, PointCloud
 from tests.beds.foreign_clouds import points_of, write_ply
 from tests.beds.object_store import object_store

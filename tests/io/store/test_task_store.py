@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.io.store.identity import FileIdentity
-from mlscorr.io.store.task_store import TaskStore, digest
+from mlscorr.io.store import FileIdentity, TaskStore, digest
 from mlscorr.survey import Mounting, PointCloud
 
 MOUNTING = Mounting(np.array([0.1, -0.6, 0.4]), Rotation.from_euler("z", 0.3))

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mlscorr.cli import app
-from mlscorr.io.surveys.project_file import is_project, read_project
+from mlscorr.io.surveys import is_project, read_project
 
 TRAJECTORY = "gps_time,easting,northing,height,roll,pitch,heading\n" + "".join(
     f"{357700 + 0.1 * k:.1f},{532000 + k},3374000,42,0,0,90\n" for k in range(50)

@@ -9,8 +9,9 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.surveys.survey_file import read_survey, read_survey_file
-from mlscorr.io.tables.control import read_control
+from mlscorr.io.surveys import read_survey
+from mlscorr.io.surveys.survey_file import read_survey_file
+from mlscorr.io.tables import read_control
 from mlscorr.survey import Pos, Scanner
 from tests.beds.shared import shared
 

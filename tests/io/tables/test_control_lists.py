@@ -7,12 +7,18 @@ import openpyxl
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.store.open_places import OpenQuestion
-from mlscorr.io.store.toml_file import read_toml
-from mlscorr.io.tables.column_names import CONTROL_NAMES, TRAJECTORY_NAMES, WORDS, plain
-from mlscorr.io.tables.control import COLUMNS, holds_points, read_control
-from mlscorr.io.tables.control_faults import ListError
-from mlscorr.io.tables.table_sections import ControlSection
+from mlscorr.io.store import OpenQuestion, read_toml
+from mlscorr.io.tables import (
+    CONTROL_NAMES,
+    TRAJECTORY_NAMES,
+    ControlSection,
+    ListError,
+    holds_points,
+    plain,
+    read_control,
+)
+from mlscorr.io.tables.column_names import WORDS
+from mlscorr.io.tables.control import COLUMNS
 from mlscorr.survey import KINDS, Trajectory
 
 ALL = {"kind": "circle", "size": 0.6, "sigma": [0.003, 0.004]}

@@ -8,11 +8,14 @@ import pytest
 
 import mlscorr
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.trajectories.course import check_heading, heading_and_course
-from mlscorr.io.trajectories.poses import read_poses
-from mlscorr.io.trajectories.trajectory import read_trajectory, read_trajectory_file
-from mlscorr.io.trajectories.trajectory_exports import export_trajectory
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+from mlscorr.io.trajectories import (
+    TrajectorySection,
+    export_trajectory,
+    read_poses,
+    read_trajectory,
+)
+from mlscorr.io.trajectories._course import check_heading, heading_and_course
+from mlscorr.io.trajectories.trajectory import read_trajectory_file
 from mlscorr.survey import Trajectory
 from tests.beds.shared import shared
 from tests.io.surveys.test_survey_file import CONTROL, TOML, write_las

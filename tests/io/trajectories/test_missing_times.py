@@ -9,7 +9,7 @@ import pytest
 import mlscorr
 from mlscorr.correction import Correction
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.clouds.las_windows import read_windows
+from mlscorr.io.clouds import read_windows
 from mlscorr.survey import CloudFile, Trajectory
 from tests.beds.copies import write_corrected
 from tests.beds.missing_times import CORNER, POINTS, START, write_survey

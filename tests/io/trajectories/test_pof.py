@@ -6,9 +6,9 @@ from datetime import date
 import numpy as np
 import pytest
 
+from mlscorr.io.trajectories import TrajectorySection, read_trajectory
 from mlscorr.io.trajectories.pof import HEADER, read_pof
-from mlscorr.io.trajectories.trajectory import read_trajectory, read_trajectory_file
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+from mlscorr.io.trajectories.trajectory import read_trajectory_file
 from tests.beds.pof import pof_bytes, poq_bytes
 from tests.io.trajectories.test_trajectory_files import assert_same
 from tests.io.trajectories.test_trajectory_io import drive

@@ -7,8 +7,8 @@ import pytest
 from pyproj import Transformer
 
 import mlscorr
-from mlscorr.io.surveys.folder_roles import sort_files
-from mlscorr.io.trajectories.trajectory import read_trajectory
+from mlscorr.io.surveys import sort_files
+from mlscorr.io.trajectories import read_trajectory
 from tests.beds.shared import shared
 from tests.io.surveys.test_survey_file import CONTROL, TOML, write_las
 from tests.io.trajectories.test_trajectory_io import HEADER, csv_of, drive, table_of

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
-from mlscorr.io.surveys.folder_roles import sort_files
-from mlscorr.io.surveys.survey_file import read_survey
+from mlscorr.io.surveys import read_survey, sort_files
 from tests.io.surveys.test_survey_file import CONTROL, TOML, write_las
 from tests.io.trajectories.test_trajectory_files import CRS, assert_same, geographic, read
 from tests.io.trajectories.test_trajectory_io import drive

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.trajectories.time_systems import match_times
+from mlscorr.io.trajectories import match_times
 from mlscorr.survey import Trajectory
 
 WEEK_NUMBER = 2300  # the week of 2024-02-04

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.io.trajectories.trajectory import read_trajectory, read_trajectory_file
-from mlscorr.io.trajectories.trajectory_exports import check_exports, export_trajectory
+from mlscorr.io.trajectories import check_exports, export_trajectory, read_trajectory
+from mlscorr.io.trajectories.trajectory import read_trajectory_file
 from tests.io.trajectories.test_trajectory_files import CRS, assert_same
 from tests.io.trajectories.test_trajectory_io import drive
 

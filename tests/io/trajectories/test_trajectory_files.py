@@ -7,9 +7,9 @@ import pytest
 from pyproj import Proj
 from scipy.spatial.transform import Rotation
 
+from mlscorr.io.trajectories import TrajectorySection
 from mlscorr.io.trajectories.sbet import read_sbet
 from mlscorr.io.trajectories.trajectory import read_trajectory_file
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
 from mlscorr.survey import Trajectory
 from tests.io.trajectories.test_trajectory_io import csv_of, drive, sbet_records, table_of, written
 

@@ -8,9 +8,14 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles, georeference, to_scanner
 from mlscorr.io.surveys.crs_checks import describe_projection
-from mlscorr.io.trajectories.sbet import SBET_FIELDS, SMRMSG_FIELDS, read_sbet
-from mlscorr.io.trajectories.trajectory import read_trajectory, write_trajectory_csv
-from mlscorr.pos.steps import find_steps
+from mlscorr.io.trajectories import (
+    SBET_FIELDS,
+    SMRMSG_FIELDS,
+    read_trajectory,
+    write_trajectory_csv,
+)
+from mlscorr.io.trajectories.sbet import read_sbet
+from mlscorr.pos import find_steps
 from mlscorr.survey import Mounting, Trajectory
 from tests.beds.shared import shared
 

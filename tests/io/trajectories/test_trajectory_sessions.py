@@ -11,10 +11,9 @@ import pytest
 import mlscorr
 from mlscorr.effects import make_effect
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.clouds.las import read_chunks
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.io.trajectories.trajectory import read_trajectory, write_trajectory_csv
-from mlscorr.io.trajectories.trajectory_sessions import join_sessions
+from mlscorr.io.clouds import read_chunks
+from mlscorr.io.surveys import read_survey
+from mlscorr.io.trajectories import join_sessions, read_trajectory, write_trajectory_csv
 from mlscorr.survey import Pos, Trajectory
 from tests.io.surveys.test_survey_file import CONTROL, TOML, write_las
 from tests.pipeline.test_starting import write_sbet

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from mlscorr.io.trajectories.weak_files import write_weak
+from mlscorr.io.trajectories import write_weak
 from tests.beds.reports import START, drive
 
 STRETCH = {"from": START + 10.0, "to": START + 20.0, "length_m": 60.0, "chainage": 60.0,

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import angles_from_attitude
-from mlscorr.io.surveys.survey_file import read_survey
-from mlscorr.io.trajectories.poses import read_poses
-from mlscorr.io.trajectories.sbet import SMRMSG_FIELDS
-from mlscorr.io.trajectories.trajectory import read_trajectory, write_trajectory_csv
-from mlscorr.io.trajectories.trajectory_exports import export_trajectory
-from mlscorr.report.provenance import systems
+from mlscorr.io.surveys import read_survey
+from mlscorr.io.trajectories import (
+    SMRMSG_FIELDS,
+    export_trajectory,
+    read_poses,
+    read_trajectory,
+    write_trajectory_csv,
+)
+from mlscorr.report._provenance import systems
 from tests.beds.pof import pof_bytes, poq_bytes
 from tests.io.surveys.test_survey_file import CONTROL, TOML, write_las
 from tests.io.trajectories.test_trajectory_io import drive, table_of

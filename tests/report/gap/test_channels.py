@@ -3,7 +3,7 @@
 import pytest
 
 from mlscorr.report.gap import diagnosis_page
-from mlscorr.report.gap.channels import channel_rows, channel_statements, distance_rows
+from mlscorr.report.gap._channels import channel_rows, channel_statements, distance_rows
 from tests.beds.gap_documents import gap_document
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from mlscorr.report import draw
 from mlscorr.report.gap import diagnosis_figures, plan_figures
-from mlscorr.report.style import draw
 from tests.beds.gap_documents import gap_document, plan_document
 
 

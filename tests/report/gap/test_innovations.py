@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.report.gap.innovations import innovations_figure, passes_of
+from mlscorr.report.gap._innovations import innovations_figure, passes_of
 from tests.beds.gap_documents import gap_document
 
 

@@ -1,7 +1,7 @@
 """Parameters of a diagnosis find the effects that they belong to."""
 
 from mlscorr.effects import effect_class
-from mlscorr.report.gap.labels import parameters_of
+from mlscorr.report.gap._labels import parameters_of
 from tests.beds.gap_documents import parameter
 
 

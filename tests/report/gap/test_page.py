@@ -7,9 +7,8 @@ from html.parser import HTMLParser
 
 import pytest
 
-from mlscorr.report.gap import diagnosis_page, plan_page
-from mlscorr.report.gap.numbers import signed
-from mlscorr.report.gap.verdict import advice, facts, smallest, verdict
+from mlscorr.report.gap import diagnosis_page, plan_page, signed
+from mlscorr.report.gap._verdict import advice, facts, smallest, verdict
 from mlscorr.report.tables import number
 from tests.beds.browser import browse, need_browser
 from tests.beds.gap_documents import KINDS, gap_document, plan_document

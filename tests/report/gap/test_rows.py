@@ -2,7 +2,7 @@
 
 import pytest
 
-from mlscorr.report.gap.rows import bin_rows, cause_rows, detectable_rows, round_rows, worst_rows
+from mlscorr.report.gap._rows import bin_rows, cause_rows, detectable_rows, round_rows, worst_rows
 from tests.beds.gap_documents import CAUSES, gap_document, parameter, round_document
 
 

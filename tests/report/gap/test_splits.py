@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from mlscorr.report.gap.splits import closure_figure, where_figure
+from mlscorr.report.gap._splits import closure_figure, where_figure
 from tests.beds.gap_documents import gap_document
 
 

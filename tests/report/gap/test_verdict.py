@@ -2,7 +2,7 @@
 
 import pytest
 
-from mlscorr.report.gap.verdict import advice, facts, verdict
+from mlscorr.report.gap._verdict import advice, facts, verdict
 from tests.beds.gap_documents import CAUSES, KINDS, START, gap_document
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from mlscorr.pipeline.installation import _rendering
-from mlscorr.report.render import PictureOptions, draw, open3d_engine, sheet
+from mlscorr.report.render import PictureOptions, draw
+from mlscorr.report.render import _open3d_engine as open3d_engine
+from mlscorr.report.render import _sheet as sheet
 from tests.beds.street_of_points import SIZE
 
 

@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.report.render.quantities import (
-    COLOURS,
-    CloudPair,
-    colour_table,
-    limits,
-    paint,
-    point_sigma,
-)
+from mlscorr.report.render import colour_table
+from mlscorr.report.render.quantities import COLOURS, CloudPair, limits, paint, point_sigma
 from mlscorr.survey import PointCloud, Trajectory
 from tests.beds.street_of_points import ORIGIN, START
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.report.render.scout import scout
+from mlscorr.report.render._scout import scout
 from mlscorr.survey import PointCloud
 from tests.beds.street_of_points import ORIGIN, START, pieces, shifted, target
 

@@ -4,9 +4,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.estimate import TieResiduals
-from mlscorr.report.render.scout import Scouted
-from mlscorr.report.render.section import find_place, worst_facades
-from mlscorr.report.render.views import PictureOptions, section
+from mlscorr.report.render import worst_facades
+from mlscorr.report.render._scout import Scouted
+from mlscorr.report.render._views import PictureOptions, section
+from mlscorr.report.render.section import find_place
 from mlscorr.survey import PointCloud, Ties
 from tests.beds.street_of_points import ORIGIN, START
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.report.render.scout import Scouted
-from mlscorr.report.render.view import PictureOptions
-from mlscorr.report.render.views import overview
+from mlscorr.report.render import PictureOptions
+from mlscorr.report.render._scout import Scouted
+from mlscorr.report.render._views import overview
 from tests.beds.street_of_points import SIZE, START, street, target
 
 

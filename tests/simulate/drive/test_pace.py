@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlscorr.simulate.drive.pace import Pace, smooth_step
+from mlscorr.simulate.drive._pace import Pace, smooth_step
 
 ELAPSED = np.arange(0.0, 120.0, 0.01)
 FAR = 1e6  # s: no slowdown within the drive

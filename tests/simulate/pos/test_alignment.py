@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.simulate.pos.alignment import poses
+from mlscorr.simulate.pos._alignment import poses
 from mlscorr.survey import Trajectory
 
 START = 413_200.0  # s

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.simulate.pos.inertial import STATES
-from mlscorr.simulate.pos.kalman import Measurement, kalman_filter, smooth
+from mlscorr.simulate.pos._inertial import STATES
+from mlscorr.simulate.pos._kalman import Measurement, kalman_filter, smooth
 
 EPOCHS = 6
 

@@ -1,0 +1,84 @@
+"""What is wrong with each survey of a blind check: of which kind, which effects, of what size."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.blind._settings import SETTINGS
+from mlscorr.effects import known_effects
+
+
+@dataclass(frozen=True)
+class Case:
+    """What one survey should have: kind, names of effects or of a mechanism, size, and names to
+    take instead where the geometry doesn't show one. The library lacks ``without``.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    mdb: float
+    without: str
+
+
+def mix(cases: int, rng: np.random.Generator, mechanisms: Sequence[str] = ()) -> list[Case]:
+    """Draw cases in random order; names of one kind come in turn, so that all are there alike.
+
+    Parameters
+    ----------
+    cases : int
+    rng : numpy.random.Generator
+    mechanisms : sequence of str
+        Names of mechanisms outside the library; without them there are no such cases.
+    """
+    shares = {k: v for k, v in SETTINGS.shares if mechanisms or k != "outside"}
+    kinds = np.repeat(list(shares), _whole(cases, shares))
+    turns = {
+        "noise": _turns(causes(is_random=True), rng),
+        "single": _turns(causes(), rng),
+        "withheld": _turns(causes(), rng),
+        "outside": _turns(tuple(mechanisms), rng),
+    }
+    return [_case(str(kind), turns, rng) for kind in rng.permutation(kinds)]
+
+
+def causes(is_random: bool = False) -> tuple[str, ...]:
+    """Names of the effects that a case may have: the library's, and those that were registered.
+
+    Parameters
+    ----------
+    is_random : bool
+        Whether they are noise.
+    """
+    kinds = known_effects()
+    return tuple(k.name for k in kinds if (k.random if is_random else not k.is_scatter()))
+
+
+def _case(kind, turns, rng):
+    names, mdb = (), 0.0
+    if kind == "pair":
+        names = tuple(map(str, rng.choice(causes(), 2, replace=False)))
+    elif kind in turns:
+        names = (next(turns[kind]),)
+    if kind == "single":
+        sizes, shares = zip(*SETTINGS.single_sizes, strict=True)
+        mdb = float(rng.choice(sizes, p=shares))
+    elif kind != "clean":
+        is_noise = kind == "noise"
+        mdb = float(rng.uniform(*(SETTINGS.noise_sizes if is_noise else SETTINGS.clear_sizes)))
+    without = str(rng.choice([name for name in causes() if name not in names]))
+    return Case(kind, names, mdb, names[0] if kind == "withheld" else without)
+
+
+def _turns(names, rng):
+    """Names without end, each once before any comes again."""
+    while names:
+        yield from map(str, rng.permutation(names))
+
+
+def _whole(total, shares):
+    """Whole numbers of a total in proportion to shares, by the largest remainders."""
+    exact = total * np.array(list(shares.values())) / sum(shares.values())
+    whole = exact.astype(int)
+    whole[np.argsort(whole - exact, kind="stable")[: total - whole.sum()]] += 1
+    return whole

@@ -1,0 +1,259 @@
+"""Knots: epochs at which the states of a signal are unknowns, and its prior there.
+
+Given its states at two knots a process between them knows nothing of the rest (``conditional``),
+so what a row sees is f(t) = a f_k + b f_k+1 + r, and as long as r stays far below any noise the
+rows of one interval may have each an r of its own. The prior of the states is a sum of squares of
+
+    W (f_k+1 - F f_k),   W Q W^T = I,      so L0 is block tridiagonal in Q^-1, F^T Q^-1 F, -Q^-1 F
+
+(Särkkä and Solin 2019, section 12.3). Q falls as the step to the power 2 d - 1, and where the
+steps of smooth signals are too small no digit is left of L0. So each signal has knots of its own,
+a step apart after which r in the middle, Q_11(step / 4), is ``SHARE`` of the signal's sigma: a
+22nd of the correlation time for Matern 5/2, a 350th for 3/2, 1/184 on the clock of an integrated
+random walk; the exponential one has them at all epochs. Where rows tell less, longer steps do
+(``sufficient_steps``). A knot may leave out epochs within a quarter of a step, where r is no
+larger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mlscorr.collocation._conditional import Neighbours, fill_gains, fill_spans, neighbours
+from mlscorr.collocation._matrices import multiply, multiply_transposed, whitening_root
+from mlscorr.collocation._pattern import Pattern, locate, panel_width
+from mlscorr.collocation._states import Layout, fill_noise, fill_transition
+from mlscorr.collocation.covariance import Covariance, process_noise
+
+SHARE = 5e-5  # of a signal's sigma that knots may leave: 0.05 mm of a drift of 1 m
+
+
+class Knots(NamedTuple):
+    """Knots of s signals, numbered signal after signal.
+
+    Parameters
+    ----------
+    first : (s + 1,) int array
+        Number of each signal's first knot.
+    clock : (k,) array
+        Of each knot, its signal's.
+    times : (u,) array
+        All knots' times, sorted and distinct. Units: s.
+    cells : (u + 1, s, 2) int array
+        Numbers of each signal's knots about a time between two of ``times``, -1 where there is
+        none.
+    """
+
+    first: np.ndarray
+    clock: np.ndarray
+    times: np.ndarray
+    cells: np.ndarray
+
+    @classmethod
+    def of(cls, gps_time: np.ndarray, clocks: np.ndarray, steps: Sequence[float]) -> Knots:
+        """The knots that signals need at given epochs.
+
+        Parameters
+        ----------
+        gps_time, clocks : (q,), (q, s) array
+            Of the epochs, in any order and more than once. Units: s.
+        steps : sequence of float
+            Largest step of each signal between its knots, on its clock.
+        """
+        epochs, rows = np.unique(gps_time, return_index=True)
+        kept = [thinned(clock, step) for clock, step in zip(clocks[rows].T, steps, strict=True)]
+        first = np.concatenate([[0], np.cumsum([len(k) for k in kept])]).astype(np.int64)
+        times = np.unique(np.concatenate([epochs[:0], *(epochs[k] for k in kept)]))
+        edges = np.append(-np.inf, times)
+        cells = np.empty((len(edges), len(kept), 2), dtype=np.int64)
+        for s, k in enumerate(kept):
+            after = np.searchsorted(epochs[k], edges, side="right")
+            cells[:, s, 0] = np.where(after > 0, first[s] + after - 1, -1)
+            cells[:, s, 1] = np.where(after < len(k), first[s] + after, -1)
+        parts = [clocks[rows[k], s] for s, k in enumerate(kept)]
+        return cls(first, np.concatenate([epochs[:0], *parts]), times, cells)
+
+
+def knot_step(covariance: Covariance, share: float = SHARE) -> float:
+    """Largest step between knots among epochs, on the signal's clock.
+
+    Parameters
+    ----------
+    covariance : Covariance
+    share : float
+        Of the signal's sigma that knots may leave.
+    """
+    small = 1e-3  # where Q_11 has only its first power
+    power = 1.0 / (2 * covariance.states - 1)
+    variance = process_noise(covariance.kind, small)[0]
+    return float(4 * small * (share**2 / variance) ** power / covariance.rate)
+
+
+@njit(cache=True, nogil=True)
+def thinned(clock: np.ndarray, step: float) -> np.ndarray:
+    """Numbers of the epochs that are knots.
+
+    From one to the next is at most a step, or there is no epoch between but those within a quarter
+    of a step of the first.
+
+    Parameters
+    ----------
+    clock : (n,) array
+        That never falls.
+    step : float
+    """
+    knots = np.empty(clock.size, dtype=np.int64)
+    count = last = 0
+    for i in range(clock.size):
+        if count > 0:
+            if clock[i] - clock[knots[count - 1]] <= step:
+                last = i
+                continue
+            if clock[last] - clock[knots[count - 1]] > 0.25 * step:
+                knots[count] = last
+                count += 1
+                if clock[i] - clock[last] <= step:
+                    last = i
+                    continue
+        knots[count] = last = i
+        count += 1
+    if count > 0 and clock[last] - clock[knots[count - 1]] > 0.25 * step:
+        knots[count] = last
+        count += 1
+    return knots[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
+    """W and W F of the step to each knot; the stationary prior's W and zero for a first one.
+
+    Parameters
+    ----------
+    layout : Layout
+    knots : Knots
+
+    Returns
+    -------
+    roots, carried : (k, 3, 3) array
+    """
+    roots, carried = np.zeros((2, knots.clock.size, 3, 3))
+    number = layout.states.size
+    f, q = np.zeros((2, number, 3, 3))
+    for s in range(number):
+        d = layout.states[s]
+        for j in range(knots.first[s], knots.first[s + 1]):
+            span = np.inf
+            if j > knots.first[s]:
+                span = knots.clock[j] - knots.clock[j - 1]
+                fill_transition(layout, np.full(number, span), f)
+            fill_noise(layout, np.full(number, span), q)
+            block = q[s, :d, :d].copy()
+            roots[j, :d, :d] = whitening_root(block, np.diag(block))
+            if j > knots.first[s]:
+                carried[j] = multiply(roots[j], f[s])
+    return roots, carried
+
+
+@njit(cache=True, nogil=True)
+def add_prior(
+    layout: Layout, knots: Knots, pattern: Pattern, roots: np.ndarray, carried: np.ndarray,
+    values: np.ndarray,
+) -> None:  # fmt: skip
+    """Add L0 to the values of a matrix: of the knots, and one for each state of other nodes.
+
+    Parameters
+    ----------
+    layout : Layout
+    knots : Knots
+    pattern : Pattern
+    roots, carried : (k, 3, 3) array
+        As of prior_roots.
+    values : (v,) array
+    """
+    place, first = pattern.place, pattern.first
+    for s in range(layout.states.size):
+        d = layout.states[s]
+        for j in range(knots.first[s], knots.first[s + 1]):
+            here, root, before = place[j], roots[j, :d, :d], -carried[j, :d, :d]
+            _add_to_processes(pattern, values, here, here, multiply_transposed(root, root))
+            if j > knots.first[s]:
+                there, across = place[j - 1], multiply_transposed(root, before)
+                _add_to_processes(
+                    pattern, values, there, there, multiply_transposed(before, before)
+                )
+                _add_to_processes(pattern, values, here, there, across)
+                _add_to_processes(pattern, values, there, here, across.T)
+    for j in range(knots.clock.size, place.size):
+        size = first[place[j] + 1] - first[place[j]]
+        _add_to_processes(pattern, values, place[j], place[j], np.eye(size))
+
+
+@njit(cache=True, nogil=True)
+def _add_to_processes(pattern, values, i, j, block):
+    """Add a block to that of each process in block (i, j), if that stands in the lower triangle."""
+    position, d = locate(pattern, i, j), block.shape[0]
+    if position < 0:
+        return
+    width = panel_width(pattern, j)
+    for begin in range(0, pattern.first[j + 1] - pattern.first[j], d):
+        for a in range(d):
+            row = position + (begin + a) * width + begin
+            target = values[row : row + d]
+            for b in range(d):
+                target[b] += block[a, b]
+
+
+@njit(cache=True, nogil=True)
+def knot_gains(
+    layout: Layout, knots: Knots, cell: np.ndarray, clocks: np.ndarray, order: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gains a, b of each signal's states at the knots about q epochs, and the variance of r.
+
+    Parameters
+    ----------
+    layout : Layout
+    knots : Knots
+    cell : (q,) int array
+        Of each epoch.
+    clocks : (q, s) array
+    order : (q,) int array
+        Of the epochs by their cells.
+
+    Returns
+    -------
+    gains, remaining : (q, s, 2 d), (q, s) array
+        Of d states at most, those of each signal without a space between a and b.
+    """
+    number, width = layout.states.size, 2 * max(layout.states) if layout.states.size else 0
+    gains, remaining = np.zeros((cell.size, number, width)), np.zeros((cell.size, number))
+    about = neighbours(number, 0, 0)
+    entered = -1
+    for e in order:
+        if cell[e] != entered:
+            entered = cell[e]
+            enter_cell(layout, knots, entered, about)
+        fill_gains(layout, about, clocks[e])
+        gains[e], remaining[e] = about.gains[:, :width], about.remaining
+    return gains, remaining
+
+
+@njit(cache=True, nogil=True)
+def enter_cell(layout: Layout, knots: Knots, cell: int, about: Neighbours) -> None:
+    """Fill in the clocks of the knots about a cell, and what lies between them.
+
+    Parameters
+    ----------
+    layout : Layout
+    knots : Knots
+    cell : int
+    about : Neighbours
+    """
+    for s in range(layout.states.size):
+        before, after = knots.cells[cell, s]
+        about.before[s] = knots.clock[before] if before >= 0 else -np.inf
+        about.after[s] = knots.clock[after] if after >= 0 else np.inf
+    fill_spans(layout, about)

@@ -1,0 +1,96 @@
+"""Effects of the scanner's encoder, which measures the angle of each beam."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from mlscorr.effects._pulses import noise_by_pulse
+from mlscorr.effects._quantity import quantity
+from mlscorr.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class AngleScale(Effect):
+    """The encoder's scale is wrong about the zero beam: recorded = true + magnitude angle.
+
+    The angle counts from -180 to 180 deg, whichever turn it is given in.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: ratio.
+    """
+
+    stage: ClassVar = "angle"
+    title: ClassVar = "Encoder scale"
+    meaning: ClassVar = "Scan angles are wrong in proportion to the angle from the zero beam."
+    sentence: ClassVar = "The scanner's encoder gives scan angles too {side} by {size}."
+    remedy: ClassVar = "Have the scanner's encoder checked."
+    sides: ClassVar = ("large", "small")
+    magnitude: float = quantity(
+        "ratio", 0.05, "a turn of the mirror would miss 18 deg", typical=1e-4,
+        source="estimate: 0.3 mm at 3 m and 60 deg; such a term is in Lichti and Licht 2006",
+    )  # fmt: skip
+
+    def _error(self, value, reference, rng):
+        return self.magnitude * (np.mod(value.angle + np.pi, 2 * np.pi) - np.pi)
+
+
+@dataclass(frozen=True)
+class AngleEccentricity(Effect):
+    """The encoder's disc is off its axis: recorded = true + magnitude sin(angle - phase).
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: rad.
+    phase : float
+        Angle from the zero beam at which the error rises through zero. Units: rad.
+    """
+
+    stage: ClassVar = "angle"
+    title: ClassVar = "Encoder off its axis"
+    meaning: ClassVar = "Scan angles are wrong by a wave that comes once a turn."
+    sentence: ClassVar = (
+        "The scanner's encoder sits off its axis: scan angles are wrong by up to {size}, once a"
+        " turn."
+    )
+    remedy: ClassVar = "Have the scanner's encoder checked."
+    parts: ClassVar = ("magnitude cos(phase)", "magnitude sin(phase)")
+    magnitude: float = quantity(
+        "rad", 0.05, "a disc of 25 mm radius can't be off its axis by more than 1 mm", typical=1e-4,
+        source="derived: 2.5 um off the axis on a disc of 25 mm radius",
+    )  # fmt: skip
+    phase: float = quantity("rad", 7.0, "a turn has 6.28 rad (is it in degrees?)", default=0.0)
+
+    def _error(self, value, reference, rng):
+        return self.magnitude * np.sin(value.angle - self.phase)
+
+
+@dataclass(frozen=True)
+class AngleNoise(Effect):
+    """Angles are noisier than stated: white noise of one more sigma, for each pulse.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: deg.
+    """
+
+    stage: ClassVar = "angle"
+    random: ClassVar = True
+    title: ClassVar = "Noisy scan angles"
+    meaning: ClassVar = "Scan angles are noisier than stated."
+    sentence: ClassVar = "The scan angles are noisier than stated: {size} of scatter come on top."
+    remedy: ClassVar = (
+        "State the scanner's angle noise in survey.toml as large as found, or have its encoder "
+        "checked."
+    )
+    magnitude: float = quantity(
+        "deg", 1.0, "encoders of surveying scanners resolve thousandths", typical=0.002,
+        source="twice the resolution of the RIEGL VQ-250's data sheet, 0.001 deg", least=0.0,
+    )  # fmt: skip
+
+    def _error(self, value, reference, rng):
+        return np.radians(self.magnitude) * noise_by_pulse(value, rng)

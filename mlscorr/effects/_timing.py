@@ -1,0 +1,99 @@
+"""Effects of the scanner's clock.
+
+Where a source is called an estimate, here and in the other modules of this room, the sentence is
+its derivation; nothing else backs it.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mlscorr.effects._pulses import noise_by_pulse
+from mlscorr.effects._quantity import quantity
+from mlscorr.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class TimeOffset(Effect):
+    """The scanner's clock is ahead of the POS's: recorded = true + magnitude.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: s.
+    """
+
+    stage: ClassVar = "clock"
+    title: ClassVar = "Scanner clock offset"
+    meaning: ClassVar = "The clocks of scanner and POS differ by a constant."
+    sentence: ClassVar = "The clock of the scanner is {size} {side} the clock of the POS."
+    remedy: ClassVar = (
+        "Have the time synchronisation of the scanner checked; until then, mlscorr apply "
+        "survey.toml gap.json -o applied takes the size found out of the cloud."
+    )
+    sides: ClassVar = ("ahead of", "behind")
+    magnitude: float = quantity(
+        "s", 1.0, "more than the step of time messages is a wrong time system", typical=1e-3,
+        source="estimate: time messages without the pulse per second hold to about 1 ms",
+    )  # fmt: skip
+
+    def _error(self, value, reference, rng):
+        return self.magnitude
+
+
+@dataclass(frozen=True)
+class ClockDrift(Effect):
+    """The scanner's clock runs fast: recorded = true + magnitude (true - reference.start).
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: s per s.
+    """
+
+    stage: ClassVar = "clock"
+    title: ClassVar = "Scanner clock drift"
+    meaning: ClassVar = "The clock of the scanner runs faster or slower than the clock of the POS."
+    sentence: ClassVar = "The clock of the scanner runs {side} by {size}."
+    remedy: ClassVar = "Have the scanner's clock steered by the POS; a drift that stays is a fault."
+    sides: ClassVar = ("fast", "slow")
+    magnitude: float = quantity(
+        "s per s",
+        1e-3,
+        "no quartz is off by more, and one that is would be replaced",
+        typical=2e-5,
+        source="usual data sheets of quartz oscillators: 20 ppm, running free of GNSS",
+    )
+
+    def _error(self, value, reference, rng):
+        return self.magnitude * (value.gps_time - reference.start)
+
+
+@dataclass(frozen=True)
+class TimeJitter(Effect):
+    """Each pulse's time stamp has noise of its own, shared by the pulse's returns.
+
+    Parameters
+    ----------
+    magnitude : float
+        Units: s.
+    """
+
+    stage: ClassVar = "clock"
+    random: ClassVar = True
+    title: ClassVar = "Noisy time stamps"
+    meaning: ClassVar = "Each laser pulse's time stamp has an error of its own."
+    sentence: ClassVar = (
+        "The scanner's time stamps scatter by {size}, which the simulator does not know."
+    )
+    remedy: ClassVar = (
+        "Check how the scanner's pulses are time-stamped: by the POS's second pulse, or by the "
+        "computer that stores them."
+    )
+    magnitude: float = quantity(
+        "s", 0.01, "more than the time of a scan line mixes up the lines", typical=1e-4,
+        source="estimate: interrupts of an operating system without real time take 0.1 ms",
+        least=0.0,
+    )  # fmt: skip
+
+    def _error(self, value, reference, rng):
+        return self.magnitude * noise_by_pulse(value, rng)

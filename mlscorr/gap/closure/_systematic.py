@@ -1,0 +1,209 @@
+"""How far a shift shrinks: what sizes found without innovations take of their squares.
+
+What stays is what the error of the size leaves, or, where chance rarely leaves as much, what the
+cause's own columns still explain of the rest. What any other block explains of it, known or
+unknown, counts by the probability that the cause isn't all: the evidence has weighed it already,
+and drift of another shape than V's looks like something, too. The gap before is what is taken away
+and what stays: no share of it is more than all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.gap.closure._cross_fit import CrossFit
+from mlscorr.gap.closure.folds import Folds
+from mlscorr.gap.evidence import SETTINGS, ColumnTable, ErrorModel, Explanations, Observations
+
+
+def share_gone(before: float, after: float, chance: float = -np.inf) -> float:
+    """Share of a signed square that is gone, within [-1, 1]: negative where it grew.
+
+    Parameters
+    ----------
+    before, after : float
+        Negative where the simulator errs more than reality does.
+    chance : float
+        What is after it at least, but for one right simulator in forty: below it the simulator
+        has too much of the cause, which is a gap, too.
+
+    >>> share_gone(100.0, 1.0), share_gone(100.0, -50.0, -60.0), share_gone(50.0, -100.0, -60.0)
+    (0.99, 1.0, -0.5)
+    """
+    before, after = max(before, 0.0), -after if after < chance else max(after, 0.0)
+    largest = max(before, after)
+    return float((before - after) / largest) if largest > 0 else 0.0
+
+
+def unit_square(observations: Observations, model: ErrorModel) -> float:
+    """Square of the length that a sum of squares of one has, spread over all rows. Units: m^2.
+
+    The sigma is that of the median innovation; of planes of two passes that of the second look, as
+    the first one only says where the plane is.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : ErrorModel
+        Of V.
+    """
+    _, sigma = observations.whitener(model).innovations(np.zeros((len(observations), 1)))
+    second = observations.second
+    return float(np.median(sigma[second]) ** 2 / second.sum())
+
+
+@dataclass(frozen=True)
+class Squares:
+    """Squares before and after (2,), in each fold (f, 2), before by chance (k,), in m^2 or in the
+    square of the gap's unit; the share that is gone, and 95 % of it.
+    """
+
+    square: np.ndarray
+    folds: np.ndarray
+    chance: np.ndarray
+    gone: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class SystematicGap:
+    """Innovations of observations, of what is predicted for each, and of what may explain them.
+
+    Parameters
+    ----------
+    residual : (n,) array
+    predicted : (n,) array
+        By the size that was found without each observation.
+    own : (n, p) array
+        Of the cause's columns.
+    explanations : Explanations
+    cross : CrossFit
+    learned : (n,) bool array
+        Which observations sizes are found in.
+    fold : (n,) int array
+    unit : float
+        Square of the length of a sum of squares of one. Units: m^2.
+    """
+
+    residual: np.ndarray
+    predicted: np.ndarray
+    own: np.ndarray
+    explanations: Explanations
+    cross: CrossFit
+    learned: np.ndarray
+    fold: np.ndarray
+    unit: float
+
+    @classmethod
+    def of(
+        cls, observations: Observations, model: ErrorModel, table: ColumnTable,
+        residual: np.ndarray, folds: Folds, used: np.ndarray, among: np.ndarray,
+    ) -> SystematicGap:  # fmt: skip
+        """Of some observations.
+
+        Parameters
+        ----------
+        observations : Observations
+        model : ErrorModel
+        table : ColumnTable
+            Of innovations, of each observation.
+        residual : (m,) array
+        folds : Folds
+        used, among : (m,) bool array
+            Rows in which sizes were found; that are looked at.
+        """
+        keep = among[observations.row]
+        row = observations.row[keep]
+        shifts = np.array([predicted.shift for predicted in folds.predicted]).T
+        f = shifts.shape[1]
+        scale = np.abs(folds.columns).max(axis=0, initial=0.0)
+        scale[scale == 0] = 1.0
+        parts = observations.columns(np.column_stack([residual, shifts, folds.columns / scale]))
+        white = observations.whitener(model).innovations(parts)[0][keep]
+        u, each, own = np.split(white, [1, 1 + f], axis=1)
+        fold, learned = folds.of_rows[row], used[row]
+        judged = each[np.arange(len(row)), fold]
+        predicted = np.where(folds.fold[row] < 0, each.mean(axis=1), judged)
+        cross = CrossFit(own[learned], fold[learned], f)
+        unit = unit_square(observations, model)
+        explanations = Explanations.of(table, table.columns[keep])
+        return cls(u[:, 0], predicted, own, explanations, cross, learned, fold, unit)
+
+    def measure(self, rng: np.random.Generator, probability: float = 0.0) -> Squares:
+        """The gap before and after.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Draws replicas.
+        probability : float
+            Of the cause, and nothing else.
+        """
+        rest = self.residual - self.predicted
+        tails = rest / np.sqrt(np.mean(rest**2))
+        drawn = rng.choice(tails, (len(rest), SETTINGS.replicas))
+        chance = self.explanations.largest(drawn)[0]
+        usual, limit = chance.mean(), np.percentile(chance, SETTINGS.band[1])
+        (largest,), (block,) = self.explanations.largest(rest[:, None])
+        chance = self.unit * (chance - usual)
+        if not self.predicted.any():  # a signed gap, as it is
+            square = np.repeat(self.unit * (largest - usual), 2)
+            return Squares(square, square[None], chance, 0.0, (0.0, 0.0))
+        gone, own, off = self._own(drawn)
+        stays = self._explained_by_own(rest[:, None])[1][:, 0]
+        other = max(float(largest - usual), own) if largest > limit else own
+        left = own + (1.0 - probability) * (other - own)
+        if left > 2 * own:
+            stays = self.explanations.fit(block, rest)
+        before = max(gone + left, 0.0)
+        interval = self._interval(gone, own, other, off, probability)
+        square = self.unit * np.array([before, left])
+        return Squares(square, self._folds(stays, left), chance, share_gone(*square), interval)
+
+    def _interval(self, gone, own, other, off, probability):
+        """95 % of the share that is gone: with others, unless they are improbable, and without."""
+        low, high = np.percentile(off, SETTINGS.band)
+        largest = share_gone(max(gone + own, 0.0), own)
+        if 1.0 - probability < 0.5 * (1.0 - SETTINGS.confidence):
+            other = own
+        wide = SETTINGS.quantile * 2 * np.sqrt(other - own) / max(gone + other, 1.0)
+        smallest = share_gone(max(gone + other, 0.0), other) - wide
+        low, high = np.clip([smallest + min(low, 0.0), largest + max(high, 0.0)], -1, 1)
+        return float(low), float(high)
+
+    def _own(self, drawn):
+        """Squares that are gone, those that the cause's own columns leave, and by how much the
+        true share is off the stated one in replicas.
+
+        By its error the size leaves on average what it leaves in replicas; more, where the
+        columns explain more of the rest than of nearly all replicas'.
+        """
+        rest = self.residual - self.predicted
+        signal = self.own @ self.cross.sizes(self.residual[self.learned, None])[-1]
+        replica = signal + drawn
+        sizes = self.cross.sizes(replica[self.learned])
+        predicted = np.einsum("np,npk->nk", self.own, sizes[self.fold])
+        wrong = ((signal - predicted) ** 2).sum(axis=0)
+        gone = (replica**2 - (replica - predicted) ** 2).sum(axis=0)
+        stated = [share_gone(max(g + wrong.mean(), 0.0), wrong.mean()) for g in gone]
+        off = 1.0 - wrong / max((signal**2).sum(), 1e-300) - np.array(stated)
+        usual = np.percentile(self._explained_by_own(replica - predicted)[0], SETTINGS.band[1])
+        explained = self._explained_by_own(rest[:, None])[0][0]
+        left = max(wrong.mean(), explained - self.own.shape[1] if explained > usual else 0.0)
+        return (self.residual**2 - rest**2).sum(), float(left), off
+
+    def _explained_by_own(self, rest):
+        """Squares (k,) of columns (n, k) that the cause's columns explain, and what of these."""
+        normal = self.own.T @ self.own + np.eye(self.own.shape[1]) / SETTINGS.free_sigma**2
+        fit = self.own @ np.linalg.solve(normal, self.own.T @ rest)
+        return (rest**2 - (rest - fit) ** 2).sum(axis=0), fit
+
+    def _folds(self, stays, left):
+        """Squares (f, 2) in each fold, before and after, on the scale of the whole."""
+        rest, number = self.residual - self.predicted, self.fold.max() + 1
+        gone = self.residual**2 - rest**2
+        share = stays**2 / max((stays**2).sum(), 1e-300) * left
+        both = [np.bincount(self.fold, v, number) for v in (gone + share, share)]
+        return self.unit * number * np.array(both).T

@@ -1,0 +1,152 @@
+"""Depth edges along scan lines: over which angle a line passes from a surface to one behind it.
+
+A thin beam steps from the near surface to the far one. A wide one measures pulses between, or
+both surfaces with one pulse, as long as its footprint lies on both: their number times the angle
+between pulses is the width of the edge.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.gap.contrast._settings import SETTINGS
+from mlscorr.gap.residuals import SETTINGS as OBSERVE
+from mlscorr.gap.residuals import chance, moments_before
+from mlscorr.simulate.scan import recorded_platform
+from mlscorr.survey import Columns, PointCloud, Survey
+from mlscorr.targets import NO_POINTS
+
+
+@dataclass(frozen=True, repr=False)
+class Edges(Columns):
+    """Depth edges.
+
+    Parameters
+    ----------
+    gps_time : (e,) array
+        Units: s.
+    place : (e, 3) array
+        On the near surface. Units: m.
+    range : (e,) array
+        Of the near surface. Units: m.
+    width : (e,) array
+        Units: rad.
+    """
+
+    gps_time: np.ndarray
+    place: np.ndarray
+    range: np.ndarray
+    width: np.ndarray
+
+    @property
+    def chance(self) -> np.ndarray:
+        """A number from 0 to 1 (e,) of the moment, the same in all clouds."""
+        return chance(np.floor(self.gps_time / OBSERVE.moment).astype(np.int64))
+
+
+class EdgeCollector:
+    """Keeps about `limit` depth edges of the chunks that it is given, wherever these end.
+
+    Parameters
+    ----------
+    survey : Survey
+    limit : int
+    """
+
+    def __init__(self, survey: Survey, limit: int = SETTINGS.kept):
+        self._survey, self._limit = survey, limit
+        self._origin = survey.trajectory.position.mean(axis=0)
+        self._platform = recorded_platform(survey, self._origin)
+        self._parts, self.share = [Edges(np.empty(0), np.empty((0, 3)), *np.empty((2, 0)))], 1.0
+        self._held = NO_POINTS
+
+    def add(self, chunk: PointCloud) -> None:
+        """Take the edges of a chunk, but those of the moments about its last point."""
+        inside = chunk[self._survey.trajectory.segment(chunk.gps_time) >= 0]
+        self._held = PointCloud.concatenate([self._held, inside])
+        self._close(chunk.gps_time[-1] if len(chunk) else np.inf)
+
+    def _close(self, time):
+        """Take the edges of held points, but those of the moments about a time (s)."""
+        segment = self._survey.trajectory.segment(self._held.gps_time)
+        moments, is_open = moments_before(time, self._held.gps_time, segment)
+        for rows in moments:
+            self._take(self._held[rows[np.argsort(self._held.gps_time[rows], kind="stable")]])
+        self._held = self._held[is_open]
+
+    def _take(self, inside):
+        """Take the edges of the points of a moment, in order of time."""
+        sight = inside.xyz - self._origin - self._platform.scanner(inside.gps_time)
+        rough = max(OBSERVE.roughest, 6 * np.sqrt(6) * self._survey.scanner.range_noise)
+        edges = edges_of(inside, sight, rough)
+        self._parts.append(edges[edges.chance < self.share])
+        while sum(map(len, self._parts)) > self._limit:
+            self.share /= 2
+            self._parts = [part[part.chance < self.share] for part in self._parts]
+
+    def edges(self) -> Edges:
+        """Edges of all chunks, of which none follows."""
+        self._close(np.inf)
+        return Edges.concatenate(self._parts)
+
+
+def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
+    """Depth edges of points in order of time.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    sight : (n, 3) array
+        From the scanner to each. Units: m.
+    rough : float
+        Second difference of ranges below which points lie on one surface. Units: m.
+    """
+    away = np.linalg.norm(sight, axis=1)
+    beam = sight / np.maximum(away, 1e-9)[:, None]
+    turn = np.append(np.inf, np.linalg.norm(np.diff(beam, axis=0), axis=1))
+    across = turn * np.minimum(away, np.append(np.inf, away[:-1]))
+    is_more = (np.diff(cloud.gps_time, prepend=-np.inf) == 0) & (across < SETTINGS.same_pulse)
+    first = np.flatnonzero(~is_more)
+    near, far = np.minimum.reduceat(away, first), np.maximum.reduceat(away, first)
+    time, step = cloud.gps_time[first], np.append(turn[first][1:], np.inf)
+    pause = np.append(np.diff(time), np.inf)
+    follows = pause <= 1.5 * np.median(pause)
+    bend = np.full(len(first), np.inf)
+    bend[1:-1] = np.abs(near[2:] - 2 * near[1:-1] + near[:-2])
+    is_smooth = (bend <= rough) & follows & np.append(False, follows[:-1])
+    begin, end = _between_plateaus(is_smooth, follows)
+    ahead, back = 2 * near[begin] - near[begin - 1], 2 * near[end] - near[end + 1]
+    low, high = np.minimum(ahead, back), np.maximum(ahead, back)
+    is_edge = (high - low >= SETTINGS.jump) & (end - begin - 1 >= 2)
+    mixed = np.maximum(end - begin - 3, 0)  # but the last on the one and the first on the other
+    last, is_double = len(first), far - near >= SETTINGS.jump
+    is_near = near[begin] <= near[end]  # pulses that measure both surfaces end the near one
+    both = np.where(is_near, _run(is_double)[begin + 1], _run(is_double[::-1])[::-1][end - 1])
+    for offset in range(2, SETTINGS.widest + 2):  # a pulse between is on neither surface
+        k = np.minimum(begin + offset, last - 1)
+        is_inside = offset < end - begin - 1
+        is_edge &= ~is_inside | ((near[k] > low + rough) & (near[k] < high - rough))
+    here = np.where(is_near, begin, end)[is_edge]
+    width = (mixed + np.minimum(both, SETTINGS.widest))[is_edge] * step[begin[is_edge]]
+    return Edges(time[here], cloud.xyz[first[here]], near[here], width)
+
+
+def _run(is_double):
+    """How many pulses (n,) up to each, it among them, follow each other without a break."""
+    number = np.arange(len(is_double))
+    return number - np.maximum.accumulate(np.where(is_double, -1, number))
+
+
+def _between_plateaus(is_smooth, follows):
+    """Last pulse of a plateau (e,) and first of the next (e,), with few pulses between them."""
+    change = np.flatnonzero(np.diff(is_smooth.astype(np.int8)))
+    starts, ends = np.append(0, change + 1), np.append(change, len(is_smooth) - 1)
+    length, smooth = ends - starts + 1, is_smooth[starts]
+    middle = np.arange(1, len(starts) - 1)
+    gaps = np.append(0, np.cumsum(~follows))
+    least = SETTINGS.plateau - 2  # a smooth pulse has its neighbours on the surface
+    good = ~smooth[middle] & (length[middle] <= SETTINGS.widest + 2)
+    good &= (length[middle - 1] >= least) & (length[middle + 1] >= least)
+    begin, end = ends[middle - 1], starts[middle + 1]
+    good &= (gaps[end] == gaps[begin]) & (begin >= 1) & (end < len(is_smooth) - 1)
+    return begin[good], end[good]

@@ -1,0 +1,124 @@
+"""What a channel's table says where real and simulated cloud differ, in plain sentences."""
+
+import numpy as np
+
+from mlscorr.gap.contrast._blocks import with_sigma
+from mlscorr.gap.contrast.tables import ContrastTable, Measure
+
+SILENT = {  # why a channel is not compared
+    "intensity": "The simulator says nothing of intensity: without its clouds there is nothing to "
+    "compare the survey's with. Give them by --simulated.",
+    "density": "The simulator says nothing of how many points come from where: it has no cloud "
+    "of its own. Give its clouds by --simulated.",
+    "edge_width": "The simulator says nothing of the width of its beam, which it takes as thin. "
+    "Give its clouds by --simulated.",
+    "dropout": "The simulator says nothing of lost returns: it has no effect dropout.",
+    "pulses": "Lost returns can't be counted: the time stamps have no regular step, or no flat "
+    "surface shows them.",
+    "edges": "Too few depth edges lie along scan lines for a width.",
+    "apart": "The two clouds have hardly a place in common.",
+}
+PLACES = {"range": ("range", " m"), "incidence": ("angle of incidence", "°")}
+
+
+def sentence(measure: Measure, table: ContrastTable, sums: np.ndarray) -> str:
+    """Where a table shows the largest difference beyond chance, with its figure; else nothing.
+
+    Parameters
+    ----------
+    measure : Measure
+        Of which the table is.
+    table : ContrastTable
+    sums : (b, bins, k) array
+        Over blocks, which made the table.
+    """
+    run = _largest_run(table)
+    if run is None:
+        return ""
+    part = sums[:, run].sum(axis=1, keepdims=True)
+    (value,), (sigma,), _ = with_sigma(part, measure.figure, measure.weights)
+    (real,), (simulated,) = measure.sides(part.sum(axis=0))
+    where = _where(table, run)
+    if measure.channel == "intensity":
+        return "" if where == "everywhere" else _intensity(table, value, sigma, where)
+    if measure.channel == "density":
+        return _density(value, sigma, where)
+    if measure.channel == "dropout":
+        return (
+            f"{_pair(100 * real, 100 * sigma)} % of the beams on flat surfaces bring no return "
+            f"{where}, {100 * simulated:.1f} % in the simulation: the simulator "
+            f"{'lacks lost returns' if value > 0 else 'loses too many returns'}."
+        )
+    return (
+        f"Depth edges are smeared over {_pair(abs(value), sigma)} mrad "
+        f"{'more' if value > 0 else 'less'} than simulated {where} ({real:.2g} against "
+        f"{simulated:.2g} mrad): the simulator's beam is {'too thin' if value > 0 else 'too wide'}."
+    )
+
+
+def _density(value, sigma, where):
+    change, hint = "more", "loses too many returns there, or its scene lacks things"
+    if value < 0:
+        change, hint = "fewer", "lacks lost returns there, or what hides things"
+    percent = _pair(100 * abs(np.expm1(value)), 100 * sigma * np.exp(value))
+    return (
+        f"The real cloud has {percent} % {change} points than the simulated one {where}: the "
+        f"simulator {hint}."
+    )
+
+
+def _intensity(table, value, sigma, where):
+    factor = np.exp(abs(value))
+    known = np.flatnonzero(np.isfinite(table.value))
+    slope = np.polyfit(known, table.value[known], 1)[0] if len(known) > 1 else value
+    return (
+        f"Real returns are {_pair(factor, factor * sigma)} times "
+        f"{'weaker' if value < 0 else 'stronger'} than simulated ones {where}, beside the usual "
+        f"ratio of the two: the simulator{_lacks(table.by, slope < 0)}."
+    )
+
+
+def _lacks(by, falls):
+    """What simulated intensities lack, where the real ones fall along the bins, or rise."""
+    if by == "reflectance":
+        return f"'s materials differ too {'much' if falls else 'little'} in brightness"
+    along = "with range" if by == "range" else f"with the {PLACES[by][0]}"
+    return f" lacks falloff {along}" if falls else f"'s intensity falls off too fast {along}"
+
+
+def _pair(value, sigma):
+    """A figure ± its sigma, with as many decimals as the sigma's first figure asks for."""
+    places = int(np.clip(-np.floor(np.log10(max(sigma, 1e-9))), 0, 4))
+    return f"{value:.{places}f} ± {sigma:.{places}f}"
+
+
+def _largest_run(table):
+    """Slice of the neighbouring bins of one sign that differ, with the largest value; or None."""
+    signs = np.where(table.differs, np.sign(np.nan_to_num(table.value)), 0)
+    if not signs.any():
+        return None
+    peak = int(np.argmax(np.where(table.differs, np.abs(np.nan_to_num(table.value)), -1)))
+    first = last = peak
+    while first > 0 and signs[first - 1] == signs[peak]:
+        first -= 1
+    while last < len(signs) - 1 and signs[last + 1] == signs[peak]:
+        last += 1
+    return slice(first, last + 1)
+
+
+def _where(table, run):
+    """The stretch of a run of bins, in words."""
+    if run == slice(0, len(table.bins)):
+        return "everywhere"
+    if table.edges is None:
+        return f"from {' and '.join(table.bins[run])} surfaces"
+    name, unit = PLACES[table.by]
+    known = np.flatnonzero(np.isfinite(table.value))
+    low, high = table.edges[run.start], table.edges[run.stop]
+    is_first, is_last = run.start <= known[0], run.stop > known[-1]
+    if is_first and is_last:
+        return "everywhere"
+    of = "" if table.by == "range" else f" {name}"
+    if is_last:
+        return f"beyond {low:g}{unit}{of}"
+    return f"within {high:g}{unit}{of}" if is_first else f"between {low:g} and {high:g}{unit}{of}"

@@ -1,0 +1,199 @@
+"""Events between the times and widths of the bank: the best one, refined."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from mlscorr.gap.evidence._error_models import ErrorModel, shares
+from mlscorr.gap.evidence.columns import ColumnTable, column_table, is_of_one_target
+from mlscorr.gap.evidence.evidence import BlockEvidence, weigh_blocks
+from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures import SETTINGS as SIGNATURES
+from mlscorr.gap.signatures import Bench, Signature, signature
+from mlscorr.survey import Survey
+
+
+@dataclass(frozen=True)
+class RefinedEvent:
+    """The most probable time and width of an event.
+
+    Parameters
+    ----------
+    signature : Signature
+    table : ColumnTable
+        Of it alone.
+    gain : float
+        Log evidence over that of none, counted as the bank's are.
+    sigma : dict
+        Of time and width, by the curvature of the evidence. Units: s.
+    """
+
+    signature: Signature
+    table: ColumnTable
+    gain: float
+    sigma: dict[str, float]
+
+
+def refine_events(
+    rows: Rows,
+    survey: Survey,
+    observations: Observations,
+    bank: ColumnTable,
+    evidence: BlockEvidence,
+    signatures: Sequence[Signature],
+) -> dict[str, RefinedEvent]:
+    """Refined events by their labels, where the bank has one that stands out.
+
+    Parameters
+    ----------
+    rows, survey, observations, signatures
+        Of one survey.
+    bank : ColumnTable
+    evidence : BlockEvidence
+        Of the residual, first column, by the bank.
+    """
+    refined = {}
+    for label in bank.effects:
+        best = bank.best(label, evidence.gain[:, 0])
+        member = bank.blocks[best].member
+        if not signatures[member].kind.moment() or evidence.gain[best, 0] < SETTINGS.refinement:
+            continue
+        numbers = [
+            i for i, block in enumerate(bank.blocks)
+            if block.label == label and block.member == member
+        ]  # fmt: skip
+        score = evidence.by_model[:, numbers].max(axis=1)
+        models = tuple(evidence.models[s] for s in np.argsort(-score)[:3])  # others add little
+        share, none = sum(bank.blocks[i].weight for i in numbers), float(evidence.total[0])
+        search = _Search(rows, survey, observations, models, none)
+        event, times = signatures[member], [s.fixed["time"] for s in signatures if s.name == label]
+        refined[label] = search.best(event, share, spacing_of(times))
+    return refined
+
+
+def spacing_of(times: Sequence[float]) -> float:
+    """Time between those at which events of one kind were tried. Units: s.
+
+    Parameters
+    ----------
+    times : sequence of float
+        In any order, once for each width.
+
+    >>> spacing_of([3.0, 1.0, 5.0])
+    2.0
+    """
+    apart = np.diff(np.unique(times))
+    return float(np.median(apart)) if len(apart) else SIGNATURES.step_spacing
+
+
+@dataclass(frozen=True)
+class _Search:
+    rows: Rows
+    survey: Survey
+    observations: Observations
+    models: tuple[ErrorModel, ...]
+    none: float  # log evidence of none by all models: by these, which suit the event, it is less
+
+    def score(self, event):
+        """Log evidence over none of a signature, and its table."""
+        table = column_table(self.rows, (event,), (), self.observations.sigma)
+        residual = self.observations.columns(self.rows.residual[:, None])
+        evidence = weigh_blocks(self.observations, self.models, residual, table)
+        gain = evidence.gain + evidence.total - self.none
+        return float(np.logaddexp.reduce(table.weighed(gain)[:, 0])), table
+
+    def moved(self, event, **fixed):
+        """The signature at another time or width, or None where there is none."""
+        bench = Bench(self.rows, self.survey)
+        try:
+            moved = signature(bench, event.kind, event.fixed | fixed, np.random.default_rng(0))
+        except ValueError:  # a time in no pass, or a width beyond its limits
+            return None
+        if is_of_one_target(self.rows, moved.jacobian):
+            return None
+        return moved if moved.jacobian[self.rows.metric].any() else None
+
+    def best(self, event, share, spacing):
+        """The RefinedEvent near an event of the bank with a prior share."""
+        if "width" in event.fixed:
+            event, gain, table, sigma = self._by_steps(event)
+        else:
+            event, gain, table, sigma = self._between_rows(event, spacing)
+        return RefinedEvent(event, table, gain + np.log(share / SETTINGS.cell), sigma)
+
+    def _between_rows(self, event, spacing):
+        """An event without a width: between two rows its evidence is the same at all times, and
+        there are peaks beside the highest. The most probable interval, among those a part of the
+        spacing apart, then by halves.
+        """
+        time, parts = event.fixed["time"], int(4 / SETTINGS.event_steps[-1])
+        edges = self._edges(time, 2 * spacing)
+        middle, length = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+        times = np.append(np.linspace(edges[0], edges[-1], parts)[1:-1], time)
+        number = np.unique(np.searchsorted(edges, times) - 1)
+        tried = {i: self._at(event, middle[i]) for i in number.tolist()}
+        while True:
+            order = sorted(tried)
+            score = np.array([tried[i][0] for i in order]) + np.log(length[order])
+            at = int(np.argmax(score))
+            best = order[at]
+            beside = {(best + other) // 2 for other in (*order[:at][-1:], *order[at + 1 :][:1])}
+            if beside <= tried.keys():
+                break
+            tried |= {i: self._at(event, middle[i]) for i in beside - tried.keys()}
+        gain, table, event = tried[best]
+        off = (middle[order] - middle[best]) ** 2 + length[order] ** 2 / 12
+        return event, gain, table, {"time": float(np.sqrt(shares(score) @ off))}
+
+    def _edges(self, time, span):
+        """Times near one at which an event changes other rows: of rows and passes. Units: s."""
+        rows, passes = self.rows, self.survey.trajectory.passes.ravel()
+        times = rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]
+        known = np.unique(np.round(np.concatenate([passes, *times]) - rows.reference.start, 2))
+        known = known[np.abs(known - time) < span]
+        return np.concatenate([[time - span], known, [time + span]])
+
+    def _at(self, event, time):
+        """Score, table and signature at another time; minus infinity where there is none."""
+        moved = self.moved(event, time=round(float(time), 3))
+        return (-np.inf, None, None) if moved is None else (*self.score(moved), moved)
+
+    def _by_steps(self, event):
+        """An event with a width: by halves, until the evidence falls by less than a factor e to
+        all sides; a drift of metres tells its time to milliseconds.
+        """
+        gain, table = self.score(event)
+        keys, step, fall = event.kind.moment(), 2 * SETTINGS.event_steps[0], np.inf
+        while step > SETTINGS.event_steps[-1] or fall > 1:
+            step, gained = step / 2, True
+            while gained:
+                gained, fall = False, 0.0
+                for key, sign in product(keys, (-1, 1)):
+                    moved = self._changed(event, key, sign * step)
+                    value, other = (-np.inf, None) if moved is None else self.score(moved)
+                    if value > gain:
+                        event, gain, table, gained = moved, value, other, True
+                    elif moved is not None:
+                        fall = max(fall, gain - value)
+        return event, gain, table, {key: self._sigma(event, key, gain, step) for key in keys}
+
+    def _changed(self, event, key, step):
+        """The signature with another time or width, or None where there is none."""
+        time, width = event.fixed["time"], event.fixed["width"]
+        if key == "time":
+            return self.moved(event, time=round(time + step * width, 3))
+        return self.moved(event, width=float(width * np.exp(2 * step)))
+
+    def _sigma(self, event, key, gain, step):
+        """By the fall of the evidence one step to both sides; the step itself where there is
+        none.
+        """
+        scale = event.fixed["width"] * (1 if key == "time" else 2)
+        sides = [self._changed(event, key, change) for change in (-step, step)]
+        falls = [gain - self.score(moved)[0] for moved in sides if moved is not None]
+        fall = np.mean(falls) if falls else 0.0
+        return float(step * scale * (1 / np.sqrt(2 * fall) if fall > 0.01 else 1 / step))

@@ -1,0 +1,291 @@
+"""How each effect shows in the rows: derivatives by its parameters, through its own function."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mlscorr.effects import EFFECTS, Effect, known_effects
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.signatures.settings import SETTINGS
+from mlscorr.survey import Survey
+
+NO_MOUNTING = "and the survey has no [mounting]"  # why most effects are left out, where any are
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How one effect, at one time or of one target where it has such, shows in the rows.
+
+    Parameters
+    ----------
+    kind : class of an Effect
+    fixed : dict
+        Parameters that the columns don't stand for: time, width, target.
+    parameters, units : tuples of p str
+    typical : (p,) array
+        Usual size of each parameter.
+    jacobian : (m, p) array
+        Of the residual by each parameter.
+    variance : (m,) array
+        A random effect's: of the residual's noise by the magnitude squared.
+    growth : (m,) array
+        A random effect's, of roughness rows: at a magnitude x their mean grows by
+        log(1 + growth x^2).
+    """
+
+    kind: type[Effect]
+    fixed: dict
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    typical: np.ndarray
+    jacobian: np.ndarray
+    variance: np.ndarray = field(repr=False)
+    growth: np.ndarray = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.kind.name
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether it shows in the rows' variance."""
+        return bool(self.variance.any() or self.growth.any())
+
+    @property
+    def is_common(self) -> bool:
+        """Whether its noise is the same for rows of one moment, not each row's own."""
+        return self.is_noise and self.kind.is_of_pose()
+
+    def effect(self, estimate: np.ndarray) -> Effect:
+        """The Effect with some parameters.
+
+        Parameters
+        ----------
+        estimate : (p,) array
+            Of random ones the size alone counts.
+
+        Raises
+        ------
+        ValueError
+            For what no survey can have.
+        """
+        estimate = np.asarray(estimate, dtype=float)
+        if self.kind.is_wave():
+            size, phase = np.hypot(*estimate), np.arctan2(estimate[1], estimate[0])
+            return self.kind(magnitude=float(size), phase=float(phase), **self.fixed)
+        values = np.abs(estimate) if self.kind.random else estimate
+        magnitude = float(values[0]) if len(values) == 1 else values.tolist()
+        return self.kind(magnitude=magnitude, **self.fixed)
+
+
+UNSTATED = "does not state how large it is"  # so that none is larger than stated
+
+
+def signatures(
+    rows: Rows,
+    survey: Survey,
+    effects: Iterable[type[Effect]] | None = None,
+    rng: np.random.Generator | None = None,
+) -> tuple[tuple[Signature, ...], dict[str, str]]:
+    """Signatures of effects in the rows of a survey, and why others have none.
+
+    Deterministic effects are differentiated by steps of a tenth of their usual size to both
+    sides. Events (effects with a time) are tried at times spread over the passes, and with several
+    widths where they have one; target outliers with each target; a phase as its two quadratures.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+        With what is believed of trajectory and mounting.
+    effects : iterable of Effect classes, optional
+        All known ones by default.
+    rng : numpy.random.Generator, optional
+        For random effects, whose variances are sampled; the same seed each time by default.
+
+    Returns
+    -------
+    tuple of Signature, dict of str
+        Sentences by the names of effects without one.
+    """
+    bench, signs, left_out = Bench(rows, survey), [], {}
+    rng = np.random.default_rng(0) if rng is None else rng
+    for kind in known_effects() if effects is None else effects:
+        if kind.needs_mounting() and survey.mounting is None:
+            left_out[kind.name] = f"It acts on the {kind.stage}, {NO_MOUNTING}."
+            continue
+        if kind.name in survey.scanner.assumed:
+            left_out[kind.name] = f"survey.toml {UNSTATED}: [scanner] {kind.name}."
+            continue
+        bank = _tried(bench, kind, _bank(kind, rows, survey), rng)
+        if isinstance(bank, str):
+            left_out[kind.name] = bank
+            continue
+        bank = [sign for sign in bank if sign.jacobian.any() or sign.is_noise]
+        signs += bank
+        if not bank:
+            left_out[kind.name] = "No row of this survey depends on it."
+    return tuple(signs), left_out
+
+
+def _tried(bench, kind, bank, rng):
+    """Signatures of an effect; a sentence where one of a user's own can't be tried."""
+    if kind in EFFECTS:
+        return [signature(bench, kind, fixed, rng) for fixed in bank]
+    try:
+        signs = [signature(bench, kind, fixed, rng) for fixed in bank]
+    except (Exception, SystemExit) as error:  # of a user's code: it is left out, not the diagnosis
+        return str(error) or type(error).__name__
+    metric = bench.rows.metric
+    for sign in signs:
+        moved = np.abs(sign.jacobian * sign.typical).max(axis=1, initial=0.0)
+        if not all(np.isfinite(v).all() for v in (moved[metric], sign.variance, sign.growth)):
+            return "It makes values that are no numbers."
+        size = f"At its usual size, {sign.typical[0]:g} {sign.units[0]}, it"
+        if why := too_far(bench.rows, moved, size):
+            return why
+    return signs
+
+
+def too_far(rows: Rows, moved: np.ndarray, what: str) -> str:
+    """Why nobody can mean an effect: it moves the things of rows farther than any survey is off.
+
+    Parameters
+    ----------
+    rows : Rows
+    moved : (m,) array
+        By how much each row is; of each thing, the worst counts. Units: m.
+    what : str
+        Moves them.
+
+    Returns
+    -------
+    str
+        A sentence; nothing where it may be meant.
+    """
+    # walls don't see a height, nor planes of two passes what moves all alike
+    parts = rows.channel == "target", rows.metric & ~rows.two_times
+    part = next((part for part in parts if part.any()), rows.metric)
+    number = np.unique(rows.item[part], return_inverse=True)[1]
+    worst = np.zeros(number.max(initial=0) + 1)
+    np.maximum.at(worst, number, np.abs(moved[part]))
+    usual, largest = np.median(worst), SETTINGS.largest_shift
+    return "" if usual <= largest else (
+        f"{what} moves points by {usual:.3g} m in the median: more than {largest:g} m no survey is "
+        "off everywhere. Is its unit right?"
+    )  # fmt: skip
+
+
+def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Generator) -> Signature:
+    """Signature of an effect class.
+
+    Parameters
+    ----------
+    bench : Bench
+    kind : class of an Effect
+    fixed : dict
+        Such as the time of an event.
+    rng : numpy.random.Generator
+        For random effects.
+    """
+    rows, size = bench.rows, kind.quantities()["magnitude"]
+    m, none = len(rows), np.zeros(len(rows))
+    typical = size.typical if size.typical is not None else 1e-3 * size.largest
+    if kind.is_scatter() or kind.stage == "return":
+        step = SETTINGS.loss * min(1.0, size.largest) if kind.stage == "return" else typical
+        change = bench.change(kind(magnitude=step, **fixed), rng)
+        return Signature(
+            kind, fixed, ("magnitude",), (size.unit,), np.array([typical]),
+            (change.shift / step)[:, None], change.variance / step**2, change.growth / step**2,
+        )  # fmt: skip
+    tries = _tries(kind, size, fixed)
+    jacobian, step = np.zeros((m, len(tries))), SETTINGS.step * typical
+    for column, (_, unit, more) in enumerate(tries if _is_seen(rows, fixed) else ()):
+        ends = [
+            bench.change(kind(magnitude=np.multiply(unit, sign * step).tolist(), **more)).shift
+            for sign in ((-1, 1) if size.least is None else (0, 1))
+        ]
+        jacobian[:, column] = (ends[1] - ends[0]) / (step * (2 if size.least is None else 1))
+    names = tuple(name for name, _, _ in tries)
+    return Signature(
+        kind, fixed, names, (size.unit,) * len(tries), np.full(len(tries), typical),
+        jacobian, none, none,
+    )  # fmt: skip
+
+
+def _is_seen(rows, fixed):
+    """Whether a row lies where an event that passes is half as large as at its largest, or more:
+    of what shows by its tail alone nobody knows how large it was.
+    """
+    times = np.concatenate([rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]])
+    apart = np.abs(times - rows.reference.start - fixed.get("time", 0.0))
+    half = np.sqrt(2 * np.log(2)) * fixed.get("width", np.inf)
+    return bool(apart.min(initial=np.inf) <= half)
+
+
+def _tries(kind, size, fixed):
+    """For each column: its name, unit vector or 1 of the magnitude, and further parameters."""
+    if size.count > 1:
+        return [
+            (name, unit, fixed) for name, unit in zip(kind.parts, np.eye(size.count), strict=True)
+        ]
+    if kind.is_wave():  # magnitude sin(x - phase) = a sin(x) - b cos(x)
+        phases = (0.0, np.pi / 2)
+        return [(n, 1.0, {**fixed, "phase": p}) for n, p in zip(kind.parts, phases, strict=True)]
+    return [("magnitude", 1.0, fixed)]
+
+
+def _bank(kind, rows, survey):
+    """Sets of fixed parameters at which an effect is tried."""
+    if kind.is_on_target():
+        used = np.unique(rows.survey_item[rows.survey_item >= 0])
+        return [{"target": rows.targets.name[i]} for i in used]
+    known, moment = kind.quantities(), kind.moment()
+    rest = {name: known[name].typical for name in kind.circumstances() if name not in moment}
+    if not moment:
+        return [rest]
+    widths = SETTINGS.widths if "width" in moment else (None,)
+    return [
+        {**rest, "time": time, **({} if width is None else {"width": width})}
+        for width in widths
+        for time in _times(rows, survey, SETTINGS.step_spacing if width is None else width)
+    ]
+
+
+def _times(rows, survey, spacing):
+    """Times of events from reference.start, spread over the time in which things were seen. s."""
+    known = rows.gps_time[rows.metric]
+    if len(known) == 0:
+        return []
+    known = np.append(known, rows.gps_time_2[rows.two_times])
+    low, high = known.min(), known.max()
+    inside = np.clip(survey.trajectory.gaps, low, high)
+    lost = float((inside[:, 1] - inside[:, 0]).sum())
+    number = int(np.clip((high - low - lost) / spacing, 1, SETTINGS.events))
+    # evenly over the time without gaps
+    times = low + (np.arange(number) + 0.5) / number * (high - low - lost)
+    for start, end in inside:
+        times = np.where(times >= start, times + (end - start), times)
+    times = times[survey.trajectory.segment(times) >= 0]
+    return [float(round(time - rows.reference.start, 3)) for time in times]
+
+
+def select(signs: Iterable[Signature], rows: Rows, used: np.ndarray) -> tuple[Signature, ...]:
+    """Signatures in some rows alone; of events those that these rows see.
+
+    Parameters
+    ----------
+    signs : iterable of Signature
+    rows : Rows
+        Of which the signatures are.
+    used : (m,) bool array
+    """
+    names, part = ("jacobian", "variance", "growth"), rows.select(used)
+    return tuple(
+        replace(sign, **{name: getattr(sign, name)[used] for name in names})
+        for sign in signs
+        if _is_seen(part, sign.fixed)
+    )

@@ -1,0 +1,257 @@
+"""Whether a trajectory moves as a vehicle does, and heads where it goes."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.frames import angles_from_attitude
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store import OpenPlace, OpenQuestion
+from mlscorr.io.trajectories.time_systems import DAY
+from mlscorr.survey import WEEK, Trajectory
+
+GON = 0.9  # deg
+SECTOR = np.radians(30.0)  # rad, in which courses are one direction
+
+
+def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
+    """The trajectory, where a vehicle can move so: no lone epoch far off, no leap of a distance.
+
+    Epochs that come within a microsecond are one, as no file of ours tells them apart.
+
+    A POS that finds its satellites again falls back at once by metres, so a single step may be
+    faster than any vehicle, two in turn may not.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    trajectory : Trajectory
+
+    Raises
+    ------
+    ValueError
+        Counts the steps that no vehicle makes, and names the fastest.
+
+    Warns
+    -----
+    UserWarning
+        Where epochs are taken as one, and as check_heading.
+    """
+    trajectory = _distinct_epochs(path, trajectory)
+    length = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+    speed = length / np.diff(trajectory.gps_time)
+    if np.ptp(trajectory.gps_time) > WEEK and speed.max() < SETTINGS.moving:
+        raise ValueError(
+            f"{path} lasts {np.ptp(trajectory.gps_time) / DAY:.1f} days, and is never faster than "
+            f"{speed.max():.2g} m/s: its times may be in milli- or microseconds. Give seconds."
+        )
+    is_fast = np.concatenate([[True], speed > SETTINGS.fastest, [True]])
+    bad = is_fast[1:-1] & (is_fast[:-2] | is_fast[2:] | (length > SETTINGS.near))
+    if bad.any():
+        worst = int(np.argmax(np.where(bad, speed, 0.0)))
+        raise ValueError(
+            f"{bad.sum()} of {len(bad)} steps of {path} are faster than {SETTINGS.fastest:.0f} "
+            f"m/s, which no vehicle is (fastest: {length[worst]:.1f} m at {speed[worst]:.3g} m/s, "
+            f"at {trajectory.gps_time[worst]:.3f} s): an epoch is wrong, or the units are not m "
+            "and s. Remove it, or export the trajectory anew."
+        )
+    check_heading(path, trajectory)
+    return trajectory
+
+
+def _distinct_epochs(path, trajectory):
+    """The trajectory with the first of each few epochs that are one; a speed between them is noise.
+
+    Times are compared as ``write_trajectory_csv`` writes them.
+    """
+    is_same = np.diff(np.round(trajectory.gps_time, 6), prepend=-np.inf) == 0
+    if not is_same.any():
+        return trajectory
+    warnings.warn(
+        f"{is_same.sum()} of {len(trajectory)} epochs of {path} come within a microsecond of the "
+        f"one before (first: {trajectory.gps_time[np.argmax(is_same)]:.6f} s): they are left out.",
+        stacklevel=5,
+    )
+    return Trajectory.concatenate([trajectory.select(~is_same)])
+
+
+def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: np.ndarray) -> None:
+    """Refuse radians and gon in columns of degrees, by the course over ground.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    gps_time : (n,) array
+        Units: s.
+    position, angles : (n, 3) array
+        Easting, northing, height (m); roll, pitch, heading (deg).
+
+    Raises
+    ------
+    ValueError
+        For headings that fit the course as radians or gon, and not as degrees.
+    """
+    heading, course = heading_and_course(gps_time, position, angles[:, 2])
+    if len(course) < SETTINGS.course_epochs:
+        return
+    degrees = np.degrees(median_difference(np.radians(heading), course))
+    radians = np.degrees(median_difference(heading, course))
+    tolerance = SETTINGS.course_tolerance
+    if np.abs(angles).max() <= 2 * np.pi and radians < tolerance <= degrees:
+        raise OpenQuestion(
+            f"The angles of {path} seem to be radians where degrees belong: none exceeds 2 pi, "
+            f"and the heading fits the course over ground to {radians:.1f} deg when taken as "
+            f"radians, to {degrees:.1f} deg when taken as degrees. If so, write "
+            'angles = "rad" under [trajectory] in survey.toml.',
+            [OpenPlace(("trajectory", "angles"), ("rad", "deg"), "unit of the angles")],
+        )
+    beside = _folded(np.radians(heading) - course)  # of a turned POS it scatters as of any
+    scatter = np.degrees(np.median(np.abs(_folded(beside - _middle(beside)))))
+    gon = np.degrees(median_difference(np.radians(GON * heading), course))
+    if (
+        degrees > SETTINGS.course_offset and gon < scatter / 2
+    ):  # a turned POS scatters as a car does
+        raise OpenQuestion(
+            f"The angles of {path} seem to be gon where degrees belong: the heading fits the "
+            f"course over ground to {gon:.1f} deg when taken as gon, to {degrees:.1f} deg when "
+            'taken as degrees (medians). If so, write angles = "gon" under [trajectory] in '
+            "survey.toml.",
+            [OpenPlace(("trajectory", "angles"), ("gon", "deg"), "unit of the angles")],
+        )
+
+
+def check_heading(path: Path, trajectory: Trajectory) -> None:
+    """Warn of a heading that is beside the course over ground all along.
+
+    Vehicles reverse, so a heading may be half a turn from the course for a part of the way. Boats
+    and aircraft head into a current or wind: to one side of the course there, to the other side on
+    the way back, which the mean of opposite courses takes out.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    trajectory : Trajectory
+
+    Warns
+    -----
+    UserWarning
+        States the median difference.
+    """
+    angles = angles_from_attitude(trajectory.attitude)
+    heading, course = heading_and_course(trajectory.gps_time, trajectory.position, angles[2])
+    if len(course) < SETTINGS.course_epochs:
+        return
+    beside = np.mod(heading - course + np.pi, 2 * np.pi) - np.pi
+    misfit, folded = np.degrees([np.median(np.abs(x)) for x in (beside, _folded(beside))])
+    forward = np.mean(np.cos(beside) > 0)
+    reverses = folded < SETTINGS.course_tolerance and forward > SETTINGS.forward_share
+    if misfit >= SETTINGS.course_tolerance and not reverses:
+        warnings.warn(
+            f"The heading of {path} differs from the course over ground by {misfit:.0f} "
+            f"deg (median of {len(course)} epochs). Unless the vehicle drifts or reverses, the "
+            "heading may not be clockwise from grid north, or easting and northing may be swapped.",
+            stacklevel=5,
+        )
+        return
+    offset, is_paired = _offset(_folded(beside), course)
+    limit = SETTINGS.course_offset if is_paired else SETTINGS.crab
+    if np.abs(np.degrees(offset)) <= limit:
+        return
+    warnings.warn(
+        f"The heading of {path} is {np.degrees(offset):+.1f} deg beside the course over ground all "
+        f"along (median of {len(course)} epochs): {_cause(heading, course, is_paired)}. If it is "
+        "wrong, correct it under [trajectory] in survey.toml or export it anew, as trajectory.csv "
+        "keeps it.",
+        stacklevel=5,
+    )
+
+
+def _cause(heading, course, is_paired):
+    """Why a heading (rad) may be beside the course (rad)."""
+    gon = np.degrees(median_difference(GON * np.mod(heading, 2 * np.pi), course))
+    if gon < SETTINGS.course_offset:
+        return (
+            f'its angles may be gon, as which it would fit to {gon:.1f} deg (angles = "gon"), or '
+            "the POS is mounted turned about its vertical axis"
+        )
+    cause = (
+        "the POS may be mounted turned about its vertical axis, or headings from true north lack "
+        "the meridian convergence"
+    )
+    return cause if is_paired else f"{cause}, or wind or current sets the vehicle aside"
+
+
+def _folded(angle):
+    """Angles (rad) within a quarter turn, those of a vehicle that reverses too."""
+    return np.mod(angle + np.pi / 2, np.pi) - np.pi / 2
+
+
+def _middle(folded):
+    """Median (rad) of folded angles, wherever they lie."""
+    mean = np.angle(np.mean(np.exp(2j * folded))) / 2
+    return mean + np.median(_folded(folded - mean))
+
+
+def _offset(beside, course):
+    """Heading beside the course (rad), and whether opposite courses were driven to take it from.
+
+    A wind or current from any side moves the vehicle aside by as much to either side of the heading
+    on opposite courses.
+    """
+    means = []
+    for direction in np.arange(0.0, np.pi, SECTOR):
+        ends = []
+        for towards in (direction, direction + np.pi):
+            rows = np.cos(course - towards) > np.cos(SECTOR)
+            if rows.sum() >= SETTINGS.course_epochs:
+                ends.append(_middle(beside[rows]))
+        if len(ends) == 2:
+            means.append(ends[0] + _folded(ends[1] - ends[0]) / 2)
+    if means:
+        return _middle(np.array(means)), True
+    return _middle(beside), False
+
+
+def heading_and_course(
+    gps_time: np.ndarray, position: np.ndarray, heading: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Heading as it stands in the file, and course, at epochs where the vehicle moves.
+
+    Parameters
+    ----------
+    gps_time, heading : (n,) array
+        Units: s; any.
+    position : (n, 3) array
+        Units: m.
+
+    Returns
+    -------
+    heading, course : (m,) array
+        Course in rad, clockwise from north.
+    """
+    steps = np.diff(gps_time)
+    if len(steps) == 0 or (steps <= 0).any():  # Trajectory says what is wrong
+        return np.empty(0), np.empty(0)
+    stride = max(1, round(SETTINGS.baseline / np.median(steps)))
+    start, end = np.arange(0, len(gps_time) - stride), np.arange(stride, len(gps_time))
+    moved = position[end] - position[start]
+    seconds = gps_time[end] - gps_time[start]
+    distance = np.hypot(moved[:, 0], moved[:, 1])
+    moving = distance > SETTINGS.moving * np.maximum(seconds, SETTINGS.baseline)
+    moving &= seconds < 10 * stride * np.median(steps)  # not across a gap
+    return heading[start + stride // 2][moving], np.arctan2(moved[:, 0], moved[:, 1])[moving]
+
+
+def median_difference(heading: np.ndarray, course: np.ndarray) -> float:
+    """Median of the absolute differences of two directions. Units: rad.
+
+    Parameters
+    ----------
+    heading, course : (m,) array
+        Units: rad.
+    """
+    return np.median(np.abs(np.mod(heading - course + np.pi, 2 * np.pi) - np.pi))

@@ -1,0 +1,52 @@
+"""TerraScan's binary trajectories (.trj): TerraScan User Guide, Trajectory file formats.
+
+A header of HdrSize bytes, then PosCnt records of PosSize bytes, little-endian: time, X, Y, Z,
+heading, roll and pitch (deg), then qualities, which are not read. TerraScan has brought positions
+and headings into the map on import.
+"""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.io.store import read_bytes
+
+MARK = b"TSCANTRJ"
+VERSION = 20010715  # the only one that is documented
+FIELDS = ("gps_time", "easting", "northing", "height", "heading", "roll", "pitch")
+
+
+def read_trj(path: str | Path) -> dict[str, np.ndarray]:
+    """Columns of a TerraScan trajectory.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    dict
+        Name of each of FIELDS to an (n,) array. Units: s, m, deg.
+
+    Raises
+    ------
+    ValueError
+        For another version, and a file of another size than its header announces.
+    """
+    data = read_bytes(path)
+    start = struct.calcsize("<8s4i")
+    mark, version, header, count, width = struct.unpack("<8s4i", data[:start].ljust(start, b"\0"))
+    if mark != MARK or version != VERSION or width < 8 * len(FIELDS) or header < start or count < 1:
+        raise ValueError(
+            f"{path} is no TerraScan trajectory of version {VERSION} (version {version}, {count} "
+            f"records of {width} bytes): export it as text from TerraScan."
+        )
+    if len(data) != header + count * width:
+        raise ValueError(
+            f"{path} has {len(data)} bytes where its header announces {header + count * width}: it "
+            "was cut off."
+        )
+    record = np.dtype({"names": FIELDS, "formats": ["<f8"] * len(FIELDS), "itemsize": width})
+    table = np.frombuffer(data, record, count, header)
+    return {name: table[name].astype(float) for name in FIELDS}

@@ -1,0 +1,157 @@
+"""How misclosures are believed to change along a drive.
+
+Per map axis the misclosure of an observation at time t is
+
+    l(t) = c + g(t) s(t) + noise,   g(t)^2 = (k sigma(t))^2 + b^2 + u^2.
+
+c is what datum and mounting do, constant but for its turning with the vehicle. s is a smooth
+process of unit variance (Matern 3/2: position and rate) that starts anew where the drift of the POS
+does, sigma(t) what the POS states, k how far that is from the truth, b a bias and u a smaller and
+rougher error that it doesn't know of. The noise is that of survey and extraction, of the stated
+attitude across the range, and a part of g and u that isn't smooth. k, b and u are not known:
+several beliefs compete, and the observations decide.
+"""
+
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mlscorr.matching._pairs import CandidatePairs
+from mlscorr.matching.settings import COMPILED, SETTINGS, settings_tuple
+from mlscorr.pos import StatedSigma
+from mlscorr.survey import ControlPoints, Pos, TargetObservations, Trajectory
+
+
+class Chain(NamedTuple):
+    """n observations in order of time, under m beliefs.
+
+    Parameters
+    ----------
+    gps_time, pass_number : (n,) array
+    forward : (n, 2) array
+        Unit vector of the vehicle's heading, E and N.
+    gain : (m, n, 3) array
+        g(t) per axis. Units: m.
+    noise : (m, n, 3) array
+        Variance per axis, without the control point's. Units: m^2.
+    otherwise : (n,) array
+        Logarithm of the density of what is none of the surveyed points (1/m^3), over the odds of
+        a surveyed point's being visible.
+    rate : (m,) array
+        sqrt(3) over the correlation time. Units: 1/s.
+    segment : (n,) int array
+        Drift starts anew between two of them.
+    pairs : CandidatePairs
+    pair_variance : (p, 3) array
+        Of the control points' positions. Units: m^2.
+    moved_share : (p,) array
+        Probability that a pair's surveyed point lies elsewhere, by what isn't in the chain.
+    settings : tuple
+        Names as of Settings.
+    """
+
+    gps_time: np.ndarray
+    pass_number: np.ndarray
+    forward: np.ndarray
+    gain: np.ndarray
+    noise: np.ndarray
+    otherwise: np.ndarray
+    rate: np.ndarray
+    segment: np.ndarray
+    pairs: CandidatePairs
+    pair_variance: np.ndarray
+    moved_share: np.ndarray
+    settings: Any
+
+
+@njit(**COMPILED)
+def transition(chain: Chain, start: int, end: int) -> np.ndarray:
+    """Transitions F of c, s and its rate from one observation to another, later or earlier.
+
+    All three are divided by their sigmas before any observation: their covariance is I then, and
+    stays so with a process noise of I - F F^T.
+
+    Parameters
+    ----------
+    chain : Chain
+    start, end : int
+        Rows.
+
+    Returns
+    -------
+    matrix : (m + 1, 3, 3) array
+        Of each belief, and at last of a drift that starts anew.
+    """
+    forward, settings = chain.forward, chain.settings
+    turned = 1.0 - forward[start, 0] * forward[end, 0] - forward[start, 1] * forward[end, 1]
+    share = (settings.turning_sigma / settings.constant_sigma) ** 2
+    matrix = np.zeros((len(chain.rate) + 1, 3, 3))
+    for m in range(len(matrix)):
+        matrix[m, 0, 0] = 1.0 - share * turned
+    if chain.segment[start] == chain.segment[end]:
+        for m, rate in enumerate(chain.rate):
+            step = rate * (chain.gps_time[end] - chain.gps_time[start])
+            decay = np.exp(-abs(step))
+            matrix[m, 1, 1], matrix[m, 1, 2] = (1.0 + abs(step)) * decay, step * decay
+            matrix[m, 2, 1], matrix[m, 2, 2] = -step * decay, (1.0 - abs(step)) * decay
+    return matrix
+
+
+def build_chain(
+    observations: TargetObservations, control: ControlPoints, pose: Trajectory, stated: StatedSigma,
+    pairs: CandidatePairs, pos: Pos,
+) -> Chain:  # fmt: skip
+    """Chain of observations in order of time.
+
+    Parameters
+    ----------
+    observations : TargetObservations
+    control : ControlPoints
+    pose : Trajectory
+        At the observations.
+    stated : StatedSigma
+        What the POS states there.
+    pairs : CandidatePairs
+    pos : Pos
+        Its correlation time.
+    """
+    distance = np.linalg.norm(observations.position - pose.position, axis=1)
+    known = np.einsum("nii->ni", observations.covariance)
+    known = known + ((stated.angles.max(axis=1) * distance) ** 2)[:, None]
+    scale, bias, unstated, share = _beliefs()
+    gain = np.sqrt((scale * stated.position) ** 2 + bias**2 + unstated**2)
+    ahead = pose.attitude.apply([0.0, 1.0, 0.0])[:, :2]
+    odds = (1.0 - SETTINGS.visible_share) / SETTINGS.visible_share
+    return Chain(
+        gps_time=observations.gps_time, pass_number=observations.pass_number,
+        forward=ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12), gain=gain,
+        noise=known + (SETTINGS.rough_share * gain) ** 2 + (unstated / 2) ** 2,
+        otherwise=np.log(_lookalikes(observations, pose) * odds),
+        rate=np.sqrt(3.0) / (share[:, 0, 0] * pos.correlation_time),
+        segment=stated.history.segment(stated.gps_time), pairs=pairs,
+        pair_variance=control.sigma[pairs.control] ** 2,
+        moved_share=np.full(len(pairs.control), SETTINGS.moved_share), settings=settings_tuple(),
+    )  # fmt: skip
+
+
+def _beliefs():
+    """Scale, bias (m), unstated sigma (m) and share of time (m, 1, 1) of each belief."""
+    drifts = [(scale, 0.0) for scale in SETTINGS.sigma_scales]
+    drifts += [(1.0, bias) for bias in SETTINGS.slow_biases]
+    groups = product(drifts, SETTINGS.unstated_sigmas, SETTINGS.time_shares)
+    table = np.array([(*drift, unstated, share) for drift, unstated, share in groups])
+    return table.T[:, :, None, None]
+
+
+def _lookalikes(observations, pose):
+    """Density (n,) of objects of each observation's kind and size. Units: 1/m^3."""
+    keys = zip(observations.kind, observations.size.round(2), strict=True)
+    appearance = np.array([f"{kind} {size}" for kind, size in keys])
+    _, number, count = np.unique(appearance, return_inverse=True, return_counts=True)
+    length = 0.0
+    for part in np.unique(observations.pass_number):
+        steps = np.diff(pose.position[observations.pass_number == part], axis=0)
+        length += np.linalg.norm(steps, axis=1).sum()
+    return SETTINGS.lookalike_density * count[number] / max(length, SETTINGS.street_length)

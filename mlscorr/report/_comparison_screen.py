@@ -1,0 +1,189 @@
+"""What a comparison of methods says first: in the terminal, in compare.json and on its page."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from mlscorr.effects import joined
+from mlscorr.evaluate import PointCounts, TargetRow
+from mlscorr.report import headline, tables
+from mlscorr.report.settings import SETTINGS
+from mlscorr.survey import counted
+
+OWN = "correct"  # the method that the command of this name uses
+UNTIED = "lsc"  # the same by control points alone
+OTHERS = {
+    "one move": "Best of those that move the whole cloud as one",
+    "over time": "Best of polynomials and interpolation over time",
+}
+
+
+def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[str, object]:
+    """``rating`` and ``statements`` of compare.json.
+
+    Parameters
+    ----------
+    document : dict
+        Its other content.
+    rows : list of TargetRow
+        One for each surveyed point and pass.
+    """
+    facts = [
+        _best(document),
+        _scored(document),
+        headline.check_statement(PointCounts.of(rows, "check")),
+        headline.control_statement(PointCounts.of(rows, "control")),
+        *_ties(document),
+        *_undetermined(document),
+        *headline.warning_statements(method_warnings(document["methods"])),
+    ]
+    return headline.statements_section(facts)
+
+
+def _best(document):
+    """Which method corrects best; the whole of the verdict."""
+    first, *more = verdict(document)
+    is_tested = document["scored_by"] != "control" and ranking(document)[0]["name"] != "raw"
+    items = tuple(("", sentence) for sentence in more)
+    return headline.Statement("Result", "green" if is_tested else "amber", first, items)
+
+
+def _scored(document):
+    """What the scores rest on."""
+    rating = "amber" if document["scored_by"] == "control" else "green"
+    return headline.Statement("Scores", rating, basis(document))
+
+
+def _ties(document) -> Iterator[headline.Statement]:
+    """Which methods use ties between passes, where there are any."""
+    own = next((row for row in document["methods"] if row["name"] == OWN), None)
+    if own is None or own["status"] != "determined":
+        return
+    if count := own["details"]["ties"]:
+        sentence = (
+            f"{OWN} also uses {counted(count, 'tie')}: planes, poles and paint that two passes "
+            "both saw. All other methods use the control points alone."
+        )
+    else:
+        why = own["details"]["untied"] or ""
+        sentence = f"{OWN} equals {UNTIED} here, for no ties were used. {why}".rstrip()
+    yield headline.Statement("Ties", "green", sentence)
+
+
+def method_warnings(rows: list[dict]) -> list[str]:
+    """Warnings of all methods, each once, after the names of the methods that gave it.
+
+    Parameters
+    ----------
+    rows : list of dict
+        ``methods`` of compare.json.
+    """
+    names: dict[str, list[str]] = {}
+    for row in rows:
+        for sentence in row["warnings"]:
+            names.setdefault(sentence, []).append(row["name"])
+    return [f"{joined(of_one)}: {sentence}" for sentence, of_one in names.items()]
+
+
+def _undetermined(document) -> Iterator[headline.Statement]:
+    """Methods without a score."""
+    absent = undetermined(document)
+    if absent:
+        count = f"{len(absent)} of {len(document['methods'])} methods have no score."
+        yield headline.Statement("Not determined", "amber", count, tuple(absent))
+
+
+def undetermined(document: dict) -> list[tuple[str, str]]:
+    """Name and reason of each method without a score.
+
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
+    ranked, by = ranking(document), document["scored_by"]
+    return [
+        (row["name"], row["why"] or row[by].get("why") or "no point to score it by")
+        for row in document["methods"]
+        if row not in ranked
+    ]
+
+
+def ranking(document: dict) -> list[dict]:
+    """Rows of the methods that have a score, by their 3D RMSE, the best first.
+
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
+    by = document["scored_by"]
+    scored = [row for row in document["methods"] if row[by]["rmse_3d"] is not None]
+    return sorted(scored, key=lambda row: row[by]["rmse_3d"])
+
+
+def basis(document: dict) -> str:
+    """What the scores rest on, in one sentence.
+
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
+    control, check = document["control_points"], document["check_points"]
+    made = f"Every method was fitted to the same {counted(control, 'control point')}"
+    if document["scored_by"] == "check":
+        return f"{made} and scored by {counted(check, 'check point')} that took no part."
+    if document["scored_by"] == "control":
+        return f"{made}. Nothing independent is left to score them by: this is the mere fit."
+    too_few = f"only {counted(check, 'check point')}" if check else "no check points"
+    groups = document["cross_validation_groups"]
+    left = "each left out in turn" if groups == control else f"left out in {groups} groups in turn"
+    others = "; each check point from all control points" if check else ""
+    return (
+        f"{made}. There {'is' if check == 1 else 'are'} {too_few}, so the scores are "
+        f"cross-validated over all points: control points, {left}, are predicted from the "
+        f"others{others}."
+    )
+
+
+def verdict(document: dict) -> list[str]:
+    """The result in sentences.
+
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
+    ranked, by = ranking(document), document["scored_by"]
+    value = {row["name"]: row[by]["rmse_3d"] for row in ranked}
+    best = ranked[0]["name"]
+    tied = [name for name in value if value[name] - value[best] < SETTINGS.difference]
+    raw = f"{tables.number(value['raw'])} m without any correction"
+    if "raw" in tied:
+        text = f"The cloud as recorded, with {tables.number(value['raw'])} m, is as good as any"
+        return [
+            f"No method improves this cloud by {1000 * SETTINGS.difference:.0f} mm or more. {text}."
+        ]
+    sentences = [_winner(ranked[0], tied, tables.number(value[best]), raw)]
+    for kind, words in OTHERS.items():
+        rest = [row["name"] for row in ranked if row["kind"] == kind]
+        if rest and rest[0] not in tied:
+            sentences.append(f"{words}: {rest[0]}, with {tables.number(value[rest[0]])} m.")
+    if OWN in value and OWN not in tied:
+        own = value[OWN]
+        behind = own - value[best]
+        sentences.append(
+            f"{OWN}, with {tables.number(own)} m, is {tables.number(behind)} m behind."
+        )
+    return sentences
+
+
+def _winner(row, tied, value, raw):
+    """The sentence on the best method, or on those that are too close to tell apart."""
+    if len(tied) == 1:
+        about = row["about"][0].lower() + row["about"][1:].rstrip(".")
+        return f"Best is {row['name']} ({about}): 3D RMSE {value} m, against {raw}."
+    return (
+        f"Best are {joined(tied)}: 3D RMSE {value} m, against {raw}. They differ by less than "
+        f"{1000 * SETTINGS.difference:.0f} mm, which can't be told apart."
+    )

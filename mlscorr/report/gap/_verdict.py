@@ -1,0 +1,265 @@
+"""What the first screen of a diagnosis says: what is wrong, how sure, how far the gap shrinks."""
+
+from typing import NamedTuple
+
+from mlscorr.effects import DASH, family, joined, known, lowered, meaning, size, title
+from mlscorr.gap import no_cause
+from mlscorr.report.assumed import has_assumed_sigma
+from mlscorr.report.gap._labels import place_of, sentences_of
+from mlscorr.report.gap._shrinking import Fact, is_closed, is_within, shrinking
+
+CERTAINTY = (  # probability from which on one says so
+    (0.99, "practically certain"),
+    (0.9, "very likely"),
+    (0.66, "likely"),
+    (0.5, "more likely than not"),
+    (0.0, "only the likeliest of several"),
+)
+DIFFERENCE = {  # by what is left more than, where no cause is named
+    "": "The survey and its simulation differ by no more than chance makes them differ.",
+    "stated": "Errors are larger than what is stated makes them, but no error that is known "
+    "explains them well enough to be named.",
+    "chance": "All in all the two differ by more than 39 of 40 surveys do in which nothing is "
+    "wrong, but no error that is known explains this better than chance does.",
+}
+NUMBER_WORDS = ("none", "one", "two", "three", "four")
+SCATTER = "This is scatter: no correction takes it off, but accuracies must be stated larger."
+NEGATIVE = "It is what the two differ by beyond chance; below zero: less than by chance."
+
+
+class VerdictBox(NamedTuple):
+    """The box with the verdict.
+
+    Parameters
+    ----------
+    tone : str
+        good, bad or open.
+    kicker : str
+        Above the sentences.
+    sentences : list of str
+    large : int
+        How many of them, from the first, are the verdict itself.
+    """
+
+    tone: str
+    kicker: str
+    sentences: list[str]
+    large: int = 1
+
+
+def verdict(document: dict) -> VerdictBox:
+    """The box with the verdict of a diagnosis.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    answer, kind = document["verdict"], family(document["verdict"]["label"])
+    if not is_judged(document):
+        short = "Too little of this survey could be compared with the simulator."
+        return VerdictBox("open", "It can't be told yet", [answer["sentence"] or short])
+    box = {"none": _nothing, "unknown": _unknown}.get(kind, _cause)(document)
+    others = not_ruled_out(document)
+    more = [f"Not ruled out: {others}."] if others else []
+    return box._replace(sentences=[*box.sentences, *more])
+
+
+def is_judged(document: dict) -> bool:
+    """Whether anything could be compared at all.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    answer = document["verdict"]
+    return bool(answer["label"]) and known(answer["probability"]) and bool(document["evidence"])
+
+
+def is_named(document: dict) -> bool:
+    """Whether the verdict names a cause.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    return is_judged(document) and family(document["verdict"]["label"]) in ("effect", "noise")
+
+
+def _nothing(document):
+    excess = document["verdict"]["excess"]
+    small = "An error smaller than the sizes that would show here may be there all the same."
+    kicker, tone = no_cause(document["verdict"]["set"], excess), "open" if excess else "good"
+    return VerdictBox(tone, kicker, [f"{DIFFERENCE[excess]} {small}"])
+
+
+def _unknown(document):
+    answer = document["verdict"]
+    if answer.get("hidden"):
+        return VerdictBox(
+            "open", "Nothing shows, but not everything was seen", [answer["sentence"]]
+        )
+    lead = answer["lead"].rstrip(".")
+    text = f"It looks like: {lead}." if lead else "It can't be said what it looks like."
+    more = "This is a lead to follow, not a cause: whatever behaves like that may have made it."
+    return VerdictBox("open", "Something is wrong that no known effect explains", [text, more])
+
+
+def _cause(document):
+    answer, label = document["verdict"], document["verdict"]["label"]
+    sentences, others = _sentences(document, label), _same(document)
+    parts, large = label.count("+") + 1, len(sentences)
+    if others:
+        either, *more = [lowered(" ".join(_sentences(document, name))) for name in (label, *others)]
+        sentences = [f"Either {either}", *(f"Or {text}" for text in more)]
+        large = len(sentences)
+        kicker = f"One of {_number_word(large)} is wrong; this survey can't tell which"
+    elif parts > 1:
+        kicker = f"{_number_word(parts).capitalize()} things are wrong"
+    elif family(label) == "noise":
+        is_assumed = label == "position_noise" and has_assumed_sigma(document["assumed"])
+        kicker = "Noisier than assumed" if is_assumed else "Noisier than stated"
+        sentences = [*sentences, SCATTER]
+    else:
+        kicker = "One thing is wrong" if answer["probability"] >= 0.5 else "Possibly wrong"
+    return VerdictBox("bad", kicker, sentences, large)
+
+
+def _number_word(number):
+    return NUMBER_WORDS[number] if number < len(NUMBER_WORDS) else str(number)
+
+
+def _same(document):
+    """Labels that this survey can't tell from the verdict's at its size."""
+    answer = document["verdict"]
+    return [name for name in answer["same"] if name != answer["label"]]
+
+
+def _sentences(document, label):
+    """A sentence with its numbers for each effect of a label; what it is, where it has none."""
+    cause = next((cause for cause in document["causes"] if cause["effect"] == label), None)
+    if cause is None:
+        return [meaning(label)]
+    target, windows = cause.get("target"), document["windows"]
+    return sentences_of(label, cause["parameters"], lambda kind: place_of(kind, target, windows))
+
+
+def not_ruled_out(document: dict) -> str:
+    """Labels of the 95 % set besides the verdict's own, with their probabilities, in words.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    answer, share = document["verdict"], _probabilities(document)
+    names = [name for name in answer["set"] if name not in {answer["label"], *answer["same"]}]
+    return joined([f"{lowered(title(n))} ({in_hundred(share.get(n))})" for n in names], "or")
+
+
+def _probabilities(document):
+    """Probability of each label that is known."""
+    share = {cause["effect"]: cause["probability"] for cause in document["causes"]}
+    return share | {rung["label"]: rung["probability"] for rung in document["evidence"]}
+
+
+def facts(document: dict) -> list[Fact]:
+    """The numbers beside the verdict: how sure, where it shows most, how far it shrinks.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    if not is_judged(document):
+        return []
+    gap, headline = document["gap"], document["headline"]
+    if not is_named(document) and not is_closed(document):
+        whole = Fact("The gap between survey and simulation", headline, NEGATIVE)
+        return [_certainty(document), whole]
+    is_pattern = is_within(gap["before"], gap["null_band"])
+    more = "What gives it away is its pattern, not its size." if is_pattern else ""
+    where = Fact("Where it shows most", headline, more)
+    return [_certainty(document), where, shrinking(document)]
+
+
+def _certainty(document):
+    answer, share = document["verdict"], _probabilities(document)
+    share = answer["probability"] + sum(share.get(name) or 0.0 for name in _same(document))
+    share = min(1.0, share)
+    words = next(words for least, words in CERTAINTY if share >= least)
+    if max((p or 0.0 for name, p in _probabilities(document).items() if name != answer["label"]),
+           default=0.0) > share:  # fmt: skip
+        words = "another is likelier, but would cost more if it were wrong"
+    more = [chance(answer["p_value"]), "± is one sigma." if is_named(document) else ""]
+    return Fact("How sure", f"{in_hundred(share)}: {words}", " ".join(filter(None, more)))
+
+
+def in_hundred(share: float | None) -> str:
+    """A probability in words.
+
+    Parameters
+    ----------
+    share : float or None
+
+    >>> in_hundred(0.9817), in_hundred(0.999), in_hundred(0.002), in_hundred(None)
+    ('98 in 100', 'more than 99 in 100', 'less than 1 in 100', '–')
+    """
+    if not known(share):
+        return DASH
+    if share >= 0.995:
+        return "more than 99 in 100"
+    return f"{100 * share:.0f} in 100" if share >= 0.005 else "less than 1 in 100"
+
+
+def chance(p_value: float | None) -> str:
+    """How often a survey would look as odd whose POS alone errs, by as much as fits this one.
+
+    Parameters
+    ----------
+    p_value : float or None
+
+    >>> chance(0.04976)
+    'Of 100 surveys with a POS as bad as fits this one, and nothing else wrong, 5 would look as
+    odd.'
+    """
+    if not known(p_value):
+        return ""
+    number = next((n for n in (100, 1000) if round(n * p_value) > 0), 10_000)
+    count = f"{number * p_value:.0f}" if p_value >= 1e-4 else "not one"
+    words = f"{number:,}".replace(",", " ") if number > 1000 else number
+    return (
+        f"Of {words} surveys with a POS as bad as fits this one, and nothing else wrong, {count} "
+        "would look as odd."
+    )
+
+
+def advice(document: dict) -> tuple[str, list[str]]:
+    """What to do now: a title and sentences.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json or plan.json.
+    """
+    if document["advice"]:
+        return "What to do now", document["advice"]
+    return "What to measure next", [f"Measure {r['survey']}." for r in document["next_data"]]
+
+
+def smallest(detectable: dict[str, list[dict]]) -> list[tuple[str, str]]:
+    """Each effect in words and the smallest size of it that shows, by its worst part.
+
+    Parameters
+    ----------
+    detectable : dict
+        By effect, of gap.json.
+    """
+    rows = []
+    for effect, parts in detectable.items():
+        sizes = [part["detectable"] for part in parts]
+        worst = max(sizes) if sizes and all(map(known, sizes)) else None
+        rows.append((title(effect), size(worst, None, parts[0]["unit"] if parts else "")))
+    return rows

@@ -1,0 +1,76 @@
+"""A sheet: one view that is drawn, before and after, while the cloud goes by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mlscorr.report.render._open3d_engine import draw_pair
+from mlscorr.report.render._zbuffer import Canvas
+from mlscorr.report.render.picture import Picture
+from mlscorr.report.render.quantities import GHOST, PAIRS, CloudPair, limits, paint, rgb
+from mlscorr.report.render.view import View
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A view with its two canvases."""
+
+    view: View
+    canvases: tuple[Canvas, Canvas]
+
+    @classmethod
+    def blank(cls, view: View) -> Sheet:
+        """Nothing drawn yet. Before a cut its points may lie anywhere."""
+        before = Canvas.blank(view.camera, np.inf if view.is_cut else view.half_depth)
+        return cls(view, (before, Canvas.blank(view.camera, view.half_depth)))
+
+    def add(self, pair: CloudPair, values: tuple[np.ndarray, np.ndarray]) -> None:
+        """Draw a chunk of the cloud with its values before and after."""
+        clouds = [pair.before.xyz, pair.after.xyz]
+        if self.view.is_cut:
+            rows = self.canvases[1].holds(clouds[1])
+            clouds, values = [xyz[rows] for xyz in clouds], [v[rows] for v in values]
+        for canvas, xyz, value in zip(self.canvases, clouds, values, strict=True):
+            canvas.draw(xyz, value)
+
+    def finished(self, by_open3d: bool = False, reference: str | Path | None = None) -> Picture:
+        """The Picture, by Open3D or the z-buffer.
+
+        Parameters
+        ----------
+        by_open3d : bool
+        reference : path, optional
+            A surface that Open3D draws behind the points.
+
+        Raises
+        ------
+        RuntimeError
+            Where Open3D fails.
+        """
+        view, radius = self.view, max(canvas.radius for canvas in self.canvases)
+        if view.is_cut:  # a few points in a row are all there is to see
+            radius = max(radius, 0.004 * view.camera.size[0])
+        pair = [canvas.grown(radius) for canvas in self.canvases]
+        ends = limits(view.colour, *(canvas.value for canvas in pair))
+        if by_open3d:
+            colours = [paint(view.colour, canvas.value, ends) for canvas in self.canvases]
+            surface = reference if np.isinf(view.half_depth) else None  # it would hide a slice
+            before, after = draw_pair(self.canvases, colours, 2 * radius + 1, surface)
+        else:
+            before, after = (_side(view, pair[k], pair[1 - k], ends) for k in (0, 1))
+        return Picture(view, before, after, ends)
+
+
+def _side(view, canvas, other, ends):
+    """RGB (h, w, 3) of a canvas on white paper."""
+    pixels = np.full((*canvas.pixels.shape, 3), 255, np.uint8)
+    if view.colour == "state":
+        pixels[other.drawn] = rgb(GHOST)[0]
+    colours = paint(view.colour, canvas.value, ends)
+    if np.isinf(view.half_depth) and view.colour not in PAIRS:  # in a thin slice edges of single
+        colours = np.round(colours * canvas.light[..., None]).astype(np.uint8)  # points are noise
+    pixels[canvas.drawn] = colours[canvas.drawn]
+    return pixels

@@ -1,0 +1,86 @@
+"""The Kalman filter and smoother of an error state."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.simulate.pos._inertial import STATES
+
+
+@dataclass(frozen=True)
+class StateEstimate:
+    """Error state (n, 15) as a filter or smoother knows it, and its covariance (n, 15, 15)."""
+
+    state: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """measured (m,) = design (m, 15) x + noise of a covariance (m, m), as the filter has it."""
+
+    design: np.ndarray
+    measured: np.ndarray
+    covariance: np.ndarray
+
+
+def kalman_filter(
+    transition: np.ndarray, noise: np.ndarray, start: np.ndarray, measurements: dict
+) -> tuple[StateEstimate, StateEstimate]:
+    """Forward pass of the error-state Kalman filter.
+
+    Parameters
+    ----------
+    transition : (n, 15, 15) array
+    noise : (15,) array
+        Variances that a step adds.
+    start : (15,) array
+        Variances at the first epoch.
+    measurements : dict
+        Epoch number -> sequence of Measurement.
+
+    Returns the filtered and the predicted StateEstimate, n + 1 epochs each.
+    """
+    epochs = len(transition) + 1
+    filtered = StateEstimate(np.zeros((epochs, STATES)), np.empty((epochs, STATES, STATES)))
+    predicted = StateEstimate(np.zeros((epochs, STATES)), np.empty((epochs, STATES, STATES)))
+    state, covariance, process = np.zeros(STATES), np.diag(start), np.diag(noise)
+    for k in range(epochs):
+        if k:
+            state = transition[k - 1] @ state
+            covariance = transition[k - 1] @ covariance @ transition[k - 1].T + process
+        predicted.state[k], predicted.covariance[k] = state, covariance
+        for measurement in measurements.get(k, ()):
+            state, covariance = _update(state, covariance, measurement)
+        filtered.state[k], filtered.covariance[k] = state, covariance
+    return filtered, predicted
+
+
+def _update(state, covariance, measurement):
+    """State and covariance after a Measurement; Joseph's form keeps it symmetric, positive."""
+    design, noise = measurement.design, measurement.covariance
+    cross = design @ covariance
+    gain = np.linalg.solve(cross @ design.T + noise, cross).T
+    keep = np.eye(STATES) - gain @ design
+    state = state + gain @ (measurement.measured - design @ state)
+    return state, keep @ covariance @ keep.T + gain @ noise @ gain.T
+
+
+def smooth(
+    transition: np.ndarray, filtered: StateEstimate, predicted: StateEstimate
+) -> StateEstimate:
+    """Smoothed StateEstimate: backward pass of Rauch, Tung and Striebel (1965).
+
+    Parameters
+    ----------
+    transition : (n, 15, 15) array
+        Over each step.
+    filtered, predicted : StateEstimate
+    """
+    forward = transition @ filtered.covariance[:-1]
+    gain = np.linalg.solve(predicted.covariance[1:], forward).transpose(0, 2, 1)
+    state, covariance = filtered.state.copy(), filtered.covariance.copy()
+    for k in range(len(transition) - 1, -1, -1):
+        state[k] += gain[k] @ (state[k + 1] - predicted.state[k + 1])
+        covariance[k] += gain[k] @ (covariance[k + 1] - predicted.covariance[k + 1]) @ gain[k].T
+    return StateEstimate(state, covariance)

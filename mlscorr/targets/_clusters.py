@@ -1,0 +1,253 @@
+"""Bright components of a piece of cloud at every level of intensity: a component tree.
+
+A target is brighter than what surrounds it, but intensity falls with range and incidence, so no
+single threshold serves. Each component at each level is a candidate; the shape decides. Levels are
+absolute and a component is judged by itself: what else a piece holds, as a bright wall some meters
+away, hides none (Najman and Couprie 2006).
+"""
+
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+from numba import njit
+
+from mlscorr.targets._voxels import neighbours, number_voxels
+from mlscorr.targets.settings import SETTINGS
+
+OCTAVE = 2  # levels of intensity: a step is the least by which dark and bright are told apart
+
+
+def bright_components(
+    xyz: np.ndarray, intensity: np.ndarray, size: float
+) -> Iterator[tuple[float, np.ndarray]]:
+    """Connected components of points brighter than each of several levels.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    intensity : (n,) array
+        Of any positive scale.
+    size : float
+        Of a target; points closer than a share of it belong together. Units: m.
+
+    Yields
+    ------
+    level : float
+    rows : (k,) int array
+        A component that stays the same over levels comes once, at the highest. One that reaches
+        farther than a target and its post is none of them.
+    """
+    level = np.floor(OCTAVE * np.log2(np.maximum(intensity, 1.0))).astype(np.int16)
+    known = set()
+    for share in SETTINGS.link_shares:
+        for number, rows in _component_tree(xyz, level, share * size):
+            if (key := (rows[0], rows[-1], len(rows))) not in known:
+                known.add(key)
+                yield float(2.0 ** (number / OCTAVE)), rows
+
+
+def _component_tree(xyz, level, link):
+    """(level, rows in order) of the components of points (n, 3) that a link (m) connects."""
+    if len(xyz) == 0:
+        return
+    edge = link / 2
+    low = np.array([column.min() for column in xyz.T])
+    low = (np.floor(low / edge) - 1) * edge  # the same cells whatever else there is
+    voxel, keys_of, *table = number_voxels(xyz, low, edge)
+    brightest_first = np.argsort(-level, kind="stable")
+    limits = SETTINGS.smallest_count, 2 * SETTINGS.near_radius
+    entries, place = _grow(xyz, level, brightest_first, voxel, keys_of, *table, limits)
+    order = np.argsort(place[voxel], kind="stable")
+    sorted_place = place[voxel[order]]
+    for number, first, count in entries:
+        start, end = np.searchsorted(sorted_place, (first, first + count))
+        rows = order[start:end]
+        yield number, np.sort(rows[level[rows] >= number])
+
+
+@njit(cache=True)
+def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
+    """Components as voxels join them from the brightest level down.
+
+    A component is a run of voxels in the order of their places, as joining two puts one's voxels
+    behind the other's: its level, its first place and its number of voxels (k, 3) describe it.
+    Places (v,) of the voxels come too.
+    """
+    smallest, largest = limits
+    count = len(keys_of)
+    parent = np.full(count, -1)
+    chain = np.full(count, -1), np.arange(count)  # the voxel behind each, the last of each root
+    sums = np.zeros((2, count), np.int64)  # voxels and points of each root
+    box = np.full((3, count), np.inf), np.full((3, count), -np.inf)
+    touched = np.full(count, -1)
+    entries = np.empty((len(xyz), 3), np.int64)  # each has a point that none before it has
+    length, start, n = 0, 0, len(brightest_first)
+    while start < n:
+        now, end = level[brightest_first[start]], start
+        while end < n and level[brightest_first[end]] == now:
+            row = brightest_first[end]
+            new = voxel[row]
+            if parent[new] < 0:
+                parent[new], sums[0, new] = new, 1
+                for near in neighbours(keys_of[new], keys, number):
+                    if parent[near] >= 0:
+                        _join(parent, chain, sums, box, new, near)
+            root = root_of(parent, new)
+            sums[1, root] += 1
+            for axis in range(3):
+                box[0][axis, root] = min(box[0][axis, root], xyz[row, axis])
+                box[1][axis, root] = max(box[1][axis, root], xyz[row, axis])
+            end += 1
+        for k in range(start, end):
+            root = root_of(parent, voxel[brightest_first[k]])
+            extent = (box[1][:, root] - box[0][:, root]).max()
+            if touched[root] != now and sums[1, root] >= smallest and extent <= largest:
+                entries[length, 0] = now
+                entries[length, 1] = root
+                entries[length, 2] = sums[0, root]
+                length += 1
+            touched[root] = now
+        start = end
+    place = _places(parent, chain[0])
+    for entry in range(length):  # a root is its component's first voxel
+        entries[entry, 1] = place[entries[entry, 1]]
+    return entries[:length].copy(), place
+
+
+@njit(cache=True)
+def _join(parent, chain, sums, box, voxel, beside):
+    """Join the components of two voxels, the smaller's voxels behind the larger's."""
+    a, b = root_of(parent, voxel), root_of(parent, beside)
+    if a == b:
+        return
+    if sums[0, a] < sums[0, b]:
+        a, b = b, a
+    behind, last = chain
+    parent[b] = a
+    behind[last[a]] = b
+    last[a] = last[b]
+    sums[:, a] += sums[:, b]
+    for axis in range(3):
+        box[0][axis, a] = min(box[0][axis, a], box[0][axis, b])
+        box[1][axis, a] = max(box[1][axis, a], box[1][axis, b])
+
+
+@njit(cache=True)
+def _places(parent, behind):
+    """Place (v,) of each voxel when all components follow each other."""
+    place_of, place = np.empty(len(parent), np.int64), 0
+    for root in range(len(parent)):
+        member = root if parent[root] == root else -1
+        while member >= 0:
+            place_of[member] = place
+            place += 1
+            member = behind[member]
+    return place_of
+
+
+def components(points: np.ndarray, link: float) -> list[np.ndarray]:
+    """Connected components of enough points to be a target.
+
+    Parameters
+    ----------
+    points : (n, d) array
+        Units: m.
+    link : float
+        Points as near as this belong together. Units: m.
+
+    Returns
+    -------
+    list of int arrays
+        Rows of each, in order.
+    """
+    label = connected(points, link)
+    order, counts = np.argsort(label, kind="stable"), np.bincount(label)
+    ends, large = np.cumsum(counts), np.flatnonzero(counts >= SETTINGS.smallest_count)
+    return [order[ends[number] - counts[number] : ends[number]] for number in large]
+
+
+def connected(points: np.ndarray, link: float) -> np.ndarray:
+    """Component number of each point: occupied voxels first, so that density costs nothing.
+
+    Parameters
+    ----------
+    points : (n, d) array
+        In two dimensions or three. Units: m.
+    link : float
+        Points as near as this belong together. Units: m.
+
+    Returns
+    -------
+    (n,) int array
+    """
+    if len(points) == 0:
+        return np.empty(0, int)
+    keys, shape = np.zeros(len(points), np.int64), []
+    for column in points.T:  # one by one, as they are large where a street is dense
+        cells = np.floor(column / (link / 3)).astype(np.int64)
+        cells -= cells.min()
+        shape.append(int(cells.max()) + 3)  # with room for two voxels: no edge is near another
+        keys *= shape[-1]
+        keys += cells
+    del cells
+    order = np.argsort(keys, kind="stable")
+    label = np.empty(len(keys), np.int32)
+    steps = _offsets(len(shape)) @ np.cumprod([1, *shape[:0:-1]])[::-1]
+    keys = keys[order]
+    label[order] = _labels(keys, steps[steps > 0])
+    return label
+
+
+@cache
+def _offsets(dimensions):
+    """Offsets (m, d) of voxels less than three apart; three apart is a tie of rounding."""
+    around = np.stack(np.meshgrid(*[np.arange(-2, 3)] * dimensions), axis=-1)
+    offsets = around.reshape(-1, dimensions)
+    return offsets[np.sum(offsets**2, axis=1) < 9]
+
+
+@njit(cache=True)
+def _labels(keys, steps):
+    """Component number (n,) of keys in increasing order, which these steps connect."""
+    voxel, occupied, count = np.empty(len(keys), np.int32), np.empty_like(keys), 0
+    for i in range(len(keys)):
+        if count == 0 or keys[i] != occupied[count - 1]:
+            occupied[count] = keys[i]
+            count += 1
+        voxel[i] = count - 1
+    parent = np.arange(count)
+    for step in steps:
+        above = 0
+        for low in range(count):
+            key = occupied[low] + step
+            while above < count and occupied[above] < key:
+                above += 1
+            if above == count:
+                break
+            if occupied[above] == key:
+                a, b = root_of(parent, low), root_of(parent, above)
+                parent[max(a, b)] = min(a, b)
+    number, components = np.empty(count, np.int32), 0
+    for i in range(count):  # the root of each is the lowest of its voxels
+        is_root = parent[i] == i
+        number[i] = components if is_root else number[root_of(parent, i)]
+        components += is_root
+    return number[voxel]
+
+
+@njit(cache=True)
+def root_of(parent: np.ndarray, i: int) -> int:
+    """What stands for the component of i, with the way to it shortened.
+
+    Parameters
+    ----------
+    parent : (n,) int array
+        What each was joined with; of a root, itself.
+    i : int
+    """
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i

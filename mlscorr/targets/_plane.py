@@ -1,0 +1,226 @@
+"""Plane of a target by random sample consensus, refined by least squares."""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from mlscorr.targets._sequence import quasi_random
+from mlscorr.targets.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from mlscorr.targets._echoes import Echoes
+    from mlscorr.targets._outline import Outline
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane in space, and the points on it.
+
+    Parameters
+    ----------
+    origin : (3,) array
+        Units: m.
+    axes : (3, 3) array
+        Rows u, v and the normal.
+    sigma : float
+        Of the points about it. Units: m.
+    inliers : (n,) bool array
+    """
+
+    origin: np.ndarray
+    axes: np.ndarray
+    sigma: float
+    inliers: np.ndarray
+
+    def coordinates(self, xyz: np.ndarray) -> np.ndarray:
+        """u, v in the plane and w along the normal.
+
+        Parameters
+        ----------
+        xyz : (n, 3) array
+            Units: m.
+        """
+        return (xyz - self.origin) @ self.axes.T
+
+    def crossing(self, xyz: np.ndarray, sight: np.ndarray) -> np.ndarray:
+        """u, v (n, 2) where beams cross the plane.
+
+        Parameters
+        ----------
+        xyz, sight : (n, 3) array
+            Points of the beams, and scanner to point. Units: m.
+        """
+        local, beam = self.coordinates(xyz), sight @ self.axes.T
+        with np.errstate(divide="ignore", invalid="ignore"):  # a beam along the plane never does
+            return local[:, :2] - local[:, 2:] / beam[:, 2:] * beam[:, :2]
+
+    def turned_like(self, other: "Plane") -> "Plane":
+        """The same plane with its axes as near as can be to those of another.
+
+        Parameters
+        ----------
+        other : Plane
+            Nearly parallel.
+        """
+        normal = self.axes[2] * np.sign(self.axes[2] @ other.axes[2])
+        u = other.axes[0] - (other.axes[0] @ normal) * normal
+        u /= np.linalg.norm(u)
+        return replace(self, axes=np.array([u, np.cross(normal, u), normal]))
+
+
+@njit(cache=True, nogil=True)
+def most_common(xyz: np.ndarray, triples: np.ndarray, tolerance: float) -> np.ndarray:
+    """Which points lie on the plane that most of them support, nearer ones more.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    triples : (k, 3) int array
+        Rows of three points through which a plane is tried.
+    tolerance : float
+        Units: m.
+
+    Returns
+    -------
+    (n,) bool array
+        None where no three span a plane.
+
+    Source: MSAC (Torr and Zisserman 2000).
+    """
+    origin, best, largest = xyz[0], np.zeros(3), -1.0
+    for i, j, k in triples:
+        normal = np.cross(xyz[j] - xyz[i], xyz[k] - xyz[i])
+        length = np.sqrt(np.sum(normal**2))
+        if length == 0.0:
+            continue
+        normal /= length
+        a, b, c = normal
+        offset, support = np.sum(normal * xyz[i]), 0.0
+        for x, y, z in xyz:
+            support += max(1.0 - ((a * x + b * y + c * z - offset) / tolerance) ** 2, 0.0)
+        if support > largest:
+            origin, best, largest = xyz[i], normal, support
+    return (np.abs(np.sum((xyz - origin) * best, axis=1)) <= tolerance) & (largest >= 0.0)
+
+
+def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
+    """Fit the plane through most points.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    tolerance : float
+        Points as near as this support a plane. Units: m.
+
+    Raises
+    ------
+    ValueError
+        For fewer than three points.
+
+    Source: Fischler and Bolles 1981, on triples that are spread evenly over all in place of random
+    ones; the consensus set is refined twice by least squares, the second time within three sigmas.
+    """
+    if len(xyz) < 3:
+        raise ValueError(f"A plane needs 3 points, there are {len(xyz)}.")
+    triples = (quasi_random(SETTINGS.plane_trials, 3) * len(xyz)).astype(int)
+    return Plane(*_fit_plane(xyz, triples, tolerance))
+
+
+@njit(cache=True, nogil=True)
+def _fit_plane(xyz, triples, tolerance):
+    """Origin (3,), axes (3, 3), sigma and inliers (n,): a piece of cloud asks for hundreds."""
+    middle = xyz.sum(axis=0) / len(xyz)
+    local, square = xyz - middle, np.empty((3, 3))
+    inside = most_common(local, triples, tolerance)
+    inside |= not inside.any()  # all on a line
+    for _ in range(2):
+        points = local[inside]
+        centre = points.sum(axis=0) / len(points)
+        points -= centre
+        for i in range(3):  # not by BLAS, which sums otherwise with another number of threads
+            for j in range(3):
+                square[i, j] = np.sum(points[:, i] * points[:, j])
+        squares, axes = np.linalg.eigh(square)
+        sigma = np.sqrt(max(squares[0], 0.0) / max(len(points) - 3, 1))
+        height = np.abs(np.sum((local - centre) * axes[:, 0], axis=1))
+        inside = height <= min(max(3 * sigma, 1e-3), tolerance)
+    return middle + centre, axes.T[::-1].copy(), sigma, inside
+
+
+@dataclass(frozen=True)
+class Centre:
+    """Where and when a beam meets the centre of an outline in a plane.
+
+    Parameters
+    ----------
+    position : (3,) array
+        Units: m.
+    covariance : (3, 3) array
+        Units: m^2.
+    gps_time : float
+        Units: s.
+    duration : float
+        Standard deviation of the points' times. Units: s.
+    normal : (3,) array
+        Towards the scanner.
+    """
+
+    position: np.ndarray
+    covariance: np.ndarray
+    gps_time: float
+    duration: float
+    normal: np.ndarray
+
+
+def centre_of(echoes: "Echoes", plane: Plane, outline: "Outline", rows: np.ndarray) -> Centre:
+    """Centre of an outline in space from the points on the target.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    plane : Plane
+    outline : Outline
+    rows : (k,) int array
+        Points on the target.
+
+    Height and time there follow by regression, as the points may lie on one side of it. A plane
+    too far moves the centre along the beam. Range noise may be correlated from point to point,
+    which plain sigmas of a fit overlook: the residuals tell by how much.
+    """
+    crossing = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
+    weights = np.linalg.pinv(np.column_stack([np.ones(len(rows)), crossing - outline.centre]))[0]
+    height = plane.coordinates(echoes.xyz[rows])[:, 2]
+    free = max(len(rows) - 3, 1)
+    variance = plane.sigma**2 * (free + 2) / free * _correlation_factor(height)
+    beam = plane.axes @ echoes.sight(rows).mean(axis=0)
+    covariance = variance * (weights @ weights) * np.outer(beam, beam) / beam[2] ** 2
+    covariance[:2, :2] += outline.covariance
+    time = echoes.gps_time[rows] - echoes.gps_time[0]
+    span = echoes.gps_time[[0, -1]] - echoes.gps_time[0]
+    floor = (SETTINGS.rounding / 3) ** 2  # what rounding leaves in a mean of many points
+    return Centre(
+        position=plane.origin + outline.centre @ plane.axes[:2],
+        covariance=plane.axes.T @ covariance @ plane.axes + floor * np.eye(3),
+        gps_time=float(echoes.gps_time[0] + np.clip(weights @ time, *span)),
+        duration=float(time.std()),
+        normal=-plane.axes[2] if beam[2] > 0 else plane.axes[2],
+    )
+
+
+def _correlation_factor(residual):
+    """By how much correlation from point to point raises the variance of a mean, at least 1.
+
+    Source: 1 + 2 sum of the autocorrelation up to where it is lost in its own noise.
+    """
+    n, centred = len(residual), residual - residual.mean()
+    total, factor = centred @ centred, 1.0
+    for lag in range(1, n // 4):
+        correlation = centred[lag:] @ centred[:-lag] / max(total, 1e-30)
+        if correlation < 2 / np.sqrt(n):
+            break
+        factor += 2 * correlation
+    return factor

@@ -1,0 +1,273 @@
+"""Where in a piece of cloud a target may be: bright components, flat patches, gaps in patches."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import Delaunay, cKDTree
+
+from mlscorr.targets._clusters import bright_components, components
+from mlscorr.targets._echoes import Echoes
+from mlscorr.targets._plane import Plane, fit_plane, most_common
+from mlscorr.targets.regions import BrightRegion
+from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets.shapes import diameter
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A place to fit a shape at.
+
+    Parameters
+    ----------
+    rows : (n,) int array
+        Points on the target; about a hole, those of the board.
+    plane : Plane
+    threshold : float
+        Of intensity between dark and bright.
+    by_edges : bool
+        Whether intensity tells nothing.
+    extent : float
+        About the longest extent of what is visible. Units: m.
+    middle : (2,) array
+        About the centre, in the plane. Units: m.
+    bloomed : bool
+        Whether the receiver was saturated: the outline may be larger than the size.
+    mesh : float
+        Of the points about a gap, whose extent is of the largest circle without points. Units: m.
+    """
+
+    rows: np.ndarray
+    plane: Plane
+    threshold: float
+    by_edges: bool
+    extent: float
+    middle: np.ndarray
+    bloomed: bool = False
+    mesh: float = 0.0
+
+
+def region_seeds(
+    echoes: Echoes, region: BrightRegion, origin: np.ndarray, kind: str, size: float | None
+) -> Iterator[Seed]:
+    """Seeds in one bright region.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    region : BrightRegion
+    origin : (3,) array
+        Of the echoes, in the region's coordinates. Units: m.
+    kind : str
+    size : float or None
+        Units: m.
+    """
+    apart = np.linalg.norm(echoes.xyz - (region.centre - origin), axis=1)
+    rows = np.flatnonzero((apart <= region.radius) & (echoes.intensity >= region.threshold))
+    guess = size or 1.4 * region.radius  # half a square's diagonal
+    yield from _bright_parts(echoes, rows, region.threshold, kind, size, guess)
+
+
+def bright_seeds(echoes: Echoes, kind: str, size: float | None) -> Iterator[Seed]:
+    """Seeds at bright components of the extent of a shape.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    kind : str
+    size : float or None
+        Of any extent where it is None. Units: m.
+    """
+    for guess in SETTINGS.size_guesses if size is None else (size,):
+        for level, rows in bright_components(echoes.xyz, echoes.intensity, guess):
+            yield from _bright_parts(echoes, rows, level, kind, size, guess)
+
+
+def plate_seeds(
+    echoes: Echoes, kind: str, size: float | None, rng: np.random.Generator
+) -> Iterator[Seed]:
+    """Seeds at flat patches of the extent of a shape, whatever their intensity.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    kind : str
+    size : float or None
+        Of any extent where it is None. Units: m.
+    rng : numpy.random.Generator
+    """
+    for guess in SETTINGS.size_guesses if size is None else (size,):
+        for plane, rows in flat_patches(echoes, guess, rng):
+            points = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
+            for share in SETTINGS.link_shares:
+                for part in components(points, max(share * guess, 2 * SETTINGS.thickness)):
+                    extent = _extent(points[part], kind, size, guess)
+                    if extent is not None:
+                        yield Seed(rows[part], plane, 0.0, True, *extent)
+
+
+def hole_seeds(echoes: Echoes, size: float | None, rng: np.random.Generator) -> Iterator[Seed]:
+    """Seeds at round gaps in flat patches: where a circle of the size holds no point of it.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    size : float or None
+        Units: m.
+    rng : numpy.random.Generator
+    """
+    for plane, rows in flat_patches(echoes, size or np.median(SETTINGS.size_guesses), rng):
+        points = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
+        for middle, radius, mesh in _gaps(echoes, plane, points, size):
+            about = np.linalg.norm(points - middle, axis=1) < 2.5 * radius
+            if about.sum() >= SETTINGS.smallest_count:
+                yield Seed(rows[about], plane, 0.0, True, 2 * radius, middle, mesh=mesh)
+
+
+def flat_patches(
+    echoes: Echoes, size: float, rng: np.random.Generator
+) -> Iterator[tuple[Plane, np.ndarray]]:
+    """Planes of a piece with the rows on each, most points first; a point is on one of them.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    size : float
+        Of a target. Units: m.
+    rng : numpy.random.Generator
+    """
+    left = _thinned(echoes.xyz, size / 12, rng)
+    smallest = SETTINGS.smallest_count / 2
+    for _ in range(SETTINGS.patches):
+        if len(left) < smallest:
+            return
+        triples = _near_triples(echoes.xyz[left], size, rng)
+        on_plane = most_common(echoes.xyz[left], triples, echoes.tolerance)
+        if on_plane.sum() < smallest:
+            return
+        plane = fit_plane(echoes.xyz[left[on_plane]], echoes.tolerance)
+        height = np.abs(plane.coordinates(echoes.xyz)[:, 2])
+        yield plane, np.flatnonzero((height <= echoes.tolerance) & _steep(echoes, plane))
+        left = left[height[left] > echoes.tolerance]
+
+
+def _steep(echoes, plane):
+    """Which beams can be said to cross a plane."""
+    sight = echoes.sight(slice(None))
+    return np.abs(sight @ plane.axes[2]) > SETTINGS.grazing * np.linalg.norm(sight, axis=1)
+
+
+def _near_triples(xyz, size, rng):
+    """Rows (k, 3) of three points near each other."""
+    seeds = rng.integers(len(xyz), size=SETTINGS.plane_trials)
+    balls = cKDTree(xyz).query_ball_point(xyz[seeds], size / 2)
+    pairs = [[ball[int(i * len(ball))] for i in rng.random(2)] for ball in balls]
+    return np.column_stack([seeds, pairs])
+
+
+def _bright_parts(echoes, rows, threshold, kind, size, guess):
+    """Seeds at the flat parts of a bright component, larger where the receiver was saturated."""
+    if len(rows) < SETTINGS.smallest_count:
+        return
+    bloomed = bool(np.mean(echoes.intensity[rows] >= echoes.intensity.max()) > 0.5)
+    bloom = SETTINGS.bloom if bloomed else 1.0
+    for part, plane, points in _flat_parts(echoes, rows, guess):
+        extent = _extent(points, kind, size, guess, bloom)
+        if extent is not None:
+            yield Seed(part, plane, threshold, False, *extent, bloomed)
+
+
+def _flat_parts(echoes, rows, size):
+    """Flat parts of a component, with their planes and places in them: itself, or what is left of
+    it without a post or pole before or beside it.
+    """
+    for _ in range(3):
+        if len(rows) < SETTINGS.smallest_count:
+            return
+        xyz = echoes.xyz[rows]
+        longest = np.linalg.norm(np.ptp(xyz, axis=0))
+        if longest + 2 * echoes.tolerance < size / 2:  # too small on whatever plane
+            return
+        plane = fit_plane(xyz, echoes.tolerance)
+        flat, whole = rows[plane.inliers], plane.inliers.mean() >= 0.7
+        points = plane.crossing(xyz[plane.inliers], echoes.sight(flat))
+        link = SETTINGS.link_shares[-1] * size
+        parts = [np.arange(len(flat))] if whole else components(points, link)
+        for part in parts:
+            if len(part) >= SETTINGS.smallest_count and np.isfinite(points[part]).all():
+                yield flat[part], plane, points[part]  # no beam runs along the plane
+        if whole:
+            return
+        rows = rows[~plane.inliers]
+
+
+def _extent(points, kind, size, guess, bloom=1.0):
+    """Longest extent and middle (2,) of points (n, 2) if a shape may have it, else None."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    shortest, longest = np.sort(high - low)
+    if size is None:
+        fits = guess / 2 <= longest <= 2 * guess and shortest >= 0.4 * longest
+    else:
+        fits = longest <= (2 - SETTINGS.smallest_length) * bloom * diameter(kind, size)
+        fits &= longest >= SETTINGS.smallest_length * size
+        fits &= shortest >= SETTINGS.smallest_width * size
+    return (float(longest), (low + high) / 2) if fits else None
+
+
+def _gaps(echoes, plane, points, size):
+    """Middle (2,), radius and mesh (m) of the largest circles with no point on or before a patch.
+
+    They are circumcircles of the Delaunay triangles (their centres are Voronoi's corners).
+    """
+    height, beam = plane.coordinates(echoes.xyz)[:, 2], echoes.sight(slice(None)) @ plane.axes[2]
+    blocked = (height * beam < 0) & (np.abs(height) > echoes.tolerance)
+    blocked &= _steep(echoes, plane)
+    known = np.vstack([points, plane.crossing(echoes.xyz[blocked], echoes.sight(blocked))])
+    known = known[:: len(known) // SETTINGS.piece_points + 1]
+    if len(known) < SETTINGS.smallest_count:
+        return
+    a, b, c = np.moveaxis(known[Delaunay(known).simplices], 1, 0)
+    centre, radius = _circumcircles(a, b, c)
+    low, high = (SETTINGS.thickness, 0.75) if size is None else (0.4 * size, 0.75 * size)
+    if size is None:
+        low = max(low, 2.5 * float(np.median(radius)))
+    order = np.argsort(-radius)
+    order = order[(radius[order] >= low) & (radius[order] <= high)]
+    centres = []
+    tree = cKDTree(points)
+    for i in order:
+        apart = all(np.linalg.norm(centre[i] - other) > radius[i] for other in centres)
+        if apart and _surrounded(
+            points[tree.query_ball_point(centre[i], 1.5 * radius[i])], centre[i]
+        ):
+            centres.append(centre[i])
+            near = np.linalg.norm(centre - centre[i], axis=1) < 2 * radius[i]
+            yield centre[i], float(radius[i]), float(np.median(radius[near]))
+        if len(centres) >= SETTINGS.patches:
+            return
+
+
+def _surrounded(points, middle):
+    """Whether points (n, 2) lie all round a place: in three quarters of the directions."""
+    direction = np.arctan2(*(points - middle).T)
+    return len(np.unique(np.floor(direction / (2 * np.pi) * 16))) >= 12
+
+
+def _circumcircles(a, b, c):
+    """Centre (n, 2) and radius (n,) of the circles through three points each."""
+    b, c = b - a, c - a
+    twice = 2 * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+    square_b, square_c = np.sum(b * b, axis=1), np.sum(c * c, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = (c[:, 1] * square_b - b[:, 1] * square_c) / twice
+        y = (b[:, 0] * square_c - c[:, 0] * square_b) / twice
+    radius = np.hypot(x, y)
+    return a + np.column_stack([x, y]), np.where(np.isfinite(radius), radius, np.inf)
+
+
+def _thinned(xyz, voxel, rng):
+    """Rows of one point in each voxel, and at most SETTINGS.piece_points of them."""
+    _, rows = np.unique(np.floor(xyz / max(voxel, 0.02)).astype(int), axis=0, return_index=True)
+    if len(rows) > SETTINGS.piece_points:
+        rows = rng.choice(rows, SETTINGS.piece_points, replace=False)
+    return np.sort(rows)

@@ -1,0 +1,223 @@
+"""From a seed to a fitted target: roughly first, which most seeds don't survive, then exactly."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.survey import Scanner
+from mlscorr.targets._assessment import Assessment, assess
+from mlscorr.targets._echoes import Echoes, beams_at_plane, missed_points
+from mlscorr.targets._outline import Outline, Size, fit_outline
+from mlscorr.targets._plane import fit_plane
+from mlscorr.targets._seeds import Seed
+from mlscorr.targets.settings import SETTINGS
+from mlscorr.targets.shapes import BRIGHT, DARK, MISS, diameter, distance_inside, form_of
+
+
+@dataclass(frozen=True)
+class ShapeFit:
+    """A shape fitted at a seed, with the beams that tell it.
+
+    Parameters
+    ----------
+    seed : Seed
+    kind : str
+    size : float or None
+        As surveyed. Units: m.
+    beams : (n, 2), (n,) and (n,) arrays
+        Crossings (m), state, and rows of the echoes; -1 where nothing returned.
+    outline : Outline
+    assessment : Assessment
+    """
+
+    seed: Seed
+    kind: str
+    size: float | None
+    beams: tuple[np.ndarray, np.ndarray, np.ndarray]
+    outline: Outline
+    assessment: Assessment
+
+    @property
+    def position(self) -> np.ndarray:
+        """Centre (3,) in the coordinates of the echoes. Units: m."""
+        return self.seed.plane.origin + self.outline.centre @ self.seed.plane.axes[:2]
+
+    @property
+    def on_target(self) -> np.ndarray:
+        """Which of the beams met the target (n,): about a hole, the board within a radius more."""
+        points, state, _ = self.beams
+        row = self.outline.row
+        row[4] = 0.0
+        inside = distance_inside(points, row, form_of(self.kind, self.seed.by_edges))
+        if self.kind == "hole":
+            inside = np.where(inside < 0, inside + self.outline.size / 2, -1.0)
+        if self.kind in ("circle", "square") and not self.seed.by_edges:
+            return (state == BRIGHT) & (inside > 0)
+        return (state != MISS) & (inside > 0)
+
+
+def rough_fit(echoes: Echoes, seed: Seed, kind: str, size: float | None) -> ShapeFit | None:
+    """Fit a shape at a seed quickly; None where it can't be one.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    seed : Seed
+    kind : str
+    size : float or None
+        Units: m.
+    """
+    known = _size(seed, size, 0.0)
+    beams = _beams(echoes, seed, kind, known.high)
+    if not seed.by_edges:
+        away = np.linalg.norm(beams[0] - seed.middle, axis=1)
+        beyond = away > SETTINGS.outside_middle * diameter(kind, known.mean)
+        bright = echoes.intensity[seed.rows]
+        beams, seed = _with_threshold(echoes.intensity, beams, bright, beyond, seed)
+    points, state, _ = beams
+    blur = SETTINGS.rough_blur * known.mean
+    start = seed.middle
+    outline = fit_outline(points, state, kind, known, blur, start, seed.by_edges, rough=True)
+    if kind == "circle" and not seed.by_edges and _dark_inside(points, state, outline):
+        outline = fit_outline(points, state, kind, known, blur, start, ring=True, rough=True)
+    assessment = assess(beams, outline, kind, seed, echoes, blur)
+    return ShapeFit(seed, kind, size, beams, outline, assessment) if assessment.plausible else None
+
+
+def _beams(echoes, seed, kind, size):
+    """Crossings, state and rows of the beams about a seed; row -1 where nothing returned."""
+    beams = beams_at_plane(echoes, seed.plane, seed.middle, size, seed.threshold)
+    if kind == "hole":
+        return beams
+    missed = missed_points(echoes, seed.rows, seed.plane)
+    passed = np.full(len(missed), MISS), np.full(len(missed), -1)
+    return tuple(map(np.concatenate, zip(beams, (missed, *passed), strict=True)))
+
+
+def exact_fit(echoes: Echoes, fit: ShapeFit, scanner: Scanner) -> ShapeFit | None:
+    """Fit the outline exactly; None where that doesn't fit or hold the centre.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    fit : ShapeFit
+        Rough.
+    scanner : Scanner
+        Noise that blurs the outline.
+    """
+    if 2 * fit.on_target.sum() < SETTINGS.smallest_count:
+        return None
+    fit = _refined(echoes, fit)
+    if not fit.on_target.any() or _sight(echoes, fit)[1] < SETTINGS.grazing:
+        return None  # or a line of points alone, whose plane may hold the beams
+    seed, kind, ring = fit.seed, fit.kind, fit.outline.inner > 0
+    points, state, rows = fit.beams
+    blur, footprint = _blur(echoes, fit, scanner)
+    known, start = _size(seed, fit.size, footprint), seed.middle
+    outline = fit_outline(points, state, kind, known, blur, start, seed.by_edges, ring)
+    hidden = _contradicted(points[rows < 0], outline, form_of(kind, seed.by_edges), blur)
+    if hidden:
+        points, state, rows = points[rows >= 0], state[rows >= 0], rows[rows >= 0]
+        outline = fit_outline(points, state, kind, known, blur, start, seed.by_edges, ring)
+    beams = points, state, rows
+    assessment = assess(beams, outline, kind, seed, echoes, blur, hidden)
+    fit = replace(fit, beams=beams, outline=outline, assessment=assessment)
+    kept = 2 * fit.on_target.sum() >= SETTINGS.smallest_count
+    return fit if assessment.accepted and kept else None
+
+
+def _refined(echoes, fit):
+    """The fit with plane and beams anew from all points that are on the target by the rough one."""
+    seed = fit.seed
+    on_target = fit.beams[2][fit.on_target]
+    plane = fit_plane(echoes.xyz[on_target], echoes.tolerance).turned_like(seed.plane)
+    shift = (fit.position - plane.origin) @ plane.axes[:2].T
+    seed = replace(seed, rows=on_target, plane=plane, middle=shift)
+    points, state, rows = beams = _beams(echoes, seed, fit.kind, fit.outline.size)
+    fit = replace(fit, seed=seed, outline=replace(fit.outline, centre=shift))
+    if not seed.by_edges and fit.kind != "checkerboard":  # whose threshold holds for both
+        inside = distance_inside(points, fit.outline.row, form_of(fit.kind, False))
+        beyond = inside < -2 * SETTINGS.rough_blur * fit.outline.size
+        bright = echoes.intensity[rows[(state != MISS) & (inside > 0)]]
+        if len(bright):
+            beams, seed = _with_threshold(echoes.intensity, beams, bright, beyond, seed)
+    return replace(fit, seed=seed, beams=beams)
+
+
+def _contradicted(missed, outline, form, blur):
+    """Whether beams that met nothing lie well inside the outline: then something out of sight
+    stood in front, and they say nothing.
+    """
+    inside = (
+        distance_inside(missed, outline.row, form) > 3 * blur + SETTINGS.rough_blur * outline.size
+    )
+    return inside.sum() > max(2, SETTINGS.contradiction * len(missed))
+
+
+def _size(seed, size, footprint):
+    """What is known of the outline's size: the beam's width moves it to and fro."""
+    if size is None and seed.mesh:  # a hole is smaller than the gap by less than the mesh
+        low = max(seed.extent - 2 * seed.mesh, seed.extent / 2)
+        return Size((low + seed.extent) / 2, np.inf, low, seed.extent + seed.mesh / 2)
+    if size is None:
+        return Size(0.85 * seed.extent, np.inf, 0.55 * seed.extent, 1.2 * seed.extent)
+    sigma = np.hypot(2 * SETTINGS.rounding, footprint)
+    if seed.bloomed:
+        return Size(1.1 * size, np.inf, size - 4 * sigma, SETTINGS.bloom * size)
+    return Size(size, sigma, size - 4 * sigma, size + 4 * sigma)
+
+
+def _dark_inside(points, state, outline):
+    """Whether what lies about the centre of a disc is dark: then it is a ring."""
+    about = np.linalg.norm(points - outline.centre, axis=1) < SETTINGS.core * outline.size
+    return (about & (state == DARK)).sum() > max(3, 0.5 * about.sum())
+
+
+def _with_threshold(intensity, beams, bright, outside, seed):
+    """The beams with their state by a threshold, and the seed with it: half way between bright
+    and dark.
+
+    bright are intensities on the target, outside tells which beams certainly aren't; where none
+    of these returned from the plane, half as bright is dark, and where they are nearly as bright,
+    the threshold is the seed's own.
+    """
+    points, state, rows = beams
+    dark = intensity[rows[outside & (state != MISS)]]
+    # the brighter of what lies outside: beside a dark board, the wall that it hangs on
+    dark = np.percentile(dark, 90) if len(dark) >= SETTINGS.smallest_count / 4 else 0.0
+    bright = np.median(bright)
+    is_apart = dark < SETTINGS.same_surface * bright
+    threshold = (bright + dark) / 2 if is_apart else seed.threshold
+    returned = np.where(intensity[rows] >= threshold, BRIGHT, DARK)
+    beams = points, np.where(state == MISS, MISS, returned), rows
+    return beams, replace(seed, threshold=float(threshold))
+
+
+def _sight(echoes, fit):
+    """Distance (m) of what was seen on the target, and the cosine of the angle of incidence."""
+    sight = echoes.sight(fit.beams[2][fit.on_target]).mean(axis=0)
+    distance = np.linalg.norm(sight)
+    return distance, abs(sight @ fit.seed.plane.axes[2]) / distance
+
+
+def _blur(echoes, fit, scanner):
+    """One sigma (m) of a beam's place across the outline, and that of the outline's size.
+
+    From angle noise and the beam's own width. A beam counts as bright from half its width on, and
+    how exactly half is as good as intensities repeat; at edges of plates nobody knows the share
+    that returns, but it is the same all round.
+    """
+    _, state, rows = fit.beams
+    on_target = fit.on_target
+    distance, cosine = _sight(echoes, fit)
+    slant = np.sqrt((1 + 1 / cosine**2) / 2)  # both ways in the plane, on average
+    beam = distance * SETTINGS.divergence / 4 * slant
+    intensity = echoes.intensity[rows[on_target & (state == BRIGHT)]].astype(float)
+    speckle = SETTINGS.speckle
+    if len(intensity) > 5 and not fit.seed.by_edges:
+        spread = 0.74 * np.subtract(*np.percentile(intensity, [75, 25]))
+        speckle = float(np.clip(spread / max(np.median(intensity), 1e-9), speckle / 4, 0.5))
+    half = np.sqrt(np.pi / 2)  # sigmas of a beam per unit of speckle, by its slope at half power
+    angle = distance * scanner.angle_noise * slant
+    blur = np.linalg.norm([angle, half * speckle * beam, SETTINGS.rounding])
+    return float(blur), float(beam)

@@ -1,0 +1,181 @@
+"""Painted lines and dashes by where scan lines cross them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from mlscorr.survey import Columns, TieFeatures
+from mlscorr.ties._paint import Crossings
+from mlscorr.ties.settings import SETTINGS
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stripes(Columns):
+    """Straight lines through the crossings of n pieces of paint.
+
+    Parameters
+    ----------
+    group : (n,) int array
+        Of its crossings.
+    count : (n,) int array
+        Of its crossings.
+    gps_time : (n,) array
+        Mean of them. Units: s.
+    centre : (n, 3) array
+        Mean of them. Units: m.
+    along : (n, 3) array
+        Unit vector, level.
+    ends : (n, 2) array
+        How far it reaches along that from the centre. Units: m.
+    begin, end : (n,) array
+        When it was first and last seen. Units: s.
+    length, width : (n,) array
+        Variances of the crossings along and across. Units: m^2.
+    pace : (n,) array
+        Gradient of time along. Units: s/m.
+    edges : (n,) array
+        Mean variance of a crossing. Units: m^2.
+    """
+
+    group: np.ndarray
+    count: np.ndarray
+    gps_time: np.ndarray
+    centre: np.ndarray
+    along: np.ndarray
+    ends: np.ndarray
+    begin: np.ndarray
+    end: np.ndarray
+    length: np.ndarray
+    width: np.ndarray
+    pace: np.ndarray
+    edges: np.ndarray
+
+
+def find_markings(crossings: Crossings, start: float) -> TieFeatures:
+    """Painted lines, a cell of each in a row, and dashes, both of whose ends were seen.
+
+    Parameters
+    ----------
+    crossings : Crossings
+        All of their windows.
+    start : float
+        Of moments and windows. Units: s.
+
+    Returns
+    -------
+    TieFeatures
+        The group stands for pass_number and scanner.
+    """
+    since = crossings.gps_time - start
+    whole = _connected(crossings, window_of(since))
+    moment = np.floor(since / SETTINGS.moment)
+    pieces = _numbered(whole, moment, np.floor(crossings.place[:, :2] / SETTINGS.cell))
+    dashes = _with_both_ends(fit_stripes(crossings, whole), start)
+    return TieFeatures.concatenate([_lines(fit_stripes(crossings, pieces)), _dashes(dashes)])
+
+
+def _lines(pieces):
+    """Pieces of lines: where they are across."""
+    # what all crossings share of their edges doesn't scatter; across the line it is less than along
+    # the scan lines, but for those that cross straight
+    variance = np.maximum(pieces.edges - pieces.width, 0.0) + pieces.width / pieces.count
+    across = np.cross(pieces.along, [0.0, 0.0, 1.0])
+    return _features("line", pieces, pieces.centre, across, variance, np.sqrt(pieces.length))
+
+
+def _dashes(dashes):
+    """Dashes: where the middle between their ends is along."""
+    centre = dashes.centre + dashes.ends.mean(axis=1)[:, None] * dashes.along
+    size = np.diff(dashes.ends)[:, 0]
+    # either end is anywhere between two scan lines, as likely as elsewhere
+    variance = (size / (dashes.count - 1)) ** 2 / 24
+    return _features("dash", dashes, centre, dashes.along, variance, size / np.sqrt(12))
+
+
+def _features(kind, stripes, centre, direction, variance, extent):
+    return TieFeatures(
+        pass_number=stripes.group, scanner=stripes.group, kind=np.full(len(stripes), kind),
+        gps_time=stripes.gps_time, centre=centre, direction=direction, variance=variance,
+        tilt=stripes.width / stripes.count / stripes.length, extent=extent, points=stripes.count,
+        sweep=stripes.pace[:, None] * stripes.along,
+    )  # fmt: skip
+
+
+def window_of(since: np.ndarray) -> np.ndarray:
+    """Number (n,) of the window in which paint is followed: a dash is cut in few of them.
+
+    Parameters
+    ----------
+    since : (n,) array
+        The start. Units: s.
+    """
+    return np.floor(since / SETTINGS.pause)
+
+
+def _with_both_ends(dashes, start):
+    """Those seen at once, and wholly in one window: two lost crossings are no end."""
+    took = dashes.end - dashes.begin
+    margin = 3 * took / (dashes.count - 1)
+    begin, end = (window_of(t - start) for t in (dashes.begin - margin, dashes.end + margin))
+    return dashes[(begin == end) & (took <= SETTINGS.moment)]
+
+
+def _numbered(*columns):
+    """Number (n,) from 0 of each different row of columns (n,) or (n, k)."""
+    return np.unique(np.column_stack(columns), axis=0, return_inverse=True)[1].ravel()
+
+
+def _connected(crossings, window):
+    """Number (n,) of what each crossing is of: those near each other in a window of a group."""
+    if len(crossings) == 0:
+        return np.empty(0, int)
+    radius = SETTINGS.cell / 2
+    key = _numbered(crossings.group, window)
+    place = crossings.place[:, :2] - crossings.place[0, :2]
+    tree = cKDTree(np.column_stack([place, 2 * radius * key]))
+    pairs = tree.query_pairs(radius, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), pairs.T), (len(place), len(place)))
+    return connected_components(links, directed=False)[1]
+
+
+def fit_stripes(crossings: Crossings, number: np.ndarray) -> Stripes:
+    """The Stripes of pieces of paint that are long and straight.
+
+    Parameters
+    ----------
+    crossings : Crossings
+    number : (n,) int array
+        Of each one's piece, from 0.
+    """
+    count = np.bincount(number)
+    place, time = crossings.place, crossings.gps_time
+
+    def mean(values):
+        return np.bincount(number, values) / np.maximum(count, 1)
+
+    rows = np.full(len(count), len(number))
+    np.minimum.at(rows, number, np.arange(len(number)))
+    origin = place[rows]
+    centre = origin + np.column_stack([mean(c) for c in (place - origin[number]).T])
+    gps_time = time[rows] + mean(time - time[rows][number])
+    x, y, _ = (place - centre[number]).T
+    covariance = np.stack([mean(x * x), mean(x * y), mean(x * y), mean(y * y)], axis=1)
+    values, axes = np.linalg.eigh(covariance.reshape(-1, 2, 2))
+    along = np.column_stack([axes[:, :, 1], np.zeros(len(count))])
+    way = x * along[number, 0] + y * along[number, 1]
+    ends, times = (np.tile([np.inf, -np.inf], (len(count), 1)) for _ in range(2))
+    for extremes, column in ((ends, way), (times, time)):
+        np.minimum.at(extremes[:, 0], number, column)
+        np.maximum.at(extremes[:, 1], number, column)
+    length = np.maximum(values[:, 1], SETTINGS.rounding**2)
+    stripes = Stripes(
+        group=crossings.group[rows], count=count, gps_time=gps_time, centre=centre, along=along,
+        ends=ends, begin=times[:, 0], end=times[:, 1], length=length,
+        width=np.maximum(values[:, 0], 0.0) * count / np.maximum(count - 2, 1),
+        pace=mean((time - gps_time[number]) * way) / length, edges=mean(crossings.variance),
+    )  # fmt: skip
+    kept = (count >= SETTINGS.crossings) & (stripes.width <= SETTINGS.roughest**2)
+    return stripes[kept & (stripes.length >= SETTINGS.narrowest**2)]

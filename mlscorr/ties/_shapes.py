@@ -1,0 +1,228 @@
+"""Planes and poles among cells, from the moments of their points alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlscorr.frames import scanner_position
+from mlscorr.survey import Columns, Survey, TieFeatures
+from mlscorr.ties._faces import COLUMNS, ROWS, join_across_faces
+from mlscorr.ties.settings import SETTINGS
+
+# Visible is the half of a pole that faces the scanner, its points evenly spread across the beam:
+# their mean lies pi / 4 of the radius before the axis, their variance across is radius^2 / 3, and
+# that along the beam (2/3 - pi^2 / 16) radius^2. Of a square one that shows two sides they lie
+# 1 / (1 + sin 2 a) of half its width before it, turned by a: 2 / pi on average.
+DEPTH, SQUARE_DEPTH, ACROSS, ALONG = np.pi / 4, 2 / np.pi, 1 / 3, 2 / 3 - np.pi**2 / 16
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Shapes(Columns):
+    """What cells hold: as in TieFeatures, and the way from the mean of the points to the centre.
+
+    Parameters
+    ----------
+    rows : (n,) int array
+        Of the cells.
+    direction : (n, 3) array
+    variance, tilt, extent : (n,) array
+    shift : (n, 3) array
+        Units: m.
+    """
+
+    rows: np.ndarray
+    direction: np.ndarray
+    variance: np.ndarray
+    tilt: np.ndarray
+    extent: np.ndarray
+    shift: np.ndarray
+
+
+def covariances(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Covariances of the points of cells, and of their noise by differences of neighbours.
+
+    Parameters
+    ----------
+    moments : (n, 21) array
+        See mlscorr.ties._cells.
+
+    Returns
+    -------
+    covariance : (n, 3, 3) array
+        Units: m^2.
+    noise : (n, 3, 3) array
+        Half the mean product of the differences; NaN where neighbours are too rare. Units: m^2.
+    """
+    count, followers = moments[:, :1], moments[:, 11:12]
+    mean = moments[:, 2:5] / count
+    products = moments[:, 5:11] / count - mean[:, ROWS] * mean[:, COLUMNS]
+    differences = moments[:, 12:18] / np.maximum(2 * followers, 1.0)
+    differences[~_is_ordered(moments)] = np.nan  # points in no order, or beams that take turns
+    return _symmetric(products), _symmetric(differences)
+
+
+def _symmetric(products):
+    matrix = np.empty((len(products), 3, 3))
+    matrix[:, ROWS, COLUMNS] = matrix[:, COLUMNS, ROWS] = products
+    return matrix
+
+
+def find_shapes(
+    survey: Survey, middle: np.ndarray, begin: np.ndarray, group: np.ndarray, moments: np.ndarray
+) -> TieFeatures:
+    """The planes and poles among cells.
+
+    Parameters
+    ----------
+    survey : Survey
+    middle : (n, 3) array
+        Of the cells. Units: m.
+    begin : (n,) array
+        Of the cells' moments. Units: s.
+    group : (n,) int array
+        Of each cell; it stands for pass_number and scanner in what is returned.
+    moments : (n, 21) array
+        See mlscorr.ties._cells.
+    """
+    moments, way = join_across_faces(middle, begin, group, moments)
+    full = np.flatnonzero(moments[:, 0] >= SETTINGS.points)
+    covariance, noise = covariances(moments[full])
+    # lambda_0 is not below det / (sum of the principal minors): spares what is no plane its axes
+    minors = (np.trace(covariance, axis1=1, axis2=2) ** 2 - (covariance**2).sum(axis=(1, 2))) / 2
+    is_thin = np.linalg.det(covariance) <= SETTINGS.roughest**2 * minors
+    is_thin |= covariance[:, 0, 0] + covariance[:, 1, 1] <= SETTINGS.thickest**2
+    rows = np.flatnonzero(is_thin)
+    cells = middle, begin, group, moments, way
+    middle, begin, group, moments, way = (column[full[rows]] for column in cells)
+    values, axes = np.linalg.eigh(covariance[rows])
+    values = np.maximum(values, SETTINGS.rounding**2)  # points of a file may be the same
+    count = moments[:, 0]
+    time, local = begin + moments[:, 1] / count, moments[:, 2:5] / count[:, None]
+    sight = middle + local - scanner_position(survey.trajectory, survey.mounting, time)
+    sight /= np.linalg.norm(sight, axis=1, keepdims=True)
+    believed = survey.scanner.range_noise**2 * np.eye(3)
+    between = np.where(np.isnan(noise[rows]), believed, noise[rows])
+    planes = _planes(moments, values, axes, between, sight)
+    poles = _poles(moments, values, axes, between, sight, way)
+    poles = poles[_stacked(middle[poles.rows], begin[poles.rows], group[poles.rows])]
+    rows = np.concatenate([planes.rows, poles.rows])
+    shapes = Shapes.concatenate([planes, poles])
+    kind = np.repeat(["plane", "pole"], [len(planes), len(poles)])
+    return TieFeatures(
+        pass_number=group[rows], scanner=group[rows], kind=kind, gps_time=time[rows],
+        centre=middle[rows] + (local[rows] + shapes.shift), direction=shapes.direction,
+        variance=shapes.variance, tilt=shapes.tilt, extent=shapes.extent,
+        points=count[rows].astype(int),
+        sweep=_sweep(moments[rows], values[rows], axes[rows], kind == "pole"),
+    )  # fmt: skip
+
+
+def _sweep(moments, values, axes, is_pole):
+    """Gradient (n, 3) of the points' times over planes, or along poles. Units: s/m."""
+    along = np.einsum("nik,ni->nk", axes, _with_time(moments)) / values
+    along[:, 0] = 0.0
+    along[is_pole, 1] = 0.0
+    return np.einsum("nik,nk->ni", axes, along)
+
+
+def _with_time(moments):
+    """Covariances (n, 3) of the points' places with their times. Units: m s."""
+    count = moments[:, :1]
+    return moments[:, 18:21] / count - moments[:, 1:2] * moments[:, 2:5] / count**2
+
+
+def _planes(moments, values, axes, noise, sight):
+    """Those of cells that hold a plane."""
+    normal, points = axes[:, :, 0], moments[:, 0]
+    variance, of_mean = _scatter(values[:, 0], moments, _along(normal, noise))
+    slant = np.einsum("ni,ni->n", normal, sight)
+    is_plane = (variance <= SETTINGS.roughest**2) & (values[:, 1] >= SETTINGS.narrowest**2)
+    is_plane &= np.abs(slant) >= SETTINGS.grazing
+    direction = normal * -np.sign(slant)[:, None]
+    shift, narrow = np.zeros_like(normal), values[:, 1]
+    rows = np.arange(len(points))
+    shapes = Shapes(rows, direction, of_mean, of_mean / narrow, np.sqrt(narrow), shift)
+    return shapes[is_plane]
+
+
+def _scatter(variance, moments, between):
+    """Variance about a plane (n,), and that of its mean. Units: m^2.
+
+    What neighbours on a scan line differ by is noise, and independent; the rest is the surface.
+    Neighbours that correlate by 1 - 1 / ripple, as in a first-order autoregression, leave of the
+    points of a line 1 / (2 ripple - 1). Across the lines the surface is as smooth as along them:
+    what is curved or broken is in a piece, and its mean no better than its roughness.
+    """
+    points = moments[:, 0]
+    variance = variance * points / (points - 3)
+    between = np.clip(between, SETTINGS.rounding**2, variance)
+    lines = _lines(moments)
+    pieces = np.maximum(points / lines / (2 * variance / between - 1), 1.0)
+    pieces = pieces * np.minimum(lines, pieces)
+    return variance, between / points + (variance - between) / pieces
+
+
+def _lines(moments):
+    """Number of scan lines (n,), or about so where the order of points doesn't tell."""
+    points, followers = moments[:, 0], moments[:, 11]
+    return np.where(_is_ordered(moments), points - followers, np.sqrt(points))
+
+
+def _is_ordered(moments):
+    """Whether enough points (n,) follow another one of their cell: else noise can't be told."""
+    return moments[:, 11] >= moments[:, 0] / 4
+
+
+def _poles(moments, values, axes, noise, sight, way):
+    """Those of cells that hold a pole and nothing else."""
+    points, axis = moments[:, 0], axes[:, :, 2] * np.where(axes[:, 2, 2:] < 0, -1.0, 1.0)
+    across = np.cross(axis, sight)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), SETTINGS.grazing)
+    beam = np.cross(across, axis)
+    matrix = np.einsum("nik,nk,njk->nij", axes, values, axes)
+    side, deep, between = _along(across, matrix), _along(beam, matrix), _along(beam, noise)
+    radius = np.sqrt(side / ACROSS)
+    # by variance a round pole is a seventh as thick as wide; a square one, turned by 5 deg or more,
+    # shows two sides, a fifth as thick as wide and up to a third as deep; a cut arc is a
+    # twentieth as thick as wide, a strip seen askew not at all, and a bush as deep as wide
+    is_thick = values[:, 0] >= values[:, 1] / 10
+    is_round = deep <= 1.5 * ALONG * radius**2 + 2 * between
+    depth = np.where(is_round, DEPTH, SQUARE_DEPTH)
+    is_pole = is_round | is_thick & (deep <= side / 2 + 2 * between)
+    is_pole &= (values[:, 2] >= 2 * SETTINGS.narrowest**2) & (radius <= SETTINGS.thickest)
+    is_pole &= axis[:, 2] >= np.cos(SETTINGS.largest_lean)
+    # what touches the border of its cell or moment goes on beyond: it is cut, and its mean is not
+    # the whole's. Of an even strip the border is sqrt(3) sigmas away, by few points up to 2.5. What
+    # is thick is joined with what is beyond, and as wide there; what is flat may be a wall's border
+    spread = np.sqrt(np.einsum("nii->ni", matrix)[:, :2])
+    spread = np.where(is_thick[:, None], spread.max(axis=1, keepdims=True), spread)
+    way = np.where(is_thick[:, None], way[:, :2], 0.0)
+    from_middle = moments[:, 2:4] / points[:, None] - way * SETTINGS.cell / 2
+    to_border = (1 + np.abs(way)) * SETTINGS.cell / 2 - np.abs(from_middle)
+    is_pole &= (to_border >= 2.5 * spread).all(axis=1)
+    time = np.einsum("ni,ni->n", across, _with_time(moments)) / np.sqrt(np.maximum(side, 1e-12))
+    to_end = SETTINGS.moment / 2 - np.abs(moments[:, 1] / points - SETTINGS.moment / 2)
+    is_pole &= to_end >= 2.5 * np.abs(time)
+    of_radius = radius**2 / (5 * points)  # a uniform distribution's variance^2 is known to 0.8 / m
+    # evenly spaced, scan lines leave the middle open by half of a step; one tells no width
+    lines = _lines(moments)
+    is_pole &= lines > 1
+    variance = side / lines**2 + depth**2 * of_radius + (SETTINGS.roundness * radius) ** 2
+    tilt, extent = side / lines**2 / values[:, 2], np.sqrt(values[:, 2])
+    shift, rows = (depth * radius)[:, None] * beam, np.arange(len(points))
+    return Shapes(rows, axis, variance, tilt, extent, shift)[is_pole]
+
+
+def _along(vector, matrix):
+    """The forms v' M v (n,) of vectors (n, 3) and matrices (n, 3, 3)."""
+    return np.einsum("ni,nij,nj->n", vector, matrix, vector)
+
+
+def _stacked(middle, begin, group):
+    """Whether a pole (n,) goes on in the cell above or below: people and bollards don't."""
+    order = np.lexsort([*middle.T[::-1], begin, group])
+    column = np.column_stack([middle, begin, group])[order]
+    goes_on = (np.diff(column, axis=0) == [0, 0, SETTINGS.cell, 0, 0]).all(axis=1)
+    stacked = np.zeros(len(order), bool)
+    stacked[order[1:][goes_on]] = stacked[order[:-1][goes_on]] = True
+    return stacked
