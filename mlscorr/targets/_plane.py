@@ -1,17 +1,12 @@
 """Plane of a target by random sample consensus, refined by least squares."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
 
 from mlscorr.targets._sequence import quasi_random
 from mlscorr.targets.settings import SETTINGS
-
-if TYPE_CHECKING:
-    from mlscorr.targets._echoes import Echoes
-    from mlscorr.targets._outline import Outline
 
 
 @dataclass(frozen=True)
@@ -149,78 +144,3 @@ def _fit_plane(xyz, triples, tolerance):
         height = np.abs(np.sum((local - centre) * axes[:, 0], axis=1))
         inside = height <= min(max(3 * sigma, 1e-3), tolerance)
     return middle + centre, axes.T[::-1].copy(), sigma, inside
-
-
-@dataclass(frozen=True)
-class Centre:
-    """Where and when a beam meets the centre of an outline in a plane.
-
-    Parameters
-    ----------
-    position : (3,) array
-        Units: m.
-    covariance : (3, 3) array
-        Units: m^2.
-    gps_time : float
-        Units: s.
-    duration : float
-        Standard deviation of the points' times. Units: s.
-    normal : (3,) array
-        Towards the scanner.
-    """
-
-    position: np.ndarray
-    covariance: np.ndarray
-    gps_time: float
-    duration: float
-    normal: np.ndarray
-
-
-def centre_of(echoes: "Echoes", plane: Plane, outline: "Outline", rows: np.ndarray) -> Centre:
-    """Centre of an outline in space from the points on the target.
-
-    Parameters
-    ----------
-    echoes : Echoes
-    plane : Plane
-    outline : Outline
-    rows : (k,) int array
-        Points on the target.
-
-    Height and time there follow by regression, as the points may lie on one side of it. A plane
-    too far moves the centre along the beam. Range noise may be correlated from point to point,
-    which plain sigmas of a fit overlook: the residuals tell by how much.
-    """
-    crossing = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
-    weights = np.linalg.pinv(np.column_stack([np.ones(len(rows)), crossing - outline.centre]))[0]
-    height = plane.coordinates(echoes.xyz[rows])[:, 2]
-    free = max(len(rows) - 3, 1)
-    variance = plane.sigma**2 * (free + 2) / free * _correlation_factor(height)
-    beam = plane.axes @ echoes.sight(rows).mean(axis=0)
-    covariance = variance * (weights @ weights) * np.outer(beam, beam) / beam[2] ** 2
-    covariance[:2, :2] += outline.covariance
-    time = echoes.gps_time[rows] - echoes.gps_time[0]
-    span = echoes.gps_time[[0, -1]] - echoes.gps_time[0]
-    floor = (SETTINGS.rounding / 3) ** 2  # what rounding leaves in a mean of many points
-    return Centre(
-        position=plane.origin + outline.centre @ plane.axes[:2],
-        covariance=plane.axes.T @ covariance @ plane.axes + floor * np.eye(3),
-        gps_time=float(echoes.gps_time[0] + np.clip(weights @ time, *span)),
-        duration=float(time.std()),
-        normal=-plane.axes[2] if beam[2] > 0 else plane.axes[2],
-    )
-
-
-def _correlation_factor(residual):
-    """By how much correlation from point to point raises the variance of a mean, at least 1.
-
-    Source: 1 + 2 sum of the autocorrelation up to where it is lost in its own noise.
-    """
-    n, centred = len(residual), residual - residual.mean()
-    total, factor = centred @ centred, 1.0
-    for lag in range(1, n // 4):
-        correlation = centred[lag:] @ centred[:-lag] / max(total, 1e-30)
-        if correlation < 2 / np.sqrt(n):
-            break
-        factor += 2 * correlation
-    return factor

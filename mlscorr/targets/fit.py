@@ -8,9 +8,9 @@ import numpy as np
 
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import PointCloud, Scanner
+from mlscorr.targets._centre import Centre, centre_of
 from mlscorr.targets._echoes import Echoes
 from mlscorr.targets._outline import Outline
-from mlscorr.targets._plane import Centre, centre_of
 from mlscorr.targets._seeds import Seed, bright_seeds, hole_seeds, plate_seeds, region_seeds
 from mlscorr.targets._shape_fit import ShapeFit, exact_fit, rough_fit
 from mlscorr.targets.intensity import why_useless

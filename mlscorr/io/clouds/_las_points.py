@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
-from typing import TYPE_CHECKING, Any, BinaryIO
+from contextlib import contextmanager
+from typing import Any, BinaryIO
 
 import lazrs
 import numpy as np
-
-from mlscorr.io.store import open_file
-
-if TYPE_CHECKING:
-    from mlscorr.io.clouds.las_layout import LasLayout
 
 
 @contextmanager
@@ -150,49 +145,3 @@ class ChunkedPoints:
         lazrs.decompress_points_with_chunk_table(data, self._laszip, decoded, run, self._selection)
         self._next = end
         return decoded
-
-
-def decoding_points(layout: LasLayout, first: int, end: int) -> AbstractContextManager:
-    """Where lazrs reads some points of a file."""
-    points = f"Points {first} to {end - 1}" if end - first > 1 else f"Point {first}"
-    return decoding(f"{points} of {layout.points} in {layout.path} cannot be decoded")
-
-
-def read_records(
-    layout: LasLayout, chunk_size: int, first: int = 0, end: int | None = None,
-    is_brief: bool = False,
-) -> Iterator[np.ndarray]:  # fmt: skip
-    """Records chunk by chunk, each in the memory of the one before.
-
-    Parameters
-    ----------
-    layout : LasLayout
-    chunk_size : int
-        Points at a time.
-    first, end : int
-        As of read_chunks.
-    is_brief : bool
-        Whether gps_time and point_source_id do.
-
-    Yields
-    ------
-    (n,) structured array
-
-    Raises
-    ------
-    ValueError
-        For points that cannot be decoded.
-    """
-    length = layout.record_length
-    last = layout.points if end is None else end
-    buffer = np.empty(min(chunk_size, last - first) * length, np.uint8)
-    with open_file(layout.path) as file:
-        decoder = layout.decoder(file, is_brief=is_brief)
-        if first:
-            decoder.seek(first)
-        for start in range(first, last, chunk_size):
-            stop = min(start + chunk_size, last)
-            raw = buffer[: (stop - start) * length]
-            with decoding_points(layout, start, stop):
-                decoder.decompress_many(raw)
-            yield raw.view(layout.record)

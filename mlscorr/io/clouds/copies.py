@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.clouds._las_points import read_records
+from mlscorr.io.clouds._las_records import read_records
 from mlscorr.io.clouds.conversion import OPENERS, is_foreign, read_in_part
 from mlscorr.io.clouds.las import records_at
 from mlscorr.io.clouds.las_checks import HEADER_SIZES, read_layout

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlscorr.io.clouds._las_points import decoding_points, read_records
+from mlscorr.io.clouds._las_records import decoding_points, read_records
 from mlscorr.io.clouds._time_order import in_time_order
 from mlscorr.io.clouds.las_checks import read_layout
 from mlscorr.io.clouds.las_layout import LasLayout

@@ -8,7 +8,6 @@
 
 from mlscorr.io.tables.column_names import (
     ANGLES,
-    AXES,
     CONTROL_NAMES,
     TRAJECTORY_NAMES,
     UNITS,
@@ -31,3 +30,4 @@ from mlscorr.io.tables.result_tables import (
 from mlscorr.io.tables.table_rows import read_numbers
 from mlscorr.io.tables.table_sections import ControlSection, PlaceColumns
 from mlscorr.io.tables.tables import check_finite, check_increasing, read_header, read_layout
+from mlscorr.survey import AXES

@@ -15,7 +15,6 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from mlscorr.io.store import shown
-from mlscorr.survey import AXES
 
 ANGLES = ("roll", "pitch", "heading")
 PLACE_NAMES = {

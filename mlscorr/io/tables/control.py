@@ -9,7 +9,7 @@ import numpy as np
 
 from mlscorr.io.store import ENCODING, as_path, open_file, shown, warn_of_cut
 from mlscorr.io.tables._sheets import SUFFIX
-from mlscorr.io.tables.column_names import AXES, CONTROL_NAMES, WORDS, meant, same_word
+from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, meant, same_word
 from mlscorr.io.tables.control_faults import doubled_names, refuse, row_doubts, row_faults
 from mlscorr.io.tables.control_lists import (
     HINTS,
@@ -29,7 +29,7 @@ from mlscorr.io.tables.control_lists import (
 from mlscorr.io.tables.table_rows import read_rows
 from mlscorr.io.tables.table_sections import ControlSection
 from mlscorr.io.tables.tables import read_layout
-from mlscorr.survey import ControlPoints, Trajectory
+from mlscorr.survey import AXES, ControlPoints, Trajectory
 
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
 ROLES = tuple(WORDS["role"])

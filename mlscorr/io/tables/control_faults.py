@@ -10,8 +10,9 @@ from scipy.spatial import cKDTree
 
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import OpenPlace, OpenQuestion, nearest, shown
-from mlscorr.io.tables.column_names import AXES, WORDS
+from mlscorr.io.tables.column_names import WORDS
 from mlscorr.io.tables.control_lists import NORMAL, SIGMAS
+from mlscorr.survey import AXES
 
 OWN_WORDS = "Say under [control] words in survey.toml what an office's own words mean."
 AMBIGUOUS = {"cp": " It is short for control point and for check point alike: write gcp or check."}

@@ -11,14 +11,14 @@ import numpy as np
 
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import OpenPlace, OpenQuestion, shown
-from mlscorr.io.tables.column_names import AXES, CONTROL_NAMES, WORDS, OfficeWord, meant, same_word
+from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, OfficeWord, meant, same_word
 from mlscorr.io.tables.layout_search import NUMBER
 from mlscorr.io.tables.layouts import TableLayout
 from mlscorr.io.tables.nearness import distance_of
 from mlscorr.io.tables.table_rows import read_rows
 from mlscorr.io.tables.table_sections import ControlSection
 from mlscorr.io.tables.tables import missing_sentence
-from mlscorr.survey import SurveyFileError, Trajectory
+from mlscorr.survey import AXES, SurveyFileError, Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
 NORMAL = ("normal_e", "normal_n", "normal_h")

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.tables.column_names import AXES
-from mlscorr.survey import SEARCH_RADIUS, ControlPoints, Trajectory
+from mlscorr.survey import AXES, SEARCH_RADIUS, ControlPoints, Trajectory
 
 FOOT = 0.3048  # m; the US survey foot is longer by 2 ppm
 

@@ -6,8 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from mlscorr.io.tables.column_names import AXES
-from mlscorr.survey import Ties
+from mlscorr.survey import AXES, Ties
 
 
 def write_targets_csv(path: str | Path, targets: Sequence[dict]) -> None:

@@ -9,10 +9,11 @@ from scipy.spatial.transform import Rotation
 from mlscorr.frames import angles_from_attitude
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import PLACE_OF_CRS, OpenPlace, OpenQuestion
-from mlscorr.io.tables import ANGLES, AXES
+from mlscorr.io.tables import ANGLES
 from mlscorr.io.trajectories._course import heading_and_course, median_difference
 from mlscorr.io.trajectories.projection import convergence_at, project
 from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
+from mlscorr.survey import AXES
 
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNIT_TOLERANCE = 1e-3  # of a quaternion's length, where three decimals are written

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.tables import (
-    AXES,
     NUMBER,
     TRAJECTORY_NAMES,
     find_layout,
@@ -20,6 +19,7 @@ from mlscorr.io.tables import (
     read_numbers,
 )
 from mlscorr.io.trajectories.conventions import QUATERNION
+from mlscorr.survey import AXES
 
 POSITION_SUFFIX = ".pos"
 RTKLIB = {"q", "ns", "ratio"}  # plain names: quality, number of satellites, ratio of ambiguities

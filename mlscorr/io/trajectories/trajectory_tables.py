@@ -14,7 +14,6 @@ import numpy as np
 from mlscorr.io.store import OpenPlace, OpenQuestion, shown
 from mlscorr.io.tables import (
     ANGLES,
-    AXES,
     NUMBER,
     TRAJECTORY_NAMES,
     UNITS,
@@ -36,7 +35,7 @@ from mlscorr.io.trajectories.conventions import (
 from mlscorr.io.trajectories.positions import check_projected, position_file
 from mlscorr.io.trajectories.time_systems import counting_on
 from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
-from mlscorr.survey import SurveyFileError
+from mlscorr.survey import AXES, SurveyFileError
 
 COLUMNS = ("gps_time", *AXES, *ANGLES)
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from pyproj import Transformer
 
-from mlscorr.io.tables import AXES, write_csv
+from mlscorr.io.tables import write_csv
 from mlscorr.io.trajectories.projection import check_crs
-from mlscorr.survey import Trajectory
+from mlscorr.survey import AXES, Trajectory
 
 
 def write_weak(
